@@ -22,8 +22,9 @@ from jounce.kinematics.device import on_processor
 from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
 from jounce.kinematics.threads import Threads
 from jounce.native import machine
-from jounce.native.values import MOST_LINES, UnsupportedOperationError
+from jounce.native.code import MOST_LINES
 from jounce.native.programs import Program, object_file
+from jounce.native.values import UnsupportedOperationError
 from jounce.shapes import is_traced
 
 VARIABLE = "JOUNCE_NATIVE"  # 0 leaves everything to XLA
@@ -146,9 +147,7 @@ class SideBySide:
     def _loaded(self, binary: bytes, given: Any, results: Any) -> Program | None:
         return Program(binary, given, results, rows=self.rows) if binary else None
 
-    def _key(
-        self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: Mapping[str, Any]
-    ) -> str | None:
+    def _key(self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: Mapping[str, Any]) -> str | None:
         """Return the name of a program in other processes, None where it holds something of a user's own."""
         leaves, tree = jax.tree.flatten(given)
         kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *places.values(), machine.processor()]

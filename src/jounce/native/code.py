@@ -9,53 +9,41 @@ from typing import Any
 
 import numpy as np
 
-SCALARS = {"f": "double", "l": "i64", "i": "i32", "b": "i1"}
-KINDS = {np.dtype(float): "f", np.dtype(np.int64): "l", np.dtype(np.int32): "i", np.dtype(bool): "b"}
-DTYPES = {kind: dtype for dtype, kind in KINDS.items()}
-IN_MEMORY = SCALARS | {"b": "i8"}
-ARITHMETIC: dict[str, tuple[str, str, Any]] = {  # of doubles, of whole numbers, in Python
-    "add": ("fadd contract", "add", operator.add),
-    "sub": ("fsub contract", "sub", operator.sub),
-    "mul": ("fmul contract", "mul", operator.mul),
-    "div": ("fdiv", "sdiv", np.divide),
-    "max": ("maximum", "smax", np.maximum),
-    "min": ("minimum", "smin", np.minimum),
-    "rem": ("frem", "srem", np.fmod),
+from jounce.native import values
+from jounce.native.values import DTYPES, IN_MEMORY, SCALARS, Region, UnsupportedOperationError, Value, kind_of, literal
+
+MOST_LINES = 120_000  # of text: LLVM makes some 20,000 of them into machine code in a second
+DOUBLES: dict[str, tuple[str, Any]] = {  # in LLVM, in Python
+    "add": ("fadd contract", operator.add),
+    "sub": ("fsub contract", operator.sub),
+    "mul": ("fmul contract", operator.mul),
+    "div": ("fdiv", np.divide),
+    "rem": ("", np.fmod),
+    "max": ("maximum", np.maximum),
+    "min": ("minimum", np.minimum),
 }
-COMPARISONS: dict[str, tuple[str, str, Any]] = {
-    "eq": ("oeq", "eq", operator.eq),
-    "ne": ("une", "ne", operator.ne),
-    "lt": ("olt", "slt", operator.lt),
-    "le": ("ole", "sle", operator.le),
-    "gt": ("ogt", "sgt", operator.gt),
-    "ge": ("oge", "sge", operator.ge),
+INTEGERS: dict[str, tuple[str, Any]] = {
+    "add": ("add", operator.add),
+    "sub": ("sub", operator.sub),
+    "mul": ("mul", operator.mul),
+    "div": ("sdiv", values.quotient),
+    "rem": ("srem", values.remainder),
+    "max": ("smax", max),
+    "min": ("smin", min),
 }
-INTRINSICS = frozenset("sqrt fabs floor ceil roundeven round".split())
-
-
-class UnsupportedOperationError(Exception):
-    """An operation that this room has no code for."""
-
-
-@dataclass(frozen=True, eq=False)
-class Region:
-    """Numbers of one kind one after another in memory, each alone or as a vector of lanes."""
-
-    pointer: str
-    kind: str
-    lanes: bool
-    given: bool = False  # by the caller: lanes of a number lie `%total` apart, and nothing is written there
-
-
-@dataclass(frozen=True, eq=False)
-class Value:
-    """A number of the program: a constant, or what an operation before has found, for each lane or for all."""
-
-    name: str
-    kind: str
-    lanes: bool
-    constant: Any = None
-    home: tuple[Region, int] | None = None  # where it is in memory, as long as it can be used
+BOOLEANS = {"add": "or", "max": "or", "mul": "and", "min": "and"}
+COMMUTATIVE = frozenset("add mul max min".split())
+NEUTRAL = {"add": 0, "sub": 0, "mul": 1, "div": 1}
+COMPARISONS: dict[str, tuple[str, str, str, Any]] = {  # of doubles, of whole numbers, of truth values, in Python
+    "eq": ("oeq", "eq", "eq", operator.eq),
+    "ne": ("une", "ne", "ne", operator.ne),
+    "lt": ("olt", "slt", "ult", operator.lt),
+    "le": ("ole", "sle", "ule", operator.le),
+    "gt": ("ogt", "sgt", "ugt", operator.gt),
+    "ge": ("oge", "sge", "uge", operator.ge),
+}
+LOGIC = {"and": operator.and_, "or": operator.or_, "xor": operator.xor}
+CONVERSIONS = {"lf": "sitofp", "if": "sitofp", "bf": "uitofp", "li": "trunc", "il": "sext", "bi": "zext", "bl": "zext"}
 
 
 @dataclass
@@ -70,19 +58,31 @@ class Code:
         Lines that there may be.
     lines, entry : list of str
         Text of what is run for each vector of lanes, and before the first.
+    memory : int
+        Bytes that are taken before the first.
     functions : set
         Names and numbers of arguments of the functions of C's library that are called.
+    intrinsics : set of str
+        Declarations of the functions of LLVM that are called.
+    here : Value or None
+        In which lanes what is written now is asked for; None for all.
     """
 
     width: int
-    most: int
+    most: int = MOST_LINES
     lines: list[str] = field(default_factory=list)
     entry: list[str] = field(default_factory=list)
     memory: int = 0
     functions: set[tuple[str, int]] = field(default_factory=set)
     intrinsics: set[str] = field(default_factory=set)
+    here: Value | None = None
     _count: int = 0
-    _known: list[dict[Any, Value]] = field(default_factory=lambda: [{}])
+    _known: list[dict[str, Value]] = field(default_factory=lambda: [{}])
+    _vectors: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    def __post_init__(self):
+        self._types = {(kind, False): of for kind, of in SCALARS.items()}
+        self._types |= {(kind, True): f"<{self.width} x {of}>" for kind, of in SCALARS.items()}
 
     # -- text ---------------------------------------------------------------------------------------------------------
 
@@ -93,151 +93,167 @@ class Code:
 
     def type_of(self, kind: str, *, lanes: bool) -> str:
         """Return the type of a number."""
-        return f"<{self.width} x {SCALARS[kind]}>" if lanes else SCALARS[kind]
+        return self._types[kind, lanes]
 
     def operand(self, value: Value, *, lanes: bool) -> str:
         """Return a value as an operand, the same in all lanes where it is one number and a vector is wanted."""
         if value.constant is not None:
-            text = literal(value.constant, value.kind)
-            return f"<{', '.join([f'{SCALARS[value.kind]} {text}'] * self.width)}>" if lanes else text
+            text = literal(value)
+            return self._repeated(value.kind, text) if lanes else text
         if not lanes or value.lanes:
             return value.name
-        return self._found(("splat", value.name), value.kind, lambda name: self._splat(name, value), lanes=True).name
-
-    def _splat(self, name: str, value: Value) -> str:
         vector, one = self.type_of(value.kind, lanes=True), SCALARS[value.kind]
-        first = self.fresh()
-        self.lines.append(f"{first} = insertelement {vector} poison, {one} {value.name}, i64 0")
-        return f"{name} = shufflevector {vector} {first}, {vector} poison, <{self.width} x i32> zeroinitializer"
+        first = self._found(f"insertelement {vector} poison, {one} {value.name}, i64 0", value.kind, lanes=True).name
+        places = f"<{self.width} x i32> zeroinitializer"
+        return self._found(f"shufflevector {vector} {first}, {vector} poison, {places}", value.kind, lanes=True).name
 
-    def _found(self, key: Any, kind: str, text: Any, *, lanes: bool) -> Value:
+    def _repeated(self, kind: str, text: str) -> str:
+        if (vector := self._vectors.get((kind, text))) is None:
+            vector = self._vectors[kind, text] = f"<{', '.join([f'{SCALARS[kind]} {text}'] * self.width)}>"
+        return vector
+
+    def _found(self, instruction: str, kind: str, *, lanes: bool) -> Value:
+        """Return what an instruction without effects gives, written only if it has not been before."""
         for known in reversed(self._known):
-            if (value := known.get(key)) is not None:
+            if (value := known.get(instruction)) is not None:
                 return value
+        if len(self.lines) > self.most:
+            raise UnsupportedOperationError(f"more than {self.most} lines")
         name = self.fresh()
-        self.lines.append(text(name))
-        value = self._known[-1][key] = Value(name, kind, lanes)
+        self.lines.append(f"{name} = {instruction}")
+        value = self._known[-1][instruction] = Value(name, kind, lanes)
         return value
 
+    def _called(self, name: str, result: str, kinds: str, given: Sequence[str], *, lanes: bool) -> Value:
+        """Return what a function of LLVM gives, whose name ends in the types of `kinds`."""
+        sizes = "".join(f".{f'v{self.width}' if lanes else ''}{'f64' if k == 'f' else SCALARS[k]}" for k in kinds)
+        of, found = self.type_of(kinds[-1], lanes=lanes), self.type_of(result, lanes=lanes)
+        self.intrinsics.add(f"declare {found} @llvm.{name}{sizes}({', '.join([of] * len(given))})")
+        listed = ", ".join(f"{of} {operand}" for operand in given)
+        return self._found(f"call {found} @llvm.{name}{sizes}({listed})", result, lanes=lanes)
+
     @contextmanager
-    def scope(self) -> Iterator[None]:
-        """Forget afterwards what was found meanwhile: it is not found on every way on."""
+    def scope(self, here: Value | None = None) -> Iterator[None]:
+        """Forget afterwards what was found meanwhile: it is not found on every way on.
+
+        Parameters
+        ----------
+        here : Value or None
+            In which lanes what is written meanwhile is asked for, if it differs from what is so around it.
+        """
+        around = self.here
+        self.here = around if here is None else here
         self._known.append({})
         try:
             yield
         finally:
             self._known.pop()
+            self.here = around
+
+    def among_here(self, choice: Value) -> Value:
+        """Return a truth value that differs from lane to lane, false where what is written now is not asked for."""
+        return choice if self.here is None or not choice.lanes else self.logic("and", choice, self.here)
+
+    def constant(self, number: Any, kind: str | None = None) -> Value:
+        """Return a constant, of the kind of its type unless one is given."""
+        scalar = np.asarray(number, None if kind is None else DTYPES[kind])[()]
+        return Value("", kind or kind_of(scalar.dtype), False, scalar)
 
     # -- operations ---------------------------------------------------------------------------------------------------
 
-    def constant(self, number: Any) -> Value:
-        """Return a constant."""
-        number = np.asarray(number)
-        if number.dtype not in KINDS:
-            raise UnsupportedOperationError(f"numbers of type {number.dtype}")
-        return Value("", KINDS[number.dtype], False, number[()])
-
     def arithmetic(self, operation: str, a: Value, b: Value) -> Value:
         """Return the sum, difference, product, quotient, remainder, larger or smaller of two numbers."""
-        of_doubles, of_integers, python = ARITHMETIC[operation]
-        if a.constant is not None and b.constant is not None and (a.kind == "f" or operation not in ("div", "rem")):
+        if a.kind == "b":
+            if operation not in BOOLEANS:
+                raise UnsupportedOperationError(f"{operation} of truth values")
+            return self.logic(BOOLEANS[operation], a, b)
+        word, python = (DOUBLES if a.kind == "f" else INTEGERS)[operation]
+        if a.constant is not None and b.constant is not None:
             with np.errstate(all="ignore"):
-                return self.constant(np.asarray(python(a.constant, b.constant), DTYPES[a.kind]))
+                return self.constant(python(a.constant, b.constant), a.kind)
         if (same := _neutral(operation, a, b)) is not None:
             return same
-        if operation in ("add", "mul") and a.name > b.name:
+        if operation in COMMUTATIVE and a.name > b.name:
             a, b = b, a
-        if a.kind != "f" and operation in ("div", "rem"):
-            b = self._divisor(a, b)
-        lanes = a.lanes or b.lanes
-        left, right, kind = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes), self.type_of(a.kind, lanes=lanes)
-        word = of_doubles if a.kind == "f" else of_integers
-
-        def text(name: str) -> str:
-            if operation in ("max", "min"):
-                return f"{name} = call {kind} {self._intrinsic(word, a.kind, 2, lanes=lanes)}({kind} {left}, {kind} {right})"
-            if word == "frem":
-                raise AssertionError
-            return f"{name} = {word} {kind} {left}, {right}"
-
-        if word == "frem":
+        if operation == "rem" and a.kind == "f":
             return self.call("fmod", a, b)
-        return self._found((operation, left, right, kind), a.kind, text, lanes=lanes)
+        if operation in ("div", "rem") and a.kind != "f":
+            return self._division(operation, word, a, b)
+        return self._pair(word, a, b)
 
-    def _divisor(self, a: Value, b: Value) -> Value:
-        """Return a divisor that does not end the process: none that is zero, and not -1 under the least number."""
-        one = self.constant(np.ones((), DTYPES[a.kind]))
-        zero, minus = self.constant(np.zeros((), DTYPES[a.kind])), self.constant(-np.ones((), DTYPES[a.kind]))
-        least = self.constant(np.asarray(np.iinfo(DTYPES[a.kind]).min, DTYPES[a.kind]))
-        beyond = self.logic("and", self.compare("eq", a, least), self.compare("eq", b, minus))
-        return self.select(self.logic("or", self.compare("eq", b, zero), beyond), one, b)
+    def _pair(self, word: str, a: Value, b: Value) -> Value:
+        lanes = a.lanes or b.lanes
+        left, right = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes)
+        if word in ("maximum", "minimum", "smax", "smin"):
+            return self._called(word, a.kind, a.kind, (left, right), lanes=lanes)
+        return self._found(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", a.kind, lanes=lanes)
+
+    def _division(self, operation: str, word: str, a: Value, b: Value) -> Value:
+        """Return a quotient or remainder of whole numbers as XLA has it, by divisors that do not end the process."""
+        one, least = self.constant(1, a.kind), self.constant(np.iinfo(DTYPES[a.kind]).min, a.kind)
+        if b.constant is None:  # of a lane that has not come here, it may be what LLVM takes for another one each time
+            frozen = f"freeze {self.type_of(b.kind, lanes=b.lanes)} {b.name}"
+            b = self._found(frozen, b.kind, lanes=b.lanes)
+        beyond = self.logic("and", self.compare("eq", a, least), self.compare("eq", b, self.constant(-1, a.kind)))
+        nothing = self.compare("eq", b, self.constant(0, a.kind))
+        found = self._pair(word, a, self.select(self.logic("or", nothing, beyond), one, b))
+        return self.select(nothing, self.constant(-1, a.kind) if operation == "div" else a, found)
 
     def compare(self, operation: str, a: Value, b: Value) -> Value:
         """Return whether a comparison of two numbers holds."""
-        of_doubles, of_integers, python = COMPARISONS[operation]
+        of_doubles, of_integers, of_booleans, python = COMPARISONS[operation]
         if a.constant is not None and b.constant is not None:
-            return self.constant(np.asarray(python(a.constant, b.constant), bool))
+            return self.constant(python(a.constant, b.constant), "b")
+        word = {"f": f"fcmp {of_doubles}", "b": f"icmp {of_booleans}"}.get(a.kind, f"icmp {of_integers}")
         lanes = a.lanes or b.lanes
-        left, right, kind = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes), self.type_of(a.kind, lanes=lanes)
-        word = f"fcmp {of_doubles}" if a.kind == "f" else f"icmp {of_integers.replace('s', 'u') if a.kind == 'b' else of_integers}"
-        return self._found((word, left, right, kind), "b", lambda name: f"{name} = {word} {kind} {left}, {right}", lanes=lanes)
+        left, right = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes)
+        return self._found(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", "b", lanes=lanes)
 
     def logic(self, operation: str, a: Value, b: Value) -> Value:
-        """Return `and`, `or` or `xor` of two truth values or whole numbers."""
+        """Return `and`, `or` or `xor` of two truth values, or of the digits of two whole numbers."""
+        if a.constant is not None and b.constant is not None:
+            return self.constant(LOGIC[operation](a.constant, b.constant), a.kind)
         for one, other in ((a, b), (b, a)):
             if one.constant is not None and one.kind == "b":
                 if operation == "xor":
-                    return self.negated(other) if one.constant else other
+                    return self.inverted(other) if one.constant else other
                 return other if bool(one.constant) == (operation == "and") else one
         if a.name == b.name and operation != "xor":
             return a
-        lanes = a.lanes or b.lanes
-        left, right, kind = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes), self.type_of(a.kind, lanes=lanes)
-        return self._found((operation, left, right), a.kind, lambda name: f"{name} = {operation} {kind} {left}, {right}", lanes=lanes)
+        return self._pair(operation, a, b)
 
     def negated(self, a: Value) -> Value:
-        """Return a number with the other sign, or the opposite of a truth value."""
+        """Return a number with the other sign."""
+        if a.kind != "f":
+            return self.arithmetic("sub", self.constant(0, a.kind), a)
         if a.constant is not None:
-            return self.constant(np.asarray(not a.constant if a.kind == "b" else -a.constant, DTYPES[a.kind]))
-        kind = self.type_of(a.kind, lanes=a.lanes)
-        if a.kind == "f":
-            return self._found(("neg", a.name), "f", lambda name: f"{name} = fneg {kind} {a.name}", lanes=a.lanes)
-        if a.kind == "b":
-            true = self.operand(self.constant(np.True_), lanes=a.lanes)
-            return self._found(("not", a.name), "b", lambda name: f"{name} = xor {kind} {a.name}, {true}", lanes=a.lanes)
-        return self.arithmetic("sub", self.constant(np.zeros((), DTYPES[a.kind])), a)
+            return self.constant(-a.constant)
+        return self._found(f"fneg {self.type_of('f', lanes=a.lanes)} {a.name}", "f", lanes=a.lanes)
+
+    def inverted(self, a: Value) -> Value:
+        """Return the opposite of a truth value, or of each digit of a whole number."""
+        if a.constant is not None:
+            return self.constant(np.invert(a.constant))
+        return self._pair("xor", a, self.constant(True if a.kind == "b" else -1, a.kind))
 
     def select(self, choice: Value, a: Value, b: Value) -> Value:
         """Return the first of two numbers where a truth value holds, the second elsewhere."""
         if choice.constant is not None:
             return a if choice.constant else b
-        if a is b or (a.name and a.name == b.name) or (a.constant is not None and _same(a.constant, b.constant)):
+        if a is b or (a.name and a.name == b.name) or _same(a.constant, b.constant):
             return a
         lanes = choice.lanes or a.lanes or b.lanes
         which, on = self.operand(choice, lanes=lanes), self.type_of("b", lanes=lanes)
-        left, right, kind = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes), self.type_of(a.kind, lanes=lanes)
-        return self._found(
-            ("select", which, left, right, kind),
-            a.kind,
-            lambda name: f"{name} = select {on} {which}, {kind} {left}, {kind} {right}",
-            lanes=lanes,
+        left, right, kind = (
+            self.operand(a, lanes=lanes),
+            self.operand(b, lanes=lanes),
+            self.type_of(a.kind, lanes=lanes),
         )
+        return self._found(f"select {on} {which}, {kind} {left}, {kind} {right}", a.kind, lanes=lanes)
 
     def intrinsic(self, operation: str, a: Value) -> Value:
         """Return a function of one double that LLVM knows to have an instruction for."""
-        kind, given = self.type_of("f", lanes=a.lanes), self.operand(a, lanes=a.lanes)
-        return self._found(
-            (operation, given),
-            "f",
-            lambda name: f"{name} = call {kind} {self._intrinsic(operation, 'f', 1, lanes=a.lanes)}({kind} {given})",
-            lanes=a.lanes,
-        )
-
-    def _intrinsic(self, operation: str, kind: str, count: int, *, lanes: bool) -> str:
-        size = {"f": "f64", "l": "i64", "i": "i32"}[kind]
-        name, of = f"@llvm.{operation}.{f'v{self.width}' if lanes else ''}{size}", self.type_of(kind, lanes=lanes)
-        self.intrinsics.add(f"declare {of} {name}({', '.join([of] * count)})")
-        return name
+        return self._called(operation, "f", "f", (self.operand(a, lanes=a.lanes),), lanes=a.lanes)
 
     def call(self, function: str, *given: Value) -> Value:
         """Return a function of doubles of C's library, one call for each lane."""
@@ -246,35 +262,29 @@ class Code:
         self.functions.add((function, len(given)))
         called = f"@{function}_of_lanes" if lanes else f"@{function}"
         listed = ", ".join(f"{kind} {operand}" for operand in operands)
-        return self._found((function, *operands), "f", lambda name: f"{name} = call {kind} {called}({listed})", lanes=lanes)
+        return self._found(f"call {kind} {called}({listed})", "f", lanes=lanes)
 
     def converted(self, a: Value, to: str) -> Value:
-        """Return a number as one of another kind."""
+        """Return a number as one of another kind, the nearest whole number where a double is beyond all."""
         if a.kind == to:
             return a
         if a.constant is not None:
-            with np.errstate(all="ignore"):
-                return self.constant(np.asarray(a.constant).astype(DTYPES[to]))
+            exact = a.kind != "f" or to not in "li"
+            return self.constant(a.constant.astype(DTYPES[to]) if exact else values.nearest(a.constant, DTYPES[to]), to)
         if to == "b":
-            return self.compare("ne", a, self.constant(np.zeros((), DTYPES[a.kind])))
-        words = {"fl": "fptosi", "fi": "fptosi", "lf": "sitofp", "if": "sitofp", "bf": "uitofp", "li": "trunc", "il": "sext"}
-        word = words.get(a.kind + to, "zext")
+            return self.compare("ne", a, self.constant(0, a.kind))
+        if a.kind == "f":  # `fptosi` gives poison where a number does not fit
+            return self._called("fptosi.sat", to, to + "f", (a.name,), lanes=a.lanes)
         kind, wanted = self.type_of(a.kind, lanes=a.lanes), self.type_of(to, lanes=a.lanes)
-        if word == "fptosi":  # of what does not fit anything may come
-            saturated = f"@llvm.fptosi.sat.{f'v{self.width}' if a.lanes else ''}{SCALARS[to]}.{f'v{self.width}' if a.lanes else ''}f64"
-            self.intrinsics.add(f"declare {wanted} {saturated}({kind})")
-            return self._found((saturated, a.name), to, lambda name: f"{name} = call {wanted} {saturated}({kind} {a.name})", lanes=a.lanes)
-        return self._found((word, a.name, to), to, lambda name: f"{name} = {word} {kind} {a.name} to {wanted}", lanes=a.lanes)
+        return self._found(f"{CONVERSIONS[a.kind + to]} {kind} {a.name} to {wanted}", to, lanes=a.lanes)
 
     def anywhere(self, a: Value) -> str:
         """Return the name of a truth value that holds where one holds in some lane."""
         if not a.lanes:
             return self.operand(a, lanes=False)
-        name, of = self.fresh(), self.type_of("b", lanes=True)
-        called = f"@llvm.vector.reduce.or.v{self.width}i1"
+        of, called = self.type_of("b", lanes=True), f"@llvm.vector.reduce.or.v{self.width}i1"
         self.intrinsics.add(f"declare i1 {called}({of})")
-        self.lines.append(f"{name} = call i1 {called}({of} {a.name})")
-        return name
+        return self._found(f"call i1 {called}({of} {a.name})", "b", lanes=False).name
 
     # -- memory -------------------------------------------------------------------------------------------------------
 
@@ -287,36 +297,42 @@ class Code:
         return Region(name, kind, lanes)
 
     def load(self, region: Region, index: int | Value) -> Value:
-        """Return the number at a place of memory."""
-        address, of, hint = self._address(region, index)
-        name = self.fresh()
-        self.lines.append(f"{name} = load {of}, ptr {address}, align 8{hint}" if region.kind != "b" else f"{name}m = load {of}, ptr {address}, align 1{hint}")
+        """Return the number at a place of memory, which must be one of its own."""
+        place = self._place(region, index)
+        hint = ", !invariant.load !0" if region.given else ""
+        name, home = self.fresh(), (region, index) if isinstance(index, int) else None
         if region.kind == "b":
-            self.lines.append(f"{name} = trunc {of} {name}m to {self.type_of('b', lanes=region.lanes)}")
-        return Value(name, region.kind, region.lanes, home=(region, index) if isinstance(index, int) else None)
+            byte, of = self.fresh(), f"<{self.width} x i8>" if region.lanes else "i8"
+            self.lines += [
+                f"{byte} = load {place}{hint}",
+                f"{name} = trunc {of} {byte} to {self.type_of('b', lanes=region.lanes)}",
+            ]
+        else:
+            self.lines.append(f"{name} = load {place}{hint}")
+        return Value(name, region.kind, region.lanes, home=home)
 
     def store(self, region: Region, index: int | Value, value: Value) -> None:
-        """Put a number at a place of memory."""
-        address, of, _ = self._address(region, index)
+        """Put a number at a place of memory, which must be one of its own."""
         operand = self.operand(value, lanes=region.lanes)
         if region.kind == "b":
-            wide = self.fresh()
-            self.lines.append(f"{wide} = zext {self.type_of('b', lanes=region.lanes)} {operand} to {of}")
-            operand = wide
-        self.lines.append(f"store {of} {operand}, ptr {address}, align {1 if region.kind == 'b' else 8}")
+            of = f"<{self.width} x i8>" if region.lanes else "i8"
+            operand = self._found(
+                f"zext {self.type_of('b', lanes=region.lanes)} {operand} to {of}", "b", lanes=True
+            ).name
+        of, rest = self._place(region, index).split(", ", 1)
+        self.lines.append(f"store {of} {operand}, {rest}")
 
-    def _address(self, region: Region, index: int | Value) -> tuple[str, str, str]:
-        """Return the address of a number, its type in memory, and what is known of it."""
-        of = f"<{self.width} x {IN_MEMORY[region.kind]}>" if region.lanes else IN_MEMORY[region.kind]
+    def _place(self, region: Region, index: int | Value) -> str:
+        """Return the type of a number in memory, its address, and of what this is a multiple."""
+        one = IN_MEMORY[region.kind]
+        of = f"<{self.width} x {one}>" if region.lanes else one
         place = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
-        address, hint = self.fresh("p"), ", !invariant.load !0" if region.given else ""
         if region.given and region.lanes:
-            first, sum_ = self.fresh(), self.fresh()
-            self.lines += [f"{first} = mul i64 {place}, %total", f"{sum_} = add i64 {first}, %lane"]
-            self.lines.append(f"{address} = getelementptr {IN_MEMORY[region.kind]}, ptr {region.pointer}, i64 {sum_}")
-        else:
-            self.lines.append(f"{address} = getelementptr {of}, ptr {region.pointer}, i64 {place}")
-        return address, of, hint
+            first = self._found(f"mul i64 {place}, %total", "l", lanes=False).name
+            place = self._found(f"add i64 {first}, %lane", "l", lanes=False).name
+        address = f"getelementptr {one if region.given else of}, ptr {region.pointer}, i64 {place}"
+        name = self._found(address, "l", lanes=False).name
+        return f"{of}, ptr {name}, align {DTYPES[region.kind].itemsize}"
 
     # -- order --------------------------------------------------------------------------------------------------------
 
@@ -336,39 +352,35 @@ class Code:
         """End a block, and go on with one of two."""
         self.lines.append(f"br i1 {choice}, label %{then}, label %{otherwise}")
 
-    def mark(self) -> tuple[int, int, int]:
+    def mark(self) -> tuple[int, int, int, int]:
         """Return how far the text has come, for `back_to`."""
-        return len(self.lines), len(self.entry), len(self._known[-1])
+        return len(self.lines), len(self.entry), len(self._known[-1]), self.memory
 
-    def back_to(self, mark: tuple[int, int, int]) -> None:
+    def back_to(self, mark: tuple[int, int, int, int]) -> None:
         """Take back what was written since a mark in the same scope."""
-        lines, entry, known = mark
+        lines, entry, known, self.memory = mark
         del self.lines[lines:], self.entry[entry:]
         while len(self._known[-1]) > known:
             self._known[-1].popitem()
 
 
-def literal(number: Any, kind: str) -> str:
-    """Return a constant as LLVM reads it."""
-    if kind == "f":
-        return f"0x{int(np.asarray(number, float).view(np.uint64)):016X}"
-    return str(bool(number)).lower() if kind == "b" else str(int(number))
-
-
 def _same(a: Any, b: Any) -> bool:
-    return b is not None and bool(a == b) and math.copysign(1, a) == math.copysign(1, b)
+    """Tell whether two constants are one, which zeros of different signs are not."""
+    return a is not None and b is not None and bool(a == b) and math.copysign(1, a) == math.copysign(1, b)
 
 
 def _neutral(operation: str, a: Value, b: Value) -> Value | None:
-    """Return the operand that an operation leaves as it is, if the other says so: one as a factor, zero in a sum."""
-    nothing = {"add": 0, "sub": 0, "mul": 1, "div": 1}.get(operation)
-    if nothing is None:
+    """Return the operand that an operation leaves as it is, if the other says so: one as a factor, zero in a sum.
+
+    The sign of -0 + 0 is not asked for, as XLA does not.
+    """
+    if (nothing := NEUTRAL.get(operation)) is None:
         return None
     if b.constant is not None and b.constant == nothing:
         return a
-    return b if operation in ("add", "mul") and a.constant is not None and a.constant == nothing else None
+    return b if operation in COMMUTATIVE and a.constant is not None and a.constant == nothing else None
 
 
-def flat(array: np.ndarray) -> Sequence[Value]:
+def flat(array: np.ndarray) -> list[Value]:
     """Return the values of an array, the last axis fastest."""
     return array.ravel().tolist()

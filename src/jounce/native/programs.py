@@ -9,11 +9,12 @@ import jax
 import numpy as np
 
 from jounce.native import rows as rows_
-from jounce.native.code import Code, Region, UnsupportedOperationError, flat
+from jounce.native.arrays import Values, constants
+from jounce.native.code import MOST_LINES, Code, flat
 from jounce.native.handler import handler_text, is_known
 from jounce.native.machine import MachineCode, compiled, vector_width
-from jounce.native.operations import Values, constants, kind_of
-from jounce.native.translation import MOST_LINES, translate
+from jounce.native.translation import translate
+from jounce.native.values import Region, UnsupportedOperationError, kind_of
 
 MOST_MEMORY = 2**20  # bytes of the stack: threads have little
 ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
@@ -235,4 +236,4 @@ def _lane_by_lane(name: str, count: int, width: int) -> str:
         lines.append(f"%s{lane} = insertelement {vector} {before}, double %r{lane}, i64 {lane}")
     listed = ", ".join(f"{vector} %a{k}" for k in range(count))
     body = "\n".join([*lines, f"ret {vector} %s{width - 1}"])
-    return f'define internal {vector} @{name}_of_lanes({listed}) noinline #2 {{\n{body}\n}}'
+    return f"define internal {vector} @{name}_of_lanes({listed}) noinline #2 {{\n{body}\n}}"

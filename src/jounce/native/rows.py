@@ -6,7 +6,8 @@ transposed in the registers; NumPy takes a third as long for it as the torque of
 
 from collections.abc import Sequence
 
-from jounce.native.code import IN_MEMORY, Code, Value
+from jounce.native.code import Code
+from jounce.native.values import IN_MEMORY, Value
 
 
 def read(code: Code, pointer: str, size: int, kind: str) -> list[Value]:

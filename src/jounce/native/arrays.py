@@ -1,0 +1,66 @@
+"""Arrays of a program that is written for LLVM: NumPy arrays whose elements are values."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.native.code import MOST_LINES, Code, flat
+from jounce.native.values import Region, UnsupportedOperationError, Value
+
+Values = np.ndarray  # of objects, each a Value
+Rule = Callable[[Code, Any, Sequence[Values]], Sequence[Values]]  # of an equation and its arguments; its results
+
+
+def filled(shape: Sequence[int], values: Sequence[Value]) -> Values:
+    """Return an array of values, the last axis fastest."""
+    found = np.empty(shape, object)
+    found.ravel()[:] = values
+    return found
+
+
+def constants(code: Code, array: Any) -> Values:
+    """Return an array of constants.
+
+    Raises
+    ------
+    UnsupportedOperationError
+        If there are more than lines of a program.
+    """
+    array = np.asarray(array)
+    if array.size > MOST_LINES:
+        raise UnsupportedOperationError(f"{array.size} constants")
+    return filled(array.shape, [code.constant(number) for number in array.ravel()])
+
+
+def each(function: Callable[..., Value], *arrays: Values) -> Values:
+    """Return what a function gives for each element of arrays, which are spread to one shape."""
+    shape = arrays[0].shape
+    if any(array.shape != shape for array in arrays):
+        arrays = np.broadcast_arrays(*arrays)
+        shape = arrays[0].shape
+    return filled(shape, list(map(function, *map(flat, arrays))))
+
+
+def in_memory(code: Code, values: Sequence[Value]) -> tuple[Region, int]:
+    """Return where some numbers are one after another in memory, and the first place: put there if they are not yet."""
+    if values[0].home is not None:
+        region, first = values[0].home
+        places = range(first, first + len(values))
+        if all(v.home is not None and v.home == (region, k) for k, v in zip(places, values, strict=True)):
+            return region, first
+    region = code.room(len(values), values[0].kind, lanes=any(value.lanes for value in values))
+    for k, value in enumerate(values):
+        code.store(region, k, value)
+    return region, 0
+
+
+def row(code: Code, home: tuple[Region, int], index: Value, shape: Sequence[int], more: int = 0) -> Values:
+    """Return an array of some in memory, `more` after that at an index in bounds, which is one for all lanes."""
+    region, first = home
+    size = int(np.prod(shape))
+    start = code.arithmetic("mul", code.converted(index, "l"), code.constant(size, "l"))
+    offsets = range(first + more * size, first + (more + 1) * size)
+    return filled(
+        shape, [code.load(region, code.arithmetic("add", start, code.constant(offset, "l"))) for offset in offsets]
+    )

@@ -1,0 +1,238 @@
+"""Operations that move elements of arrays, and those that take or put them at indices found by the program."""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+from jax.lax import GatherScatterMode
+
+from jounce.native.arrays import Values, constants, each, filled, in_memory, row
+from jounce.native.code import Code, flat
+from jounce.native.values import DTYPES, UnsupportedOperationError, Value, kind_of
+
+MOST_CANDIDATES = 64  # places of an array among which a number is picked by comparing
+
+# -- at places that are known -----------------------------------------------------------------------------------------
+
+
+def part(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return elements between bounds."""
+    p = equation.params
+    strides = p["strides"] or (1,) * given[0].ndim
+    return [given[0][(*map(slice, p["start_indices"], p["limit_indices"], strides), ...)]]
+
+
+def broadcast(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return an array repeated along new axes and those of length one."""
+    shape, axes = equation.params["shape"], equation.params["broadcast_dimensions"]
+    placed = [1] * len(shape)
+    for axis, size in zip(axes, given[0].shape, strict=True):
+        placed[axis] = size
+    return [np.broadcast_to(given[0].reshape(placed), shape)]
+
+
+def tile(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return an array repeated along its axes."""
+    return [np.tile(given[0], equation.params["reps"])]
+
+
+def reshape(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return the same elements in another shape."""
+    return [given[0].reshape(equation.outvars[0].aval.shape)]
+
+
+def concatenate(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return arrays one after another."""
+    return [np.concatenate(given, equation.params["dimension"])]
+
+
+def stack(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return arrays side by side along a new axis."""
+    return [np.stack(given, equation.params["axis"])]
+
+
+def unstack(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return the parts of an array along an axis, without it."""
+    rows = np.moveaxis(given[0], equation.params["axis"], 0)
+    return [rows[k, ...] for k in range(len(rows))]
+
+
+def transpose(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return an array with its axes in another order."""
+    return [given[0].transpose(equation.params["permutation"])]
+
+
+def reverse(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return an array backwards along some axes."""
+    return [np.flip(given[0], equation.params["dimensions"])]
+
+
+def pad(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return an array with a number before, after and between its elements; some are cut off where less than none."""
+    array, filler = given
+    found = np.full(equation.outvars[0].aval.shape, filler.item(), object)
+    places, taken = [], []
+    for size, whole, (low, _high, between) in zip(
+        array.shape, found.shape, equation.params["padding_config"], strict=True
+    ):
+        at = low + np.arange(size) * (between + 1)
+        inside = np.flatnonzero((at >= 0) & (at < whole))
+        places.append(at[inside])
+        taken.append(inside)
+    found[np.ix_(*places)] = array[np.ix_(*taken)]
+    return [found]
+
+
+def iota(code: Code, equation: Any, _: Sequence[Values]) -> Sequence[Values]:
+    """Return whole numbers that count along an axis."""
+    p = equation.params
+    numbers = np.arange(p["shape"][p["dimension"]]).astype(DTYPES[kind_of(p["dtype"])])
+    line = numbers.reshape([-1 if axis == p["dimension"] else 1 for axis in range(len(p["shape"]))])
+    return [np.broadcast_to(constants(code, line), p["shape"])]
+
+
+def split(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return the parts of an array along an axis."""
+    return np.split(given[0], np.cumsum(equation.params["sizes"])[:-1], axis=equation.params["axis"])
+
+
+# -- at indices -------------------------------------------------------------------------------------------------------
+
+
+def _element(code: Code, values: Sequence[Value], index: Value) -> Value:
+    """Return the number at an index, which is in bounds: from memory, or picked by comparing."""
+    if index.constant is not None:
+        return values[int(index.constant)]
+    if not index.lanes and len(values) > 2:
+        return row(code, in_memory(code, values), index, ()).item()
+    if len(values) > MOST_CANDIDATES:
+        raise UnsupportedOperationError(f"picking one of {len(values)} numbers")
+    found = values[-1]
+    for k in reversed(range(len(values) - 1)):
+        found = code.select(code.compare("eq", index, code.constant(k, index.kind)), values[k], found)
+    return found
+
+
+def _within(code: Code, index: Value, least: int, most: int) -> Value:
+    """Return an index within bounds."""
+    below = code.arithmetic("min", index, code.constant(most, index.kind))
+    return code.arithmetic("max", below, code.constant(least, index.kind))
+
+
+def dynamic_slice(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return a part of an array that starts at indices, moved so that all of it is in bounds."""
+    array, *starts = given
+    for axis, (start, size) in enumerate(zip(starts, equation.params["slice_sizes"], strict=True)):
+        rows = np.moveaxis(array, axis, 0)
+        index, shape = _within(code, start.item(), 0, len(rows) - size), (size, *rows.shape[1:])
+        if index.constant is not None:
+            found = rows[int(index.constant) :][:size]
+        elif not np.prod(shape):
+            found = np.empty(shape, object)
+        elif not index.lanes:
+            home = in_memory(code, flat(rows))
+            found = np.stack([row(code, home, index, shape[1:], k) for k in range(size)])
+        else:
+            pick = _picked(code, index)
+            windows = [rows[k : len(rows) - size + 1 + k] for k in range(size)]
+            found = np.stack([each(pick, *(window[k, ...] for k in range(len(window)))) for window in windows])
+        array = np.moveaxis(found, 0, axis)
+    return [array]
+
+
+def _picked(code: Code, index: Value) -> Callable[..., Value]:
+    return lambda *values: _element(code, values, index)
+
+
+def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return an array with a part of it changed that starts at indices, moved so that all of it is in bounds."""
+    array, new, *starts = given
+    rooms = [whole - size for whole, size in zip(array.shape, new.shape, strict=True)]
+    indices = [_within(code, start.item(), 0, most) for start, most in zip(starts, rooms, strict=True)]
+    moving = [axis for axis, index in enumerate(indices) if index.constant is None]
+    firsts = [
+        range(most + 1) if index.constant is None else (int(index.constant),)
+        for index, most in zip(indices, rooms, strict=True)
+    ]
+    found = array.copy()
+    for first in itertools.product(*firsts):
+        here = code.constant(True)
+        for axis in moving:
+            number = code.constant(first[axis], indices[axis].kind)
+            here = code.logic("and", here, code.compare("eq", indices[axis], number))
+        for offset in np.ndindex(new.shape):
+            place = tuple(a + b for a, b in zip(first, offset, strict=True))
+            found[place] = code.select(here, new.item(offset), found.item(place))
+    return [found]
+
+
+def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return parts of an array at indices: which element an index tells is asked of JAX, with places for numbers."""
+    array, indices = given
+    p, places, dtype = equation.params, np.arange(array.size).reshape(array.shape), equation.outvars[0].aval.dtype
+    known = np.vectorize(lambda value: 0 if value.constant is None else int(value.constant), otypes=[int])(indices)
+    moving = [k for k in range(indices.shape[-1]) if any(value.constant is None for value in flat(indices[..., k]))]
+    if len(moving) > 1:
+        raise UnsupportedOperationError("indices of which more than one are not known")
+
+    def at(table: np.ndarray) -> np.ndarray:
+        options = {"dimension_numbers": p["dimension_numbers"], "slice_sizes": p["slice_sizes"], "mode": p["mode"]}
+        with jax.ensure_compile_time_eval():
+            return np.asarray(jax.lax.gather(places, table, fill_value=-1, **options))
+
+    numbers = [*flat(array), code.constant(_filler(p, dtype), kind_of(dtype))]
+    if not moving:
+        return [_taken(numbers, at(known))]
+    (axis,) = moving
+    size = array.shape[p["dimension_numbers"].start_index_map[axis]]
+    tables = []
+    for k in range(-1, size + 1):  # one beyond each end, too
+        known[..., axis] = k
+        tables.append(at(known))
+    found = np.empty(tables[0].shape, object)
+    which = [k for k in range(found.ndim) if k not in p["dimension_numbers"].offset_dims]
+    for place in np.ndindex(found.shape):
+        index = _within(code, indices[(*(place[k] for k in which), axis)], -1, size)
+        index = code.arithmetic("add", index, code.constant(1, index.kind))
+        found[place] = _element(code, [numbers[table[place]] for table in tables], index)
+    return [found]
+
+
+def _taken(numbers: Sequence[Value], table: np.ndarray) -> Values:
+    return filled(table.shape, [numbers[place] for place in table.ravel()])
+
+
+def _filler(params: Mapping[str, Any], dtype: Any) -> Any:
+    """Return what stands where an index points beyond an array."""
+    if params["mode"] != GatherScatterMode.FILL_OR_DROP:
+        return 0
+    if params["fill_value"] is not None:
+        return params["fill_value"]
+    if np.issubdtype(dtype, np.floating):
+        return np.nan
+    return True if np.dtype(dtype).kind == "b" else np.iinfo(dtype).min
+
+
+def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Put numbers at indices, or add them to what is there: which place an index tells is asked of JAX."""
+    array, indices, updates = given
+    if any(value.constant is None for value in flat(indices)):
+        raise UnsupportedOperationError("changing an array at indices that are not known")
+    if not updates.size or not array.size:
+        return [array]
+    p, add = equation.params, equation.primitive.name == "scatter-add"
+    table = np.vectorize(lambda value: int(value.constant), otypes=[int])(indices)
+
+    def put(unit: np.ndarray) -> jax.Array:
+        options = {"dimension_numbers": p["dimension_numbers"], "mode": p["mode"]}
+        return jax.lax.scatter_add(np.zeros(array.shape), table, unit, **options)
+
+    with jax.ensure_compile_time_eval():
+        hits = np.asarray(jax.vmap(put)(np.eye(updates.size).reshape(-1, *updates.shape)))
+    found = flat(array)
+    for k, place in zip(*np.nonzero(hits.reshape(updates.size, array.size)), strict=True):
+        value = updates.item(k)
+        found[place] = code.arithmetic("add", found[place], value) if add else value
+    return [filled(array.shape, found)]
