@@ -85,6 +85,21 @@ def test_elements_of_a_carry_change_places():
     assert_agree(run, np.arange(COUNT), ordinary(4))
 
 
+def test_elements_change_places_in_a_loop_that_all_lanes_leave_together():
+    def run(n, x):
+        return lax.fori_loop(0, n[0], lambda k, x: jnp.roll(x, 1, axis=0), x)
+
+    assert_agree(run, ordinary(4), shared=(np.array([3]),), counts=COUNTS)
+
+
+def test_numbers_that_lanes_share_after_a_loop():
+    def run(n, shared, x):
+        return lax.fori_loop(0, n[0], lambda k, s: (shared, s[0]), (x, x))
+
+    for n in (0, 1, 2, 5):
+        assert_agree(run, ordinary(), shared=(np.array([n]), np.array([2.5])), counts=COUNTS)
+
+
 def test_what_a_loop_reads_at_indices_is_what_it_held_before_it_changed():
     def run(n, x):
         def body(state):
