@@ -12,7 +12,7 @@ from jounce.kinematics import Status, compilation, side_by_side
 from jounce.kinematics.instant_program import advance_instant
 from jounce.kinematics.side_by_side import SideBySide
 from jounce.native import handler, machine
-from jounce.native.programs import Program
+from jounce.native.programs import Program, object_file
 from tests.kinematics.test_compilation import Shelf
 from tests.problems.small import four_bar, slider_crank
 
@@ -26,7 +26,7 @@ def agree(one, other, tolerance=1e-11):
     np.testing.assert_array_equal(one.status, other.status)
     for name, wanted in other.outputs.items():
         peak = np.nanmax(np.abs(wanted), axis=0)
-        scale = np.where(peak > 1e-9 * np.max(peak), peak, 1.0 + np.max(peak))
+        scale = np.where(peak > 1e-9 * np.max(peak), peak, 1.0 + np.max(peak)) + (np.max(peak) < 1e-6)  # or rounding
         np.testing.assert_allclose(one.outputs[name] / scale, wanted / scale, rtol=0, atol=tolerance)
 
 
@@ -104,8 +104,7 @@ def test_what_is_kept_is_not_made_again(monkeypatch):
     monkeypatch.setattr(compilation, "_store", store)
     function = example.function
     monkeypatch.setattr(side_by_side, "program_key", lambda *given: repr(given[2]))  # it has no name in the package
-    monkeypatch.setattr(side_by_side, "object_file", lambda *a: made.append(1) or real(*a))
-    real = __import__("jounce.native.programs", fromlist=["object_file"]).object_file
+    monkeypatch.setattr(side_by_side, "object_file", lambda *a, **k: made.append(1) or object_file(*a, **k))
     for _ in range(3):
         results(SideBySide(function))
     assert (len(made), len(store)) == (1, 1)
@@ -152,10 +151,10 @@ def test_there_is_none_for_what_is_traced():
 
 
 def test_there_is_none_for_what_has_no_code():
-    def sorted_(shared, lanes):
-        return jnp.sort(shared[0]) * lanes[0]
+    def transformed(shared, lanes):
+        return jnp.fft.fft(lanes[0]).real * shared[0]
 
-    assert SideBySide(sorted_).program((np.arange(3.0),), (np.arange(5.0),)) is None
+    assert SideBySide(transformed).program((np.arange(3.0),), (np.arange(5.0),)) is None
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from jounce.native import machine, programs
+from jounce.native.code import MOST_LINES
 
 llvm = pytest.importorskip("llvmlite.binding", reason="the compiler is an extra")
 
@@ -36,7 +37,7 @@ def verified(text):
     return machine.compiled(text)
 
 
-def compiled(function, lanes, shared=(), known=(), width=8):
+def compiled(function, lanes, shared=(), known=(), width=8, most_lines=MOST_LINES):
     """Return what runs a function of one instant for many, by machine code for vectors of `width` lanes."""
     one = [jax.ShapeDtypeStruct((*x.shape[:-1], 1), x.dtype) for x in lanes]
     kinds = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in shared]
@@ -44,8 +45,8 @@ def compiled(function, lanes, shared=(), known=(), width=8):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(programs, "vector_width", lambda: width)
         patch.setattr(programs, "compiled", verified)
-        binary = programs.object_file(whole_function, kinds, one, {k: shared[k] for k in known})
-        return programs.Program(binary, jax.eval_shape(whole_function, kinds, one))
+        binary = programs.object_file(whole_function, kinds, one, {k: shared[k] for k in known}, most_lines=most_lines)
+        return programs.Program(binary, (kinds, one), jax.eval_shape(whole_function, kinds, one))
 
 
 def one_by_one(function, lanes, shared=()):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from jax import lax
 
-from tests.native.lanes import COUNT, SPECIAL, assert_agree, ordinary, whole
+from tests.native.lanes import COUNT, SPECIAL, WHOLE, assert_agree, ordinary, whole
 
 ARRAYS = {
     "doubles": lambda: ordinary(2, 3, 4),
@@ -110,3 +110,15 @@ def test_products_of_another_type():
         return longer, lax.dot_general(a, b, (((0,), (0,)), ((1,), (1,))), preferred_element_type=jnp.float64)
 
     assert_agree(run, whole(3, dtype=np.int32) * 10**8, whole(3, seed=1, dtype=np.int32) * 10**8)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_sorting(axis):
+    special = np.stack([np.roll(SPECIAL, k) for k in range(12)]).reshape(3, 4, COUNT)
+    for numbers in (special, np.stack([np.roll(WHOLE, k) for k in range(12)]).reshape(3, 4, COUNT)):
+        assert_agree(lambda x: jnp.sort(x, axis=axis), numbers, signs=False)
+
+
+def test_sorting_by_another_array():
+    assert_agree(lambda x: jnp.argsort(x, axis=0), ordinary(7))
+    assert_agree(lambda x, y: lax.sort((x, y), dimension=0, num_keys=1), whole(9, high=-4), ordinary(9))

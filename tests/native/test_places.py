@@ -6,7 +6,7 @@ import pytest
 from jax import lax
 from jax.lax import GatherScatterMode
 
-from jounce.native.code import UnsupportedOperationError
+from jounce.native.values import UnsupportedOperationError
 from tests.native.lanes import COUNT, assert_agree, compiled, ordinary, whole
 
 MODES = {"clip": GatherScatterMode.CLIP, "fill": GatherScatterMode.FILL_OR_DROP}
