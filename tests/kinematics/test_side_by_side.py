@@ -135,7 +135,7 @@ def test_threads_that_ask_at_once_get_one_program():
     assert len({id(prepared.machine_code) for prepared in found}) == 1
 
 
-@pytest.mark.parametrize(("variable", "installed"), [("0", True), ("1", False)], ids=["not wanted", "not installed"])
+@pytest.mark.parametrize("variable, installed", [("0", True), ("1", False)], ids=["not wanted", "not installed"])
 def test_there_may_be_none(variable, installed, monkeypatch):
     monkeypatch.setenv("JOUNCE_NATIVE", variable)
     monkeypatch.setattr(machine, "is_installed", lambda: installed)
@@ -158,7 +158,7 @@ def test_there_is_none_for_what_has_no_code():
 
 
 @pytest.mark.parametrize(
-    ("shared", "lanes"),
+    "shared, lanes",
     [((np.float32(2.0),), (np.arange(5.0),)), ((2.0,), (np.arange(5),)), ((np.ones(2),), (np.arange(5.0),))],
     ids=["single precision", "whole numbers", "another shape"],
 )

@@ -22,6 +22,18 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
     pose_type, order
         As those of `advance`.
     """
-    (system, tolerance, refine, wanted), (known, step, instant, survey) = shared, instants
-    given = *known, step, instant, tolerance, refine, survey[0], wanted
-    return advance(with_fields(system, reflected=True), *given, pose_type=pose_type, order=order)
+    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, survey) = shared, instants
+    return advance(
+        with_fields(system, reflected=True),
+        coordinates,
+        angles,
+        sign,
+        step,
+        instant,
+        tolerance,
+        refine,
+        survey[0],
+        wanted,
+        pose_type=pose_type,
+        order=order,
+    )

@@ -11,7 +11,7 @@ import threading
 import zlib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import cached_property, partial, update_wrapper
+from functools import cached_property, partial
 from typing import Any
 
 import jax
@@ -91,7 +91,7 @@ class SideBySide:
         self.most_lines = most_lines
         self._programs: dict[Any, Program | None] = {}
         self._lock = threading.Lock()
-        update_wrapper(self, function)
+        self.__wrapped__, self.__doc__ = function, function.__doc__  # by which a name in the package is known as its
 
     def __len__(self) -> int:
         """How many programs were wanted, those that there is no code for included."""

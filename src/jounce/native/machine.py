@@ -6,7 +6,6 @@ from functools import lru_cache
 from importlib.util import find_spec
 from typing import Any
 
-CODE_MODEL = "large"  # what is compiled may lie far from the libraries that it calls
 _lock = threading.Lock()  # LLVM's state is one for the process
 
 
