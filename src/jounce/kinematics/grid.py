@@ -73,7 +73,7 @@ class GridSolver:
             width, most = self.solver.width, self.solver.together // self.solver.width
         left = reached & (self.status != Status.OK)
         done = count - int(np.count_nonzero(left))
-        with Threads(threads) as pool:
+        with Threads(threads, compiled=count > LONG_GRID and self.solver.is_compiled) as pool:
             for lanes, distance in _levels(left, len(self._anchors), width):
                 source = self._sources(lanes, distance)
                 size = width * _lots(len(lanes), width, most, threads)

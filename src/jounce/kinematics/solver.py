@@ -99,6 +99,11 @@ class Solver:
         known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(guess))
         return _way(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant), planned=True)
 
+    @property
+    def is_compiled(self) -> bool:
+        """Whether instants of a long grid are solved by machine code, which is there before the first of them."""
+        return self._native is not None
+
     @cached_property
     def width(self) -> int:
         """How many instants of a long grid are solved side by side at least."""
