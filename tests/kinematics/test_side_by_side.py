@@ -16,7 +16,7 @@ from jounce.native.programs import Program, object_file
 from tests.kinematics.test_compilation import Shelf
 from tests.problems.small import four_bar, slider_crank
 
-pytestmark = pytest.mark.skipif(not machine.is_installed(), reason="llvmlite is not installed")
+pytestmark = pytest.mark.skipif(not machine.is_usable(), reason="llvmlite is not installed")
 SPATIAL = ["rsur", "rssr", "hooke_joint", "bennett", "sarrus", "stewart_platform", "delta_robot"]
 PLANAR = ["six_bar_watt", "jansen_leg", "quick_return", "gear_pair", "wolfrom_train", "peaucellier", "servo_press"]
 
@@ -138,7 +138,7 @@ def test_threads_that_ask_at_once_get_one_program():
 @pytest.mark.parametrize("variable, installed", [("0", True), ("1", False)], ids=["not wanted", "not installed"])
 def test_there_may_be_none(variable, installed, monkeypatch):
     monkeypatch.setenv("JOUNCE_NATIVE", variable)
-    monkeypatch.setattr(machine, "is_installed", lambda: installed)
+    monkeypatch.setattr(machine, "is_usable", lambda: installed)
     assert fresh().program((2.0,), (np.arange(5.0),), times=3) is None
 
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from jounce.kinematics.side_by_side import SideBySide
-from jounce.native.machine import is_installed
+from jounce.native.machine import is_usable
 
-pytestmark = pytest.mark.skipif(not is_installed(), reason="there is no compiler")
+pytestmark = pytest.mark.skipif(not is_usable(), reason="there is no compiler")
 
 
 def of_all_kinds(shared, lanes):

@@ -5,13 +5,13 @@ import pytest
 
 import jounce as jn
 from jounce.kinematics.side_by_side import VARIABLE
-from jounce.native.machine import is_installed
+from jounce.native.machine import is_usable
 from jounce.robot.batches import LEAST_THREADED
 from jounce.robot.forward_dynamics import _moved
 from jounce.robot.inverse_dynamics import _generalised_forces
 from tests.problems.robots import random_robot, robot_named
 
-pytestmark = pytest.mark.skipif(not is_installed(), reason="there is no compiler")
+pytestmark = pytest.mark.skipif(not is_usable(), reason="there is no compiler")
 COUNTS = (0, 1, 7, 129, 5000)
 CONTINUOUS = jn.Robot(
     "wheel",

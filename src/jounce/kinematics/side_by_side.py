@@ -157,4 +157,4 @@ class SideBySide:
 
 
 def _wanted() -> bool:
-    return os.environ.get(VARIABLE, "") != "0" and machine.is_installed() and on_processor() and not being_debugged()
+    return os.environ.get(VARIABLE, "") != "0" and machine.is_usable() and on_processor() and not being_debugged()

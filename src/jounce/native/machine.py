@@ -1,18 +1,23 @@
 """Text for LLVM as machine code of this computer, in the memory of this process or as bytes for another one."""
 
 import ctypes
+import sys
 import threading
 from functools import lru_cache
 from importlib.util import find_spec
 from typing import Any
 
+TRIED = ("linux",)
 _lock = threading.Lock()  # LLVM's state is one for the process
 
 
 @lru_cache(maxsize=1)
-def is_installed() -> bool:
-    """Tell whether there is a compiler: llvmlite is an extra of this package."""
-    return find_spec("llvmlite") is not None
+def is_usable() -> bool:
+    """Tell whether there is a compiler, which is an extra of this package, on a system where it has been tried.
+
+    Elsewhere code may ask for functions that LLVM does not find, and then it ends the process.
+    """
+    return sys.platform in TRIED and find_spec("llvmlite") is not None
 
 
 @lru_cache(maxsize=1)
