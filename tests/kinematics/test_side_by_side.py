@@ -26,7 +26,9 @@ def agree(one, other, tolerance=1e-11):
     np.testing.assert_array_equal(one.status, other.status)
     for name, wanted in other.outputs.items():
         peak = np.nanmax(np.abs(wanted), axis=0)
-        scale = np.where(peak > 1e-9 * np.max(peak), peak, 1.0 + np.max(peak)) + 1e3 * (np.max(peak) < 1e-6)  # or rounding
+        scale = np.where(peak > 1e-9 * np.max(peak), peak, 1.0 + np.max(peak)) + 1e3 * (
+            np.max(peak) < 1e-6
+        )  # or rounding
         np.testing.assert_allclose(one.outputs[name] / scale, wanted / scale, rtol=0, atol=tolerance)
 
 
