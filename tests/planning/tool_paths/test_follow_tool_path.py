@@ -54,7 +54,8 @@ def test_other_instants_and_laws_of_the_joints():
     assert (exact.status == Status.OK).all()
     laws = motion.trajectory()
     assert laws.names == ("joint_0", "joint_1")
-    assert np.allclose(laws.derivatives(times, 3), exact.q, rtol=0, atol=1e-9)
+    # polynomials between instants magnify what positions are rounded by with the cube of the inverse spacing
+    assert np.allclose(laws.derivatives(times, 3), exact.q, rtol=0, atol=1e-8)
 
 
 @pytest.mark.slow
