@@ -21,6 +21,11 @@ SPATIAL = ["rsur", "rssr", "hooke_joint", "bennett", "sarrus", "stewart_platform
 PLANAR = ["six_bar_watt", "jansen_leg", "quick_return", "gear_pair", "wolfrom_train", "peaucellier", "servo_press"]
 
 
+@pytest.fixture(autouse=True)
+def _wanted(monkeypatch):
+    monkeypatch.delenv("JOUNCE_NATIVE", raising=False)  # as where all tests run without machine code
+
+
 def agree(one, other, tolerance=1e-11):
     """Compare two motions: outcomes, and outputs by the peak of each derivative."""
     np.testing.assert_array_equal(one.status, other.status)
