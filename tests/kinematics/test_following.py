@@ -56,7 +56,7 @@ def turnover_of(mechanism, instant):
     solver = Solver(model, 4, 1e-12)
     known = {name: np.stack([x, *[np.zeros_like(x)] * 4]) for name, x in coordinates.items()}
     angles = tuple(np.zeros((5, 1, group.instances, 1)) for group in model.system.outputs)
-    arrival = solver((known, angles, np.zeros(1)), np.zeros(1), np.array([instant]), survey=True)
+    arrival = solver(solver.needed((known, angles, np.zeros(1))), np.zeros(1), np.array([instant]), survey=True)
     jets = {name: Jet(tuple(map(jnp.asarray, c))) for name, c in arrival.coordinates.items()}
 
     def jacobian(step):

@@ -16,7 +16,9 @@ from jounce.native.programs import Program, object_file
 from tests.kinematics.test_compilation import Shelf
 from tests.problems.small import four_bar, slider_crank
 
-pytestmark = pytest.mark.skipif(not machine.is_usable(), reason="llvmlite is not installed")
+pytestmark = pytest.mark.skipif(
+    not machine.is_usable(), reason="there is no compiler, or a system where it was not tried"
+)
 SPATIAL = ["rsur", "rssr", "hooke_joint", "bennett", "sarrus", "stewart_platform", "delta_robot"]
 PLANAR = ["six_bar_watt", "jansen_leg", "quick_return", "gear_pair", "wolfrom_train", "peaucellier", "servo_press"]
 

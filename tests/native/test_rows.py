@@ -7,7 +7,7 @@ import pytest
 from jounce.kinematics.side_by_side import SideBySide
 from jounce.native.machine import is_usable
 
-pytestmark = pytest.mark.skipif(not is_usable(), reason="there is no compiler")
+pytestmark = pytest.mark.skipif(not is_usable(), reason="there is no compiler, or a system where it was not tried")
 
 
 def of_all_kinds(shared, lanes):

@@ -11,7 +11,7 @@ from jounce.robot.forward_dynamics import _moved
 from jounce.robot.inverse_dynamics import _generalised_forces
 from tests.problems.robots import random_robot, robot_named
 
-pytestmark = pytest.mark.skipif(not is_usable(), reason="there is no compiler")
+pytestmark = pytest.mark.skipif(not is_usable(), reason="there is no compiler, or a system where it was not tried")
 COUNTS = (0, 1, 7, 129, 5000)
 CONTINUOUS = jn.Robot(
     "wheel",

@@ -106,7 +106,7 @@ class GridSolver:
         lanes, source = batch
         chosen = _slice_of(source)
         known = jax.tree.map(lambda x: x[..., chosen], self.solver.needed(self._store))
-        arrival = self.solver.advanced(known, self.time[lanes] - self._instants[source], self.time[lanes])
+        arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
         self._keep(_slice_of(lanes), arrival.state(slice(None)))
         return arrival
 
@@ -169,7 +169,7 @@ class GridSolver:
         path, instant = self.path, self.time[lost : lost + 1]
         self.status[lost], self.faults[lost] = path.status, path.fault
         last = path.anchors[-1]
-        arrival = self.solver(last.state, instant - last.instant, instant)
+        arrival = self.solver(self.solver.needed(last.state), instant - last.instant, instant)
         if arrival.status[0] == Status.INADMISSIBLE:  # the fault is the law's, not that of the position before
             self.status[lost], self.faults[lost] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
 

@@ -224,7 +224,7 @@ def _ended(solver: Solver, path: FollowedPath, done: Leg, span: float) -> Follow
         target, arrival = float(done.way.instant[0]), jax.tree.map(np.asarray, done.last)
     else:
         target, instant = refused, np.array([refused])
-        arrival = solver(here.state, instant - here.instant, instant, survey=True)
+        arrival = solver(solver.needed(here.state), instant - here.instant, instant, survey=True)
     status = Status(int(arrival.status[0]))
     if status != Status.INADMISSIBLE and here.reach < NEARLY_SINGULAR * span:
         status = Status.SINGULAR  # the range of the motion ends at a dead point
@@ -244,7 +244,7 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, Passage]
     coordinates, outputs, sign = here.state
     shortened = jax.tree.map(_shortened, (coordinates, outputs))
     known = (*shortened, np.zeros_like(sign))  # the sign may change
-    arrival = solver(known, np.array([target - here.instant]), np.array([target]), survey=True)
+    arrival = solver(solver.needed(known), np.array([target - here.instant]), np.array([target]), survey=True)
     beyond = Anchor.of(arrival, target)
     if arrival.status[0] not in PASSABLE or not arrival.deviation[0] <= PASSAGE_DEVIATION:
         return None

@@ -275,7 +275,8 @@ def _rehearse(mechanism: Mechanism, solver: Solver, still: SolvedState, instants
     """
     count, known = min(len(instants), REHEARSED), still
     if len(instants) > LONG_GRID:
-        solver(_repeated(known, solver.width), np.zeros(solver.width), np.asarray(instants[: solver.width]))
+        needed = solver.needed(_repeated(known, solver.width))
+        solver(needed, np.zeros(solver.width), np.asarray(instants[: solver.width]))
     outputs = [x for x in mechanism.outputs.values() if isinstance(x, AbstractMotionOutput) and x.of_forces]
     if outputs and not led_outputs(mechanism):
         coordinates, *_ = _repeated(still, count)

@@ -36,24 +36,16 @@ class Solver:
 
     def __call__(
         self,
-        known: SolvedState,
-        step: Float[np.ndarray, " batch"],
-        instant: Float[np.ndarray, " batch"],
-        *,
-        survey: bool = False,
-    ) -> Arrival:
-        """Solve instants from known neighbours, `together` at most; of a few, `survey` looks for singular positions."""
-        return self.advanced(self.needed(known), step, instant, survey=survey)
-
-    def advanced(
-        self,
         needed: SolvedState,
         step: Float[np.ndarray, " batch"],
         instant: Float[np.ndarray, " batch"],
         *,
         survey: bool = False,
     ) -> Arrival:
-        """Solve instants from what is `needed` of neighbours."""
+        """Solve instants from what is `needed` of solved ones, `together` at most.
+
+        Of a few instants, `survey` looks for singular positions.
+        """
         lanes = len(instant)
         if lanes <= SMALL_BATCH:
             known, step, instant = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), (needed, step, instant))

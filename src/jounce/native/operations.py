@@ -7,11 +7,9 @@ import jax
 import numpy as np
 
 from jounce.native import axes, places
-from jounce.native.arrays import Rule, Values, constants, each
+from jounce.native.arrays import Rule, Values, each
 from jounce.native.code import Code
 from jounce.native.values import UnsupportedOperationError, Value, kind_of
-
-__all__ = ["RULES", "Values", "constants", "kind_of"]
 
 FUNCTIONS = {  # of C's library, by the names that JAX has for them, which are the same
     "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
