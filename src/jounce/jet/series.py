@@ -99,8 +99,8 @@ class Recursion(ProgramReader):
         self._nodes = self._needed()
         self._products = list(dict.fromkeys(pair for node in self._nodes for pair in node.pairs))
         self._stored = list(dict.fromkeys(x for pair in self._products for x in pair[:2]))
-        width = sum(jnp.size(self._values[pair.left]) for pair in self._products)
-        left, right = ((), ()) if unrolled else (jnp.zeros((order + size * _BLOCK, width)) for size in (1, 2))
+        self._width = sum(jnp.size(self._values[pair.left]) for pair in self._products)
+        left, right = ((), ()) if unrolled else (jnp.zeros((order + size * _BLOCK, self._width)) for size in (1, 2))
         self.history = (left, right, tuple(self._values[x] for x in self._stored))
 
     def advanced(self, history: Any, k: Any, coefficients: Sequence[Any]) -> tuple[Any, Any]:
@@ -179,18 +179,16 @@ class Recursion(ProgramReader):
         if not self._products:
             return left, right
         rows = {x: jnp.ravel(c) for x, c in zip(self._stored, newest, strict=True)}
-        if self.unrolled:
-            newest_left = tuple(rows[pair.left] * (k if pair.weighted else 1.0) for pair in self._products)
-            return (*left, newest_left), (*right, tuple(rows[pair.right] for pair in self._products))
-        a, b = (jnp.concatenate([rows[pair[i]] for pair in self._products])[None] for i in (0, 1))
+        a, b = (jnp.concatenate([rows[pair[i]] for pair in self._products]) for i in (0, 1))
         weighted = [pair.weighted for pair in self._products for _ in range(rows[pair.left].size)]
-        left = jax.lax.dynamic_update_slice_in_dim(left, a * jnp.where(np.array(weighted), k, 1.0)[None], k, 0)
-        return left, jax.lax.dynamic_update_slice_in_dim(right, b, k + _BLOCK, 0)
+        a = a * jnp.where(np.array(weighted), k, 1.0)
+        if self.unrolled:
+            return (*left, a), (*right, b)
+        left = jax.lax.dynamic_update_slice_in_dim(left, a[None], k, 0)
+        return left, jax.lax.dynamic_update_slice_in_dim(right, b[None], k + _BLOCK, 0)
 
     def _sums(self, left: Any, right: Any, k: Any) -> dict[_Pair, Any]:
         """Return the sums over the products of coefficients of orders 1 to k - 1, those of order k left out."""
-        if self.unrolled:
-            return self._few_sums(left, right, k)
 
         def block(i: Any, found: Any) -> Any:
             first = 1 + i * _BLOCK
@@ -199,21 +197,15 @@ class Recursion(ProgramReader):
             return found + total(a[j] * b[_BLOCK - 1 - j] for j in range(_BLOCK))
 
         count = -(-self.order // _BLOCK) if self.reversible else (k + _BLOCK - 2) // _BLOCK  # what is beyond is zero
-        found = jax.lax.fori_loop(0, count, block, jnp.zeros(left.shape[1]))
+        if self.unrolled:
+            found = total(left[j] * right[k - j] for j in range(1, k)) if k > 1 else jnp.zeros(self._width)
+        else:
+            found = jax.lax.fori_loop(0, count, block, jnp.zeros(self._width))
         sums, place = {}, 0
         for pair in self._products:
             shape = jnp.shape(self._values[pair.left])
             size = math.prod(shape)
             part, place = found[place : place + size].reshape(shape), place + size
-            sums[pair] = part / k if pair.weighted else part
-        return sums
-
-    def _few_sums(self, left: Any, right: Any, k: int) -> dict[_Pair, Any]:
-        sums = {}
-        for place, pair in enumerate(self._products):
-            value = self._values[pair.left]
-            parts = [left[j][place] * right[k - j][place] for j in range(1, k)]
-            part = jnp.reshape(total(parts), jnp.shape(value)) if parts else jnp.zeros_like(value)
             sums[pair] = part / k if pair.weighted else part
         return sums
 
