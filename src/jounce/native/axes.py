@@ -1,7 +1,8 @@
 """Operations along axes of arrays: sums, products, extremes, and products of matrices."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from jounce.native.values import DTYPES, UnsupportedOperationError, Value, kind_
 MOST_SORTED = 16  # numbers
 
 
-def _nothing(operation: str, kind: str) -> Any:
+def nothing(operation: str, kind: str) -> Any:
     """Return what an operation gives of no numbers."""
     if operation in ("add", "mul"):
         return operation == "mul"
@@ -25,15 +26,16 @@ def _nothing(operation: str, kind: str) -> Any:
     return limits[operation == "min"]
 
 
+def combination(code: Code, operation: str) -> Callable[[Value, Value], Value]:
+    """Return what combines two numbers to their sum, product, or the like."""
+    return partial(code.logic if operation in ("and", "or") else code.arithmetic, operation)
+
+
 def _combined(code: Code, operation: str, values: Sequence[Value], kind: str) -> Value:
     """Return the sum, product, or the like of numbers of one kind."""
     if not values:
-        return code.constant(_nothing(operation, kind), kind)
-    combine = code.logic if operation in ("and", "or") else code.arithmetic
-    found = values[0]
-    for value in values[1:]:
-        found = combine(operation, found, value)
-    return found
+        return code.constant(nothing(operation, kind), kind)
+    return reduce(combination(code, operation), values)
 
 
 def reduction(operation: str) -> Rule:

@@ -2,7 +2,7 @@
 
 import math
 import operator
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -66,6 +66,14 @@ class Code:
         Declarations of the functions of LLVM that are called.
     here : Value or None
         In which lanes what is written now is asked for; None for all.
+    large : int or None
+        Arrays of more numbers stay in memory, and operations on them are loops; None for none.
+    alone : bool
+        Whether there is one instant only, so that vectors are numbers of an array that lie one after another.
+    constants : list of str
+        Text of arrays of constants in memory.
+    changeable : set of Region
+        Memory of one array alone, which may be changed where nobody reads it any more.
     """
 
     width: int
@@ -76,9 +84,17 @@ class Code:
     functions: set[tuple[str, int]] = field(default_factory=set)
     intrinsics: set[str] = field(default_factory=set)
     here: Value | None = None
+    large: int | None = None
+    alone: bool = False
+    constants: list[str] = field(default_factory=list)
+    changeable: set[Region] = field(default_factory=set)
     _count: int = 0
     _known: list[dict[str, Value]] = field(default_factory=lambda: [{}])
     _vectors: dict[tuple[str, str], str] = field(default_factory=dict)
+    _rooms: dict[tuple[int, str, bool], list[Region]] = field(default_factory=dict)  # that nobody uses any more
+    _taken: dict[Region, tuple[int, str, bool]] = field(default_factory=dict)  # that somebody may, by what they hold
+    _tables: dict[tuple[str, bytes], Region] = field(default_factory=dict)
+    _users: list[Callable[[Region], bool]] = field(default_factory=list)  # tell whether memory is wanted further on
 
     def __post_init__(self):
         self._types = {(kind, False): of for kind, of in SCALARS.items()}
@@ -296,6 +312,70 @@ class Code:
         self.entry.append(f"{name} = alloca {of}, i64 {max(1, size)}, align 64")
         return Region(name, kind, lanes)
 
+    def taken_room(self, size: int, kind: str, *, lanes: bool) -> Region:
+        """Return memory that can be given back, some that was if there is any."""
+        key = max(1, size), kind, lanes
+        free = self._rooms.get(key)
+        region = free.pop() if free else self.room(size, kind, lanes=lanes)
+        self._taken[region] = key
+        self.changeable.add(region)
+        return region
+
+    def give_back(self, region: Region) -> None:
+        """Let memory be used again, if it can be given back."""
+        if (key := self._taken.pop(region, None)) is not None:
+            self._rooms.setdefault(key, []).append(region)
+
+    @contextmanager
+    def used(self, wants: Callable[[Region], bool]) -> Iterator[None]:
+        """Keep memory meanwhile that a function says is wanted further on."""
+        self._users.append(wants)
+        try:
+            yield
+        finally:
+            self._users.pop()
+
+    def is_unshared(self, region: Region) -> bool:
+        """Tell whether what is in memory is wanted no more."""
+        return not any(wants(region) for wants in self._users)
+
+    def constants_region(self, numbers: Sequence[Any], kind: str) -> Region:
+        """Return where constants are in memory."""
+        table = np.array(numbers, DTYPES[kind])
+        key = kind, table.tobytes()
+        if (region := self._tables.get(key)) is None:
+            one, name = IN_MEMORY[kind], f"@c{len(self._tables)}"
+            texts = (literal(self.constant(number)) for number in table)
+            listed = ", ".join(f"{one} {str(int(text == 'true')) if kind == 'b' else text}" for text in texts)
+            self.constants.append(f"{name} = private constant [{table.size} x {one}] [{listed}], align 64")
+            region = self._tables[key] = Region(name, kind, False)
+        return region
+
+    def load_along(self, region: Region, index: int | Value) -> Value:
+        """Return a vector of numbers that lie one after another from a place of memory on."""
+        one, place = IN_MEMORY[region.kind], self._address(region, index)
+        name, of = self.fresh(), f"<{self.width} x {one}>"
+        hint = ", !invariant.load !0" if region.given else ""
+        self.lines.append(f"{name} = load {of}, ptr {place}, align {DTYPES[region.kind].itemsize}{hint}")
+        if region.kind == "b":
+            byte, name = name, self.fresh()
+            self.lines.append(f"{name} = trunc {of} {byte} to {self.type_of('b', lanes=True)}")
+        return Value(name, region.kind, True)
+
+    def store_along(self, region: Region, index: int | Value, value: Value) -> None:
+        """Put a vector of numbers one after another from a place of memory on."""
+        one, place, operand = IN_MEMORY[region.kind], self._address(region, index), self.operand(value, lanes=True)
+        of = f"<{self.width} x {one}>"
+        if region.kind == "b":
+            truth = self.type_of("b", lanes=True)
+            operand = self._found(f"zext {truth} {operand} to {of}", "b", lanes=True).name
+        self.lines.append(f"store {of} {operand}, ptr {place}, align {DTYPES[region.kind].itemsize}")
+
+    def _address(self, region: Region, index: int | Value) -> str:
+        place = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
+        address = f"getelementptr {IN_MEMORY[region.kind]}, ptr {region.pointer}, i64 {place}"
+        return self._found(address, "l", lanes=False).name
+
     def load(self, region: Region, index: int | Value) -> Value:
         """Return the number at a place of memory, which must be one of its own."""
         place = self._place(region, index)
@@ -352,13 +432,15 @@ class Code:
         """End a block, and go on with one of two."""
         self.lines.append(f"br i1 {choice}, label %{then}, label %{otherwise}")
 
-    def mark(self) -> tuple[int, int, int, int]:
+    def mark(self) -> tuple[Any, ...]:
         """Return how far the text has come, for `back_to`."""
-        return len(self.lines), len(self.entry), len(self._known[-1]), self.memory
+        rooms = {key: list(regions) for key, regions in self._rooms.items()}
+        return len(self.lines), len(self.entry), len(self._known[-1]), self.memory, rooms, dict(self._taken)
 
-    def back_to(self, mark: tuple[int, int, int, int]) -> None:
+    def back_to(self, mark: tuple[Any, ...]) -> None:
         """Take back what was written since a mark in the same scope."""
-        lines, entry, known, self.memory = mark
+        lines, entry, known, self.memory, rooms, taken = mark
+        self._rooms, self._taken = {key: list(regions) for key, regions in rooms.items()}, dict(taken)
         del self.lines[lines:], self.entry[entry:]
         while len(self._known[-1]) > known:
             self._known[-1].popitem()

@@ -114,13 +114,12 @@ def _same(_: Code, __: Any, given: Sequence[Values]) -> Sequence[Values]:
     return given
 
 
-RULES: Mapping[str, Rule] = {
+ELEMENTWISE: Mapping[str, Rule] = {
     **{name: _arithmetic(name) for name in ("add", "sub", "mul", "div", "max", "min", "rem")},
     **{name: _compare(name) for name in ("eq", "ne", "lt", "le", "gt", "ge")},
     **{name: _logic(name) for name in ("and", "or", "xor")},
     **{name: _intrinsic(name) for name in ("sqrt", "floor", "ceil")},
     **{name: _function(name) for name in FUNCTIONS},
-    **dict.fromkeys(("copy", "stop_gradient", "optimization_barrier"), _same),
     "add_any": _arithmetic("add"),
     "neg": _unary(Code.negated),
     "not": _unary(Code.inverted),
@@ -134,6 +133,12 @@ RULES: Mapping[str, Rule] = {
     "convert_element_type": _convert,
     "select_n": _select,
     "clamp": _clamp,
+}
+"""Of each number, or of the numbers at one place of some arrays."""
+
+RULES: Mapping[str, Rule] = {
+    **ELEMENTWISE,
+    **dict.fromkeys(("copy", "stop_gradient", "optimization_barrier"), _same),
     "reduce_sum": axes.reduction("add"),
     "reduce_prod": axes.reduction("mul"),
     "reduce_max": axes.reduction("max"),

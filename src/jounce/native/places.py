@@ -115,7 +115,7 @@ def _element(code: Code, values: Sequence[Value], index: Value) -> Value:
     return found
 
 
-def _within(code: Code, index: Value, least: int, most: int) -> Value:
+def within(code: Code, index: Value, least: int, most: int) -> Value:
     """Return an index within bounds."""
     below = code.arithmetic("min", index, code.constant(most, index.kind))
     return code.arithmetic("max", below, code.constant(least, index.kind))
@@ -126,7 +126,7 @@ def dynamic_slice(code: Code, equation: Any, given: Sequence[Values]) -> Sequenc
     array, *starts = given
     for axis, (start, size) in enumerate(zip(starts, equation.params["slice_sizes"], strict=True)):
         rows = np.moveaxis(array, axis, 0)
-        index, shape = _within(code, start.item(), 0, len(rows) - size), (size, *rows.shape[1:])
+        index, shape = within(code, start.item(), 0, len(rows) - size), (size, *rows.shape[1:])
         if index.constant is not None:
             found = rows[int(index.constant) :][:size]
         elif not np.prod(shape):
@@ -150,7 +150,7 @@ def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequenc
     """Return an array with a part of it changed that starts at indices, moved so that all of it is in bounds."""
     array, new, *starts = given
     rooms = [whole - size for whole, size in zip(array.shape, new.shape, strict=True)]
-    indices = [_within(code, start.item(), 0, most) for start, most in zip(starts, rooms, strict=True)]
+    indices = [within(code, start.item(), 0, most) for start, most in zip(starts, rooms, strict=True)]
     moving = [axis for axis, index in enumerate(indices) if index.constant is None]
     firsts = [
         range(most + 1) if index.constant is None else (int(index.constant),)
@@ -182,7 +182,7 @@ def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Value
         with jax.ensure_compile_time_eval():
             return np.asarray(jax.lax.gather(places, table, fill_value=-1, **options))
 
-    numbers = [*flat(array), code.constant(_filler(p, dtype), kind_of(dtype))]
+    numbers = [*flat(array), code.constant(filler(p, dtype), kind_of(dtype))]
     if not moving:
         return [_taken(numbers, at(known))]
     (axis,) = moving
@@ -194,7 +194,7 @@ def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Value
     found = np.empty(tables[0].shape, object)
     which = [k for k in range(found.ndim) if k not in p["dimension_numbers"].offset_dims]
     for place in np.ndindex(found.shape):
-        index = _within(code, indices[(*(place[k] for k in which), axis)], -1, size)
+        index = within(code, indices[(*(place[k] for k in which), axis)], -1, size)
         index = code.arithmetic("add", index, code.constant(1, index.kind))
         found[place] = _element(code, [numbers[table[place]] for table in tables], index)
     return [found]
@@ -204,7 +204,7 @@ def _taken(numbers: Sequence[Value], table: np.ndarray) -> Values:
     return filled(table.shape, [numbers[place] for place in table.ravel()])
 
 
-def _filler(params: Mapping[str, Any], dtype: Any) -> Any:
+def filler(params: Mapping[str, Any], dtype: Any) -> Any:
     """Return what stands where an index points beyond an array."""
     if params["mode"] != GatherScatterMode.FILL_OR_DROP:
         return 0

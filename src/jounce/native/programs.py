@@ -9,10 +9,11 @@ import jax
 import numpy as np
 
 from jounce.native import rows as rows_
-from jounce.native.arrays import Values, constants
+from jounce.native.arrays import constants
 from jounce.native.code import MOST_LINES, Code, flat
 from jounce.native.handler import handler_text, is_known
 from jounce.native.machine import MachineCode, compiled, vector_width
+from jounce.native.stored import Array, Stored, contiguous, is_large, put, values_of
 from jounce.native.translation import translate
 from jounce.native.values import Region, UnsupportedOperationError, kind_of
 
@@ -161,15 +162,21 @@ def _text(
     *,
     rows: bool = False,
     most_lines: int = MOST_LINES,
+    large: int | None = None,
+    alone: bool = False,
 ) -> str:
     """Return the text of a module with a function `run` of the addresses of all arrays and the number of lanes."""
-    code, given = Code(width, most_lines), []
+    code, given = Code(width, most_lines, large=large, alone=alone), []
     for number, variable in enumerate(closed.jaxpr.invars):
         if number in known:
             given.append(constants(code, known[number]))
             continue
-        region = _region(code, number, kind_of(variable.aval.dtype), lanes=number >= shared)
-        array = np.empty(variable.aval.shape, object)
+        region = _region(code, number, kind_of(variable.aval.dtype), lanes=number >= shared and not alone)
+        shape = variable.aval.shape
+        if is_large(code, variable.aval) and not (rows and region.lanes):
+            given.append(contiguous(region, shape))
+            continue
+        array = np.empty(shape, object)
         if rows and region.lanes:
             array.ravel()[:] = rows_.read(code, region.pointer, array.size, region.kind)
         else:
@@ -180,10 +187,7 @@ def _text(
         _write(code, number, array, rows=rows)
     if code.memory > MOST_MEMORY:
         raise UnsupportedOperationError(f"{code.memory} bytes of memory")
-    lines = [
-        "define void @run(ptr noalias %arguments, i64 %total) #1 {",
-        "begin:",
-        *code.entry,
+    loop = [
         f"%most = sub i64 %total, {width}",
         "br label %lanes",
         "lanes:",
@@ -196,13 +200,20 @@ def _text(
         "%over = icmp sge i64 %next, %total",
         "br i1 %over, label %end, label %lanes",
         "end:",
+    ]
+    lines = [
+        *code.constants,
+        "define void @run(ptr noalias %arguments, i64 %total) #1 {",
+        "begin:",
+        *code.entry,
+        *(code.lines if alone else loop),
         "ret void",
         "}",
         *sorted(code.intrinsics | {"declare i64 @llvm.smin.i64(i64, i64)"}),
     ]
     for name, count in sorted(code.functions):
         lines += [f"declare double @{name}({', '.join(['double'] * count)}) #0", _lane_by_lane(name, count, width)]
-    lines.append(handler_text(len(given), len(results), shared))
+    lines.append(handler_text(len(given), len(results), None if alone else shared))
     return "\n".join([*lines, ATTRIBUTES])
 
 
@@ -213,11 +224,14 @@ def _region(code: Code, number: int, kind: str, *, lanes: bool) -> Region:
     return Region(f"%a{number}", kind, lanes, given=True)
 
 
-def _write(code: Code, number: int, array: Values, *, rows: bool) -> None:
-    values = flat(array)
-    if not values:
+def _write(code: Code, number: int, array: Array, *, rows: bool) -> None:
+    if not array.size:
         return
-    region = _region(code, number, values[0].kind, lanes=True)
+    if isinstance(array, Stored) and not rows:
+        put(code, contiguous(_region(code, number, array.kind, lanes=not code.alone), array.shape), array)
+        return
+    values = flat(values_of(code, array))
+    region = _region(code, number, values[0].kind, lanes=not code.alone)
     if rows:
         rows_.write(code, region.pointer, values)
         return

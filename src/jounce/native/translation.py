@@ -4,15 +4,32 @@ Where lanes part, all ways that some lane takes are run, and each keeps what its
 last lane that is in it has left. So the results of a lane depend on no other.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from jax.extend.core import Literal, jaxprs_in_params
 
-from jounce.native.arrays import Values, constants, each, filled, in_memory, row
+from jounce.native.arrays import Values, constants, each, filled
 from jounce.native.code import Code, flat
+from jounce.native.loops import STORED
 from jounce.native.operations import RULES
+from jounce.native.stored import (
+    Array,
+    Stored,
+    at as row_at,
+    contiguous,
+    copied,
+    further,
+    is_large,
+    nest,
+    new as new_array,
+    put,
+    settled,
+    stored,
+    values_of,
+)
 from jounce.native.values import Region, UnsupportedOperationError, Value, kind_of
 
 MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn after turn
@@ -35,31 +52,76 @@ def translate(code: Code, program: Any, constants_: Sequence[Values], given: Seq
     UnsupportedOperationError
         Where there is no code for an operation.
     """
-    known: dict[Any, Values] = dict(zip(program.constvars, constants_, strict=True))
+    known: dict[Any, Array] = dict(zip(program.constvars, constants_, strict=True))
     known |= zip(program.invars, given, strict=True)
+    last = {} if code.large is None else _last_uses(program)
+    now = 0
 
-    def read(variable: Any) -> Values:
+    def read(variable: Any) -> Array:
         if isinstance(variable, Literal):
             aval: Any = variable.aval
             return constants(code, np.asarray(variable.val, aval.dtype))
         return known[variable]
 
-    for equation in program.eqns:
-        inputs = [read(variable) for variable in equation.invars]
-        name = equation.primitive.name
-        if (rule := _CONTROL.get(name) or RULES.get(name)) is None:
-            raise UnsupportedOperationError(name)
-        for variable, values in zip(equation.outvars, rule(code, equation, inputs), strict=True):
-            known[variable] = _checked(values, variable.aval)
+    def wanted(region: Region) -> bool:
+        return any(
+            isinstance(array, Stored) and array.region is region and last.get(variable, -1) > now
+            for variable, array in known.items()
+        )
+
+    with code.used(wanted):
+        for now, equation in enumerate(program.eqns):
+            inputs = [read(variable) for variable in equation.invars]
+            found = _found(code, equation, inputs)
+            for variable, values in zip(equation.outvars, found, strict=True):
+                known[variable] = _checked(values, variable.aval)
+            if last:
+                used = [v for v in (*equation.invars, *equation.outvars) if not isinstance(v, Literal)]
+                _let_go(code, known, [v for v in dict.fromkeys(used) if last.get(v, now) <= now])
     return [read(variable) for variable in program.outvars]
 
 
-def _checked(values: Any, aval: Any) -> Values:
+def _last_uses(program: Any) -> dict[Any, int]:
+    """Return the number of the last equation that reads each variable; results are read after all of them."""
+    uses = [*(equation.invars for equation in program.eqns), program.outvars]
+    return {variable: k for k, read in enumerate(uses) for variable in read if not isinstance(variable, Literal)}
+
+
+def _let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
+    """Forget variables that nobody reads any more, and give back what memory only they had."""
+    gone = [known.pop(variable, None) for variable in variables]
+    for region in {array.region for array in gone if isinstance(array, Stored)}:
+        if code.is_unshared(region):
+            code.give_back(region)
+
+
+def _found(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Return the results of an operation: by single values, or by loops where an array is large."""
+    name = equation.primitive.name
+    if (control := _CONTROL.get(name)) is not None:
+        return control(code, equation, given)
+    if name in RULES and (any(map(_is_stored, given)) or any(is_large(code, v.aval) for v in equation.outvars)):
+        if (rule := STORED.get(name)) is not None:
+            return [settled(code, x) if isinstance(x, Stored) else x for x in rule(code, equation, given)]
+    if (rule := RULES.get(name)) is None:
+        raise UnsupportedOperationError(name)
+    return rule(code, equation, [values_of(code, array) for array in given])
+
+
+def _is_stored(array: Array) -> bool:
+    return isinstance(array, Stored)
+
+
+def _checked(values: Any, aval: Any) -> Array:
     """Return values as an array, as NumPy does not for a lone one: of the shape and the kind that JAX has for it."""
-    array = values if isinstance(values, np.ndarray) else filled((), [values])
+    array = values if isinstance(values, np.ndarray | Stored) else filled((), [values])
     if array.shape != aval.shape:
         raise AssertionError(f"an array of shape {array.shape} where one of {aval.shape} belongs")
     kind = kind_of(aval.dtype)
+    if isinstance(array, Stored):
+        if array.kind != kind:
+            raise UnsupportedOperationError(f"an array of {array.kind} where one of {kind} belongs")
+        return array
     if array.size and array.item(0).kind != kind:
         raise UnsupportedOperationError(f"an array of {array.item(0).kind} where one of {kind} belongs")
     return array
@@ -86,20 +148,38 @@ class _Carried:
             code.room(int(np.prod(aval.shape)), kind_of(aval.dtype), lanes=vector)
             for aval, vector in zip(avals, lanes, strict=True)
         ]
+        self.large = [is_large(code, aval) for aval in avals]
+        code.changeable.update(region for region, large in zip(self.regions, self.large, strict=True) if large)
 
-    def load(self) -> list[Values]:
-        """Return the arrays as they are."""
+    def load(self) -> list[Array]:
+        """Return the arrays as they are; large ones stay where they are."""
         return [
-            filled(shape, [self.code.load(region, k) for k in range(int(np.prod(shape)))])
-            for region, shape in zip(self.regions, self.shapes, strict=True)
+            contiguous(region, shape)
+            if large
+            else filled(shape, [self.code.load(region, k) for k in range(math.prod(shape))])
+            for region, shape, large in zip(self.regions, self.shapes, self.large, strict=True)
         ]
 
-    def store(self, arrays: Sequence[Values]) -> None:
+    def store(self, arrays: Sequence[Array]) -> None:
         """Change the arrays: where a number is what was there when it was loaded, there is nothing to do."""
-        for region, array in zip(self.regions, arrays, strict=True):
+        targets = [contiguous(region, shape) for region, shape in zip(self.regions, self.shapes, strict=True)]
+        changing = {
+            target.region for target, array in zip(targets, arrays, strict=True) if not target.is_same(array)
+        }
+        apart = [  # what is a part of an array that changes is read before
+            copied(self.code, array)
+            if isinstance(array, Stored) and array.region in changing and not target.is_same(array)
+            else array
+            for target, array in zip(targets, arrays, strict=True)
+        ]
+        for target, array in zip(targets, apart, strict=True):
+            if isinstance(array, Stored):
+                if not target.is_same(array):
+                    put(self.code, target, array)
+                continue
             for k, value in enumerate(flat(array)):
-                if value.home != (region, k):
-                    self.code.store(region, k, value)
+                if value.home != (target.region, k):
+                    self.code.store(target.region, k, value)
 
 
 def _until_settled(code: Code, lanes: list[bool], attempt: Callable[[list[bool]], tuple[list[bool], Any]]) -> Any:
@@ -124,23 +204,34 @@ def _until_settled(code: Code, lanes: list[bool], attempt: Callable[[list[bool]]
 def _in_lanes(arrays: Sequence[Values], already: Sequence[bool] | None = None) -> list[bool]:
     """Tell which arrays have numbers that differ from lane to lane, or did already."""
     already = [False] * len(arrays) if already is None else already
-    return [before or any(v.lanes for v in flat(array)) for before, array in zip(already, arrays, strict=True)]
-
-
-def _likely(arrays: Sequence[Values]) -> list[bool]:
-    """Tell which arrays that a loop changes are taken to differ from lane to lane: all but counts that do not yet."""
     return [
-        lanes or any(v.kind == "f" for v in flat(array)) for lanes, array in zip(_in_lanes(arrays), arrays, strict=True)
+        before or (array.region.lanes if isinstance(array, Stored) else any(v.lanes for v in flat(array)))
+        for before, array in zip(already, arrays, strict=True)
     ]
 
 
-def _likely_made(avals: Sequence[Any]) -> list[bool]:
+def _likely(code: Code, arrays: Sequence[Array], avals: Sequence[Any]) -> list[bool]:
+    """Tell which arrays that a loop changes are taken to differ from lane to lane: all but counts that do not yet."""
+    return [a or b for a, b in zip(_in_lanes(arrays), _likely_made(code, avals), strict=True)]
+
+
+def _likely_made(code: Code, avals: Sequence[Any]) -> list[bool]:
     """Tell which arrays that are made are taken to differ from lane to lane."""
-    return [kind_of(aval.dtype) == "f" for aval in avals]
+    return [kind_of(aval.dtype) == "f" and not code.alone for aval in avals]
 
 
-def _chosen(code: Code, choice: Value, new: Sequence[Values], old: Sequence[Values]) -> list[Values]:
-    return [each(lambda a, b: code.select(choice, a, b), x, y) for x, y in zip(new, old, strict=True)]
+def _chosen(code: Code, choice: Value, new: Sequence[Array], old: Sequence[Array]) -> list[Array]:
+    def chosen(x: Array, y: Array) -> Array:
+        if not isinstance(x, Stored) and not isinstance(y, Stored):
+            return each(lambda a, b: code.select(choice, a, b), x, y)
+        a, b = stored(code, x), stored(code, y)
+        if a.is_same(b):
+            return a
+        found = new_array(code, a.shape, a.kind, lanes=choice.lanes or a.region.lanes or b.region.lanes)
+        nest(code, [a, b], [found], lambda values: [code.select(choice, *values)])
+        return found
+
+    return [chosen(x, y) for x, y in zip(new, old, strict=True)]
 
 
 def _while(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
@@ -157,12 +248,14 @@ def _while(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
         code.begin(head)
         with code.scope():
             before = carried.load()
-            goes = code.among_here(_closed(code, p["cond_jaxpr"], asked, before)[0].item())
+            with code.used(_among([*asked, *needed, *before])):
+                goes = code.among_here(_closed(code, p["cond_jaxpr"], asked, before)[0].item())
             if goes.lanes and not all(lanes):  # what a lane keeps that has left differs
                 return [True] * len(lanes), []
             code.branch(code.anywhere(goes), body, end)
             code.begin(body)
-            with code.scope(goes if goes.lanes else None):
+            kept = [*asked, *needed, *(before if goes.lanes else ())]
+            with code.scope(goes if goes.lanes else None), code.used(_among(kept)):
                 after = _closed(code, p["body_jaxpr"], needed, before)
                 if goes.lanes:
                     after = _chosen(code, goes, after, before)
@@ -171,7 +264,13 @@ def _while(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
         code.begin(end)
         return _in_lanes(after, lanes), carried.load()
 
-    return _until_settled(code, _likely(start), attempt)
+    return _until_settled(code, _likely(code, start, [variable.aval for variable in equation.outvars]), attempt)
+
+
+def _among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
+    """Return what tells the memory of some arrays."""
+    regions = {array.region for array in arrays if isinstance(array, Stored)}
+    return regions.__contains__
 
 
 def _scan(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
@@ -182,7 +281,7 @@ def _scan(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values
     made = [variable.aval for variable in equation.outvars[len(start) :]]
     if p["length"] == 0:
         return [*start, *(np.empty(aval.shape, object) for aval in made)]
-    most = code.most if _needs_known_places(p["jaxpr"].jaxpr) else MOST_UNROLLED
+    most = code.most if code.large is None and _needs_known_places(p["jaxpr"].jaxpr) else MOST_UNROLLED
     if (unrolled := _unrolled(code, equation, needed, start, rows, most)) is not None:
         return unrolled
     mark = code.mark()
@@ -217,35 +316,26 @@ def _rolled(
         written, counter = _Carried(code, made, lanes[size:]), code.room(1, "l", lanes=False)
         carried.store(start)
         code.store(counter, 0, code.constant(0, "l"))
-        homes = [in_memory(code, flat(array)) if array.size else None for array in rows]
+        homes = [stored(code, array) if array.size else array for array in rows]
         body, end = code.label(), code.label()
         code.jump(body)
         code.begin(body)
-        with code.scope():
+        with code.scope(), code.used(_among([*needed, *homes])):
             count = code.load(counter, 0)
             at = code.arithmetic("sub", last, count) if p["reverse"] else count
-            taken = [_row(code, home, array, at) for home, array in zip(homes, rows, strict=True)]
+            taken = [row_at(code, array, at) if array.size else np.empty(array.shape[1:], object) for array in homes]
             results = _closed(code, p["jaxpr"], needed, carried.load(), taken)
             carried.store(results[:size])
             for region, array in zip(written.regions, results[size:], strict=True):
-                _put(code, region, at, array)
+                if array.size:
+                    put(code, contiguous(region, array.shape, further(code, 0, at, array.size)), array)
             code.store(counter, 0, code.arithmetic("add", count, code.constant(1, "l")))
             code.branch(code.operand(code.compare("lt", count, last), lanes=False), body, end)
         code.begin(end)
         return _in_lanes(results, lanes), [*carried.load(), *written.load()]
 
-    return _until_settled(code, [*_likely(start), *_likely_made(made)], attempt)
-
-
-def _row(code: Code, home: tuple[Region, int] | None, array: Values, index: Value) -> Values:
-    return np.empty(array.shape[1:], object) if home is None else row(code, home, index, array.shape[1:])
-
-
-def _put(code: Code, region: Region, index: Value, array: Values) -> None:
-    """Put a row of numbers at an index."""
-    first = code.arithmetic("mul", index, code.constant(array.size, "l"))
-    for k, value in enumerate(flat(array)):
-        code.store(region, code.arithmetic("add", first, code.constant(k, "l")), value)
+    likely = [*_likely(code, start, [variable.aval for variable in equation.outvars[:size]]), *_likely_made(code, made)]
+    return _until_settled(code, likely, attempt)
 
 
 def _unrolled(
@@ -258,14 +348,25 @@ def _unrolled(
     p, mark, before = equation.params, code.mark(), len(code.lines)
     size, found = len(start), {}
     for k in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
-        results = _closed(code, p["jaxpr"], needed, start, [array[k, ...] for array in rows])
+        results = _closed(code, p["jaxpr"], needed, start, [row_at(code, array, k) for array in rows])
         start, found[k] = results[:size], results[size:]
         lines, left = len(code.lines) - before, p["length"] - len(found)
         if p["length"] > 1 and lines + lines / len(found) / HOPE * left > most:
             code.back_to(mark)
             return None
     made = [[found[k][place] for k in range(p["length"])] for place in range(len(equation.outvars) - size)]
-    return [*start, *(np.stack(parts) for parts in made)]
+    return [*start, *(_stacked(code, parts) for parts in made)]
+
+
+def _stacked(code: Code, parts: Sequence[Array]) -> Array:
+    if not any(map(_is_stored, parts)) and not (code.large and len(parts) * parts[0].size > code.large):
+        return np.stack(parts)
+    lanes = _in_lanes(parts)
+    kind = next(p.kind if isinstance(p, Stored) else p.item(0).kind for p in parts)
+    found = new_array(code, (len(parts), *parts[0].shape), kind, lanes=any(lanes))
+    for k, part in enumerate(parts):
+        put(code, contiguous(found.region, part.shape, k * part.size), part)
+    return found
 
 
 def _cond(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
@@ -283,7 +384,7 @@ def _cond(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
             begin, end = code.label(), code.label()
             code.branch(code.anywhere(here), begin, end)
             code.begin(begin)
-            with code.scope(here if here.lanes else None):
+            with code.scope(here if here.lanes else None), code.used(_among(inputs if k < len(ways) - 1 or here.lanes else [])):
                 made = _closed(code, way, inputs)
                 found = _in_lanes(made, found)
                 if which.lanes and k > 0:
@@ -294,7 +395,7 @@ def _cond(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
         return found, results.load()
 
     avals = [variable.aval for variable in equation.outvars]
-    return _until_settled(code, [which.lanes or likely for likely in _likely_made(avals)], attempt)
+    return _until_settled(code, [which.lanes or likely for likely in _likely_made(code, avals)], attempt)
 
 
 _CALLS = ("jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "custom_vjp_call", "checkpoint", "remat2")

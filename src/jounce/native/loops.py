@@ -1,0 +1,399 @@
+"""JAX's operations on arrays that stay in memory: views where numbers keep their places, and loops elsewhere."""
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from jax.lax import GatherScatterMode
+
+from jounce.native.arrays import Values, filled
+from jounce.native.axes import combination, nothing
+from jounce.native.code import Code, flat
+from jounce.native.operations import ELEMENTWISE, RULES
+from jounce.native.places import filler, within
+from jounce.native.stored import (
+    Array,
+    Stored,
+    at,
+    between,
+    check_uniform,
+    contiguous,
+    copied,
+    counted,
+    further,
+    is_own,
+    nest,
+    new,
+    put,
+    replace_home,
+    reshaped,
+    spread,
+    stored,
+    transposed,
+)
+from jounce.native.values import Value, kind_of
+
+StoredRule = Callable[[Code, Any, Sequence[Array]], Sequence[Array]]
+
+
+# -- number by number -------------------------------------------------------------------------------------------------
+
+
+def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Return the results of an operation on each number: its rule for single values, in a loop."""
+    rule, aval = RULES[equation.primitive.name], equation.outvars[0].aval
+    arrays = [stored(code, array) for array in given]
+    arrays = [spread(x, aval.shape, range(x.ndim)) if x.ndim else spread(x, aval.shape, ()) for x in arrays]
+    found = new(code, aval.shape, kind_of(aval.dtype), lanes=any(x.region.lanes for x in arrays))
+
+    def body(values: Sequence[Value]) -> Sequence[Value]:
+        return [result.item() for result in rule(code, equation, [filled((), [value]) for value in values])]
+
+    nest(code, arrays, [found], body)
+    return [found]
+
+
+def _same(_: Code, __: Any, given: Sequence[Array]) -> Sequence[Array]:
+    return given
+
+
+# -- views ------------------------------------------------------------------------------------------------------------
+
+
+def _part(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    p, array = equation.params, stored(code, given[0])
+    steps = p["strides"] or (1,) * array.ndim
+    for axis, (start, limit, step) in enumerate(zip(p["start_indices"], p["limit_indices"], steps, strict=True)):
+        array = between(code, array, axis, int(start), len(range(start, limit, step)), step)
+    return [array]
+
+
+def _broadcast(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    p = equation.params
+    return [spread(stored(code, given[0]), p["shape"], p["broadcast_dimensions"])]
+
+
+def _reshape(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    return [reshaped(code, stored(code, given[0]), equation.outvars[0].aval.shape)]
+
+
+def _transpose(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    return [transposed(stored(code, given[0]), equation.params["permutation"])]
+
+
+def _reverse(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    array = stored(code, given[0])
+    for axis in equation.params["dimensions"]:
+        array = between(code, array, axis, array.shape[axis] - 1, array.shape[axis], -1)
+    return [array]
+
+
+def _unstack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    array, axis = stored(code, given[0]), equation.params["axis"]
+    rows = transposed(array, [axis, *(k for k in range(array.ndim) if k != axis)])
+    return [at(code, rows, k) for k in range(rows.shape[0])]
+
+
+def _split(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    array, axis, sizes = stored(code, given[0]), equation.params["axis"], equation.params["sizes"]
+    starts = [0, *itertools.accumulate(map(int, sizes))]
+    return [between(code, array, axis, start, int(size)) for start, size in zip(starts, sizes, strict=False)]
+
+
+def _dynamic_slice(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    array, *starts = given
+    return [_window(code, stored(code, array), _starts(code, array, equation.params["slice_sizes"], starts), equation)]
+
+
+def _window(code: Code, array: Stored, starts: Sequence[int | Value], equation: Any) -> Stored:
+    for axis, (start, size) in enumerate(zip(starts, equation.params["slice_sizes"], strict=True)):
+        array = between(code, array, axis, start, size)
+    return array
+
+
+def _starts(code: Code, array: Array, sizes: Sequence[int], starts: Sequence[Values]) -> list[int | Value]:
+    """Return where a part begins, moved so that all of it is in bounds."""
+    found = []
+    for whole, size, start in zip(array.shape, sizes, starts, strict=True):
+        index = check_uniform(within(code, start.item(), 0, whole - size))
+        found.append(index if index.constant is None else int(index.constant))
+    return found
+
+
+# -- arrays made of others --------------------------------------------------------------------------------------------
+
+
+def _lanes(arrays: Sequence[Array]) -> bool:
+    return any(x.region.lanes if isinstance(x, Stored) else any(v.lanes for v in flat(x)) for x in arrays)
+
+
+def _made(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
+    """Return room for the result of an operation."""
+    aval = equation.outvars[0].aval
+    return new(code, aval.shape, kind_of(aval.dtype), lanes=_lanes(given))
+
+
+def _concatenate(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    found, axis, start = _made(code, equation, given), equation.params["dimension"], 0
+    for array in given:
+        put(code, between(code, found, axis, start, array.shape[axis]), array)
+        start += array.shape[axis]
+    return [found]
+
+
+def _stack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    found, axis = _made(code, equation, given), equation.params["axis"]
+    rows = transposed(found, [axis, *(k for k in range(found.ndim) if k != axis)])
+    for k, array in enumerate(given):
+        row = between(code, rows, 0, k, 1)
+        put(code, replace(row, shape=row.shape[1:], strides=row.strides[1:]), array)
+    return [found]
+
+
+def _tile(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    array, times = stored(code, given[0]), equation.params["reps"]
+    shape = [n for pair in zip(times, array.shape, strict=True) for n in pair]
+    repeated = spread(array, shape, range(1, len(shape), 2))
+    return [reshaped(code, repeated, equation.outvars[0].aval.shape)]
+
+
+def _pad(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    array, nothing_ = stored(code, given[0]), stored(code, given[1])
+    found = _made(code, equation, given)
+    put(code, found, spread(nothing_, found.shape, ()))
+    target = found
+    for axis, (low, _, between_) in enumerate(equation.params["padding_config"]):
+        step = between_ + 1
+        before = max(0, -(low // step)) if low < 0 else 0  # of the array, beyond the beginning
+        start = low + before * step
+        size = max(0, min(array.shape[axis] - before, -(-(found.shape[axis] - start) // step)))
+        array = between(code, array, axis, before, size)
+        target = between(code, target, axis, start, size, step)
+    put(code, target, array)
+    return [found]
+
+
+def _dynamic_update_slice(code: Code, _: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Change a part of an array: in its place where nobody else sees it."""
+    array, part, *starts = given
+    places = _starts(code, array, part.shape, starts)
+    lanes = _lanes([part])
+    if is_own(code, array) and (array.region.lanes or not lanes):
+        found = array
+    elif lanes and not _lanes([array]):
+        found = new(code, array.shape, _kind(array), lanes=True)
+        put(code, found, stored(code, array))
+    else:
+        found = copied(code, array)
+    target = found
+    for axis, (start, size) in enumerate(zip(places, part.shape, strict=True)):
+        target = between(code, target, axis, start, size)
+    put(code, target, copied(code, part) if isinstance(part, Stored) and part.region is found.region else part)
+    return [found]
+
+
+def _kind(array: Array) -> str:
+    return array.kind if isinstance(array, Stored) else array.item(0).kind
+
+
+# -- along axes -------------------------------------------------------------------------------------------------------
+
+
+def _reduction(operation: str) -> StoredRule:
+    """Return the rule for sums, products and the like along some axes."""
+
+    def rule(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+        array, axes = stored(code, given[0]), equation.params["axes"]
+        kept = [axis for axis in range(array.ndim) if axis not in axes]
+        found = _made(code, equation, [array])
+        start = stored(code, filled((), [code.constant(nothing(operation, found.kind), found.kind)]))
+        put(code, found, spread(start, found.shape, ()))
+        combine = combination(code, operation)
+        total = spread(found, array.shape, kept)
+        nest(code, [total, array], [total], lambda values: [combine(*values)], adds=True)
+        return [found]
+
+    return rule
+
+
+def _dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Return products of matrices: sums of products over some axes, for each place along those that are joined."""
+    (left_sum, right_sum), (left_batch, right_batch) = equation.params["dimension_numbers"]
+    found = _made(code, equation, given)
+    start = stored(code, filled((), [code.constant(0, found.kind)]))
+    put(code, found, spread(start, found.shape, ()))
+    left, right = (stored(code, array) for array in given)
+    left_free, right_free = (
+        [axis for axis in range(x.ndim) if axis not in (*batch, *summed)]
+        for x, batch, summed in ((left, left_batch, left_sum), (right, right_batch, right_sum))
+    )
+    left, right = transposed(left, (*left_batch, *left_free, *left_sum)), transposed(right, (*right_batch, *right_free, *right_sum))
+    batch, summed = len(left_batch), len(left_sum)
+    shape = (*found.shape, *left.shape[left.ndim - summed :])
+    after, end = batch + len(left_free), len(shape) - summed
+    a = spread(left, shape, [*range(after), *range(end, len(shape))])
+    b = spread(right, shape, [*range(batch), *range(after, len(shape))])
+    total = spread(found, shape, range(end))
+
+    def body(values: Sequence[Value]) -> Sequence[Value]:
+        known, p, q = (code.converted(value, found.kind) for value in values)
+        return [code.arithmetic("add", known, code.arithmetic("mul", p, q))]
+
+    nest(code, [total, a, b], [total], body, adds=True)
+    return [found]
+
+
+# -- at indices -------------------------------------------------------------------------------------------------------
+
+
+def _placed(
+    code: Code, p: Any, array: Stored, rows: Stored, numbers: Mapping[int, int], sizes: Sequence[int], batch: Sequence[int | Value]
+) -> tuple[int | Value, Value]:
+    """Return the place of the first number of a window, moved into the array, and whether it was there already.
+
+    Parameters
+    ----------
+    rows : Stored
+        Indices, of which the last axis are those of a window.
+    numbers : mapping
+        Of the axes of the array for which there are indices, to their places among them.
+    sizes : sequence of int
+        Of a window, for each axis of the array.
+    batch : sequence
+        Which window it is.
+    """
+    place, inside = array.first, code.constant(True)
+    for axis, size in enumerate(array.shape):
+        if axis not in numbers:
+            continue
+        where = rows.first
+        for k, stride in zip((*batch, numbers[axis]), rows.strides, strict=True):
+            where = further(code, where, k, stride)
+        index = code.converted(check_uniform(replace_home(code.load(rows.region, where))), "l")
+        kept = within(code, index, 0, size - sizes[axis])
+        inside = code.logic("and", inside, code.compare("eq", kept, index))
+        place = further(code, place, kept, array.strides[axis])
+    return place, inside if p["mode"] == GatherScatterMode.FILL_OR_DROP else code.constant(True)
+
+
+def _windows(
+    code: Code, shape: Sequence[int], body: Callable[[list[int | Value]], None], before: Sequence[int | Value] = ()
+) -> None:
+    """Write loops over the windows of an array."""
+    if not shape:
+        body(list(before))
+        return
+    counted(code, shape[0], lambda k: _windows(code, shape[1:], body, (*before, k)))
+
+
+def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Return parts of an array at indices."""
+    p, array, indices = equation.params, stored(code, given[0]), stored(code, given[1])
+    numbers, aval = p["dimension_numbers"], equation.outvars[0].aval
+    found = new(code, aval.shape, kind_of(aval.dtype), lanes=array.region.lanes)
+    offsets = list(numbers.offset_dims)
+    batch = [axis for axis in range(found.ndim) if axis not in offsets]
+    taken = [axis for axis in range(array.ndim) if axis not in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims)]
+    sizes, named = p["slice_sizes"], {axis: k for k, axis in enumerate(numbers.start_index_map)}
+    beyond = stored(code, filled((), [code.constant(filler(p, aval.dtype), found.kind)]))
+
+    def window(which: list[int | Value]) -> None:
+        first, inside = _placed(code, p, array, indices, named, sizes, which)
+        for axis, of in zip(numbers.operand_batching_dims, numbers.start_indices_batching_dims, strict=True):
+            first = further(code, first, which[of], array.strides[axis])
+        source = Stored(array.region, tuple(sizes[a] for a in taken), tuple(array.strides[a] for a in taken), first)
+        start = found.first
+        for axis, k in zip(batch, which, strict=True):
+            start = further(code, start, k, found.strides[axis])
+        target = Stored(found.region, source.shape, tuple(found.strides[a] for a in offsets), start)
+        if inside.constant is not None:
+            put(code, target, source)
+            return
+        other = spread(beyond, source.shape, ())
+        nest(code, [source, other], [target], lambda values: [code.select(inside, *values)])
+
+    if array.size:
+        _windows(code, [found.shape[axis] for axis in batch], window)
+    else:
+        put(code, found, spread(beyond, found.shape, ()))
+    return [found]
+
+
+def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Put numbers at indices, or add them to what is there."""
+    array, indices, updates = given[0], stored(code, given[1]), stored(code, given[2])
+    if isinstance(array, Stored) and updates.region is array.region:
+        updates = copied(code, updates)
+    p, add = equation.params, equation.primitive.name == "scatter-add"
+    numbers = p["dimension_numbers"]
+    if is_own(code, array) and (array.region.lanes or not updates.region.lanes):
+        found = array
+    else:
+        found = new(code, array.shape, _kind(array), lanes=_lanes([array, updates]))
+        put(code, found, stored(code, array))
+    if not updates.size or not found.size:
+        return [found]
+    windows = list(numbers.update_window_dims)
+    batch = [axis for axis in range(updates.ndim) if axis not in windows]
+    kept = [
+        axis for axis in range(found.ndim) if axis not in (*numbers.inserted_window_dims, *numbers.operand_batching_dims)
+    ]
+    sizes = [1] * found.ndim
+    for axis, of in zip(kept, windows, strict=True):
+        sizes[axis] = updates.shape[of]
+    named = {axis: k for k, axis in enumerate(numbers.scatter_dims_to_operand_dims)}
+
+    def window(which: list[int | Value]) -> None:
+        first, inside = _placed(code, p, found, indices, named, sizes, which)
+        for axis, of in zip(numbers.operand_batching_dims, numbers.scatter_indices_batching_dims, strict=True):
+            first = further(code, first, which[of], found.strides[axis])
+        target = Stored(found.region, tuple(sizes[a] for a in kept), tuple(found.strides[a] for a in kept), first)
+        start = updates.first
+        for axis, k in zip(batch, which, strict=True):
+            start = further(code, start, k, updates.strides[axis])
+        source = Stored(updates.region, target.shape, tuple(updates.strides[a] for a in windows), start)
+
+        def body(values: Sequence[Value]) -> Sequence[Value]:
+            old, value = values
+            changed = code.arithmetic("add", old, value) if add else value
+            return [code.select(inside, changed, old)]
+
+        nest(code, [target, source], [target], body, adds=True)
+
+    _windows(code, [updates.shape[axis] for axis in batch], window)
+    return [found]
+
+
+STORED: Mapping[str, StoredRule] = {
+    **dict.fromkeys(ELEMENTWISE, _each),
+    **dict.fromkeys(("copy", "stop_gradient", "optimization_barrier"), _same),
+    "reduce_sum": _reduction("add"),
+    "reduce_prod": _reduction("mul"),
+    "reduce_max": _reduction("max"),
+    "reduce_min": _reduction("min"),
+    "reduce_and": _reduction("and"),
+    "reduce_or": _reduction("or"),
+    "dot_general": _dot,
+    "slice": _part,
+    "broadcast_in_dim": _broadcast,
+    "tile": _tile,
+    "reshape": _reshape,
+    "squeeze": _reshape,
+    "expand_dims": _reshape,
+    "concatenate": _concatenate,
+    "stack": _stack,
+    "unstack": _unstack,
+    "transpose": _transpose,
+    "rev": _reverse,
+    "pad": _pad,
+    "split": _split,
+    "dynamic_slice": _dynamic_slice,
+    "dynamic_update_slice": _dynamic_update_slice,
+    "gather": _gather,
+    "scatter": _scatter,
+    "scatter-add": _scatter,
+}
+"""Rules for operations of which an array is large; of others, the numbers are taken out of memory."""

@@ -1,0 +1,363 @@
+"""Arrays that stay in memory, where they are too large to be single values, and loops over them.
+
+Parts, transposes and repetitions of such an array are views, as in NumPy: where numbers begin, and how far apart they
+lie. A loop takes a number of each array, or as many as a vector has where they lie one after another.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from jounce.native.arrays import Values, filled, in_memory
+from jounce.native.code import Code, flat
+from jounce.native.values import Region, UnsupportedOperationError, Value
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """An array in memory.
+
+    Attributes
+    ----------
+    region : Region
+        Where its numbers are.
+    shape, strides : tuple of int
+        As those of an array of NumPy; strides count numbers.
+    first : int or Value
+        Place of the first number, the same for all lanes.
+    """
+
+    region: Region
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]
+    first: int | Value = 0
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes."""
+        return len(self.shape)
+
+    @property
+    def size(self) -> int:
+        """Number of numbers."""
+        return math.prod(self.shape)
+
+    @property
+    def kind(self) -> str:
+        """Kind of the numbers."""
+        return self.region.kind
+
+    def is_same(self, other: Any) -> bool:
+        """Tell whether another array is this one."""
+        return (
+            isinstance(other, Stored)
+            and (other.region is self.region and other.shape == self.shape and other.strides == self.strides)
+            and (other.first is self.first or (isinstance(self.first, int) and other.first == self.first))
+        )
+
+
+Array = Values | Stored
+
+
+def contiguous(region: Region, shape: Sequence[int], first: int | Value = 0) -> Stored:
+    """Return an array whose numbers lie one after another, the last axis fastest."""
+    ends = np.cumprod([1, *shape[:0:-1]]) if len(shape) else []
+    return Stored(region, tuple(shape), tuple(int(x) for x in ends[::-1]), first)
+
+
+def new(code: Code, shape: Sequence[int], kind: str, *, lanes: bool) -> Stored:
+    """Return an array of which nothing is known yet."""
+    return contiguous(code.taken_room(math.prod(shape), kind, lanes=lanes), shape)
+
+
+def is_own(code: Code, array: Any) -> bool:
+    """Tell whether an array may be changed in its place: it is all that is there, and nobody else reads it."""
+    return (
+        isinstance(array, Stored)
+        and array.region in code.changeable
+        and array.is_same(contiguous(array.region, array.shape))
+        and code.is_unshared(array.region)
+    )
+
+
+def is_large(code: Code, array: Any) -> bool:
+    """Tell whether an array belongs in memory."""
+    return code.large is not None and math.prod(array.shape) > code.large
+
+
+# -- views ------------------------------------------------------------------------------------------------------------
+
+
+def further(code: Code, first: int | Value, steps: int | Value, stride: int) -> int | Value:
+    """Return a place so many strides further."""
+    if not isinstance(steps, Value) and not isinstance(first, Value):
+        return first + int(steps) * stride
+    more = code.arithmetic("mul", _whole(code, steps), code.constant(stride, "l"))
+    return _plain(code.arithmetic("add", _whole(code, first), more))
+
+
+def _whole(code: Code, number: int | Value) -> Value:
+    return code.converted(number, "l") if isinstance(number, Value) else code.constant(number, "l")
+
+
+def _plain(value: Value) -> int | Value:
+    return value if value.constant is None else int(value.constant)
+
+
+def between(code: Code, array: Stored, axis: int, start: int | Value, size: int, step: int = 1) -> Stored:
+    """Return so many numbers along an axis from an index on."""
+    shape, strides = list(array.shape), list(array.strides)
+    first = further(code, array.first, start, strides[axis])
+    shape[axis], strides[axis] = size, strides[axis] * step
+    return Stored(array.region, tuple(shape), tuple(strides), first)
+
+
+def at(code: Code, array: Array, index: int | Value) -> Array:
+    """Return the part of an array at an index of its first axis: an index that is not known wants a stored one."""
+    if not isinstance(array, Stored):
+        assert isinstance(index, int)
+        return array[index, ...]
+    part = between(code, array, 0, index, 1)
+    return settled(code, replace(part, shape=part.shape[1:], strides=part.strides[1:]))
+
+
+def transposed(array: Stored, axes: Sequence[int]) -> Stored:
+    """Return an array with its axes in another order."""
+    return replace(array, shape=tuple(array.shape[k] for k in axes), strides=tuple(array.strides[k] for k in axes))
+
+
+def spread(array: Stored, shape: Sequence[int], axes: Sequence[int]) -> Stored:
+    """Return an array repeated along new axes and those of length one; `axes` are where its own belong."""
+    strides = [0] * len(shape)
+    for axis, size, stride in zip(axes, array.shape, array.strides, strict=True):
+        strides[axis] = stride if size == shape[axis] else 0
+    return replace(array, shape=tuple(shape), strides=tuple(strides))
+
+
+def reshaped(code: Code, array: Stored, shape: Sequence[int]) -> Stored:
+    """Return the same numbers in another shape, copied where no strides tell it."""
+    strides = _split(*_merged(array.shape, [array.strides]), shape)
+    if strides is None:
+        return contiguous(copied(code, array).region, shape)
+    return replace(array, shape=tuple(shape), strides=strides)
+
+
+def _split(sizes: Sequence[int], strides: Sequence[Sequence[int]], shape: Sequence[int]) -> tuple[int, ...] | None:
+    """Return the strides of axes of other lengths, None where there are none: of axes as `_merged` returns them."""
+    found, waiting, left, stride = [], list(zip(sizes, strides[0], strict=True)), 1, 0
+    for size in reversed(shape):
+        if size == 1:
+            found.append(0)
+            continue
+        if left == 1:
+            left, stride = waiting.pop()
+        if left % size:
+            return None
+        found.append(stride)
+        left, stride = left // size, stride * size
+    return tuple(reversed(found))
+
+
+# -- numbers and memory -----------------------------------------------------------------------------------------------
+
+
+def values_of(code: Code, array: Array) -> Values:
+    """Return an array as single values."""
+    if not isinstance(array, Stored):
+        return array
+    places = [
+        further(code, array.first, int(np.dot(index, array.strides)), 1) if array.ndim else array.first
+        for index in np.ndindex(*array.shape)
+    ]
+    return filled(array.shape, [replace_home(code.load(array.region, place)) for place in places])
+
+
+def replace_home(value: Value) -> Value:
+    """Return a value that is not taken to be where it came from: that may change."""
+    value.home = None
+    return value
+
+
+def stored(code: Code, array: Array) -> Stored:
+    """Return an array in memory, put there if it is not yet; what is repeated is put there once."""
+    if isinstance(array, Stored):
+        return array
+    repeated = [size > 1 and stride == 0 for size, stride in zip(array.shape, array.strides, strict=True)]
+    part = array[(*(slice(0, 1) if r else slice(None) for r in repeated), ...)]
+    values = flat(part)
+    if all(value.constant is not None for value in values):
+        region, first = code.constants_region([v.constant for v in values], values[0].kind), 0
+    else:
+        region, first = in_memory(code, values)
+    return spread(contiguous(region, part.shape, first), array.shape, range(array.ndim))
+
+
+def settled(code: Code, array: Stored) -> Array:
+    """Return an array as single values where it is small."""
+    return array if is_large(code, array) else values_of(code, array)
+
+
+def copied(code: Code, array: Array) -> Stored:
+    """Return an array with a place of its own, its numbers one after another."""
+    if isinstance(array, Stored):
+        found = new(code, array.shape, array.kind, lanes=array.region.lanes)
+    else:
+        values = flat(array)
+        found = new(code, array.shape, values[0].kind, lanes=any(value.lanes for value in values))
+    put(code, found, array)
+    return found
+
+
+def put(code: Code, target: Stored, array: Array) -> None:
+    """Write an array where another one is, which it does not overlap."""
+    if not target.size:
+        return
+    if isinstance(array, Stored):
+        nest(code, [array], [target], lambda values: values)
+        return
+    for index, value in zip(np.ndindex(*target.shape), flat(array), strict=True):
+        place = further(code, target.first, int(np.dot(index, target.strides)), 1) if target.ndim else target.first
+        code.store(target.region, place, value)
+
+
+# -- loops ------------------------------------------------------------------------------------------------------------
+
+Body = Callable[[list[Value]], Sequence[Value]]
+
+
+def counted(code: Code, count: int, body: Callable[[int | Value], None]) -> None:
+    """Write a loop that runs so many times."""
+    if count <= 1:
+        if count:
+            body(0)
+        return
+    before, head, latch, end = (code.label() for _ in range(4))
+    index, following = code.fresh("i"), code.fresh("i")
+    code.jump(before)
+    code.begin(before)
+    code.jump(head)
+    code.begin(head)
+    code.lines.append(f"{index} = phi i64 [0, %{before}], [{following}, %{latch}]")
+    with code.scope():
+        body(Value(index, "l", False))
+    code.jump(latch)
+    code.begin(latch)
+    over = code.fresh()
+    code.lines.append(f"{following} = add nuw nsw i64 {index}, 1")
+    code.lines.append(f"{over} = icmp eq i64 {following}, {count}")
+    code.branch(over, end, head)
+    code.begin(end)
+
+
+def nest(code: Code, given: Sequence[Stored], found: Sequence[Stored], body: Body, *, adds: bool = False) -> None:
+    """Write loops over arrays of one shape.
+
+    Parameters
+    ----------
+    code : Code
+    given, found : sequence of Stored
+        What is read and written.
+    body : callable
+        Maps numbers of the arrays read to those written.
+    adds : bool, default False
+        Whether what is written depends on what was there, so that no place may be visited twice.
+    """
+    arrays = [*given, *found]
+    shape, strides = _merged(arrays[0].shape, [array.strides for array in arrays])
+    if 0 in shape:
+        return
+    inner = _inner(shape, strides, len(given))
+    order = [k for k in range(len(shape)) if k != inner]
+    firsts = [array.first for array in arrays]
+
+    def run(axes: Sequence[int], places: Sequence[int | Value]) -> None:
+        if axes:
+            axis, *rest = axes
+            counted(
+                code,
+                shape[axis],
+                lambda k: run(rest, [further(code, p, k, s[axis]) for p, s in zip(places, strides, strict=True)]),
+            )
+        elif inner is None:
+            one(places, along=False)
+        else:
+            innermost(places)
+
+    def innermost(places: Sequence[int | Value]) -> None:
+        size, steps = shape[inner], [s[inner] for s in strides]
+        width = code.width
+        vectors = code.alone and size >= width and set(steps) <= {0, 1} and 0 not in steps[len(given) :]
+
+        def visit(start: int | Value, along: bool) -> None:
+            one([further(code, p, start, s) for p, s in zip(places, steps, strict=True)], along, steps)
+
+        if not vectors:
+            counted(code, size, lambda k: visit(k, False))
+            return
+        whole, left = divmod(size, width)
+        if left and not adds:  # the last vectors share numbers
+
+            def last(k: int | Value) -> None:
+                start = further(code, 0, k, width)
+                most = size - width
+                start = min(start, most) if isinstance(start, int) else code.arithmetic("min", start, code.constant(most, "l"))
+                visit(start, True)
+
+            counted(code, whole + 1, last)
+            return
+        counted(code, whole, lambda k: visit(further(code, 0, k, width), True))
+        counted(code, left, lambda k: visit(further(code, whole * width, k, 1), False))
+
+    def one(places: Sequence[int | Value], along: bool, steps: Sequence[int] = ()) -> None:
+        read = [
+            code.load_along(array.region, place) if along and steps[k] else replace_home(code.load(array.region, place))
+            for k, (array, place) in enumerate(zip(given, places, strict=False))
+        ]
+        for array, place, value in zip(found, places[len(given) :], body(read), strict=True):
+            if along:
+                code.store_along(array.region, place, value)
+            else:
+                code.store(array.region, place, value)
+
+    run(order, firsts)
+
+
+def _merged(shape: Sequence[int], strides: Sequence[Sequence[int]]) -> tuple[list[int], list[list[int]]]:
+    """Return axes without those of length one, neighbours as one where the numbers of all arrays go on."""
+    sizes: list[int] = []
+    steps: list[list[int]] = [[] for _ in strides]
+    for k, size in enumerate(shape):
+        if size == 1:
+            continue
+        own = [s[k] for s in strides]
+        if sizes and all(step[-1] == size * stride for step, stride in zip(steps, own, strict=True)):
+            sizes[-1] *= size
+            for step, stride in zip(steps, own, strict=True):
+                step[-1] = stride
+            continue
+        sizes.append(size)
+        for step, stride in zip(steps, own, strict=True):
+            step.append(stride)
+    return sizes, steps
+
+
+def _inner(shape: Sequence[int], strides: Sequence[Sequence[int]], given: int) -> int | None:
+    """Return the axis of the innermost loop: where numbers lie one after another, and what is written as well."""
+    if not shape:
+        return None
+
+    def rank(axis: int) -> tuple[bool, bool, int]:
+        steps = [s[axis] for s in strides]
+        return set(steps) <= {0, 1} and 0 not in steps[given:], 0 not in steps[given:], axis
+
+    return max(range(len(shape)), key=rank)
+
+
+def check_uniform(value: Value) -> Value:
+    """Return an index, which must be one for all lanes."""
+    if value.lanes:
+        raise UnsupportedOperationError("an index into memory that differs from lane to lane")
+    return value
