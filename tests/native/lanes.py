@@ -12,6 +12,8 @@ from jounce.native.code import MOST_LINES
 
 llvm = pytest.importorskip("llvmlite.binding", reason="the compiler is an extra")
 
+import os
+LARGE = int(os.environ["LARGE"]) if "LARGE" in os.environ else None
 COUNT = 17  # two whole vectors and a rest
 SPECIAL = np.array(
     [np.nan, np.inf, -np.inf, 0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 2.5, -2.5, 1e300, -1e300, 3.0, 1e-300, 1.5, -3.7]
@@ -45,7 +47,7 @@ def compiled(function, lanes, shared=(), known=(), width=8, most_lines=MOST_LINE
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(programs, "vector_width", lambda: width)
         patch.setattr(programs, "compiled", verified)
-        binary = programs.object_file(whole_function, kinds, one, {k: shared[k] for k in known}, most_lines=most_lines)
+        binary = programs.object_file(whole_function, kinds, one, {k: shared[k] for k in known}, most_lines=most_lines, large=LARGE)
         return programs.Program(binary, (kinds, one), jax.eval_shape(whole_function, kinds, one))
 
 

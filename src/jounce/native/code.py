@@ -378,6 +378,8 @@ class Code:
 
     def load(self, region: Region, index: int | Value) -> Value:
         """Return the number at a place of memory, which must be one of its own."""
+        if isinstance(index, Value) and index.lanes:
+            return self._gathered(region, index)
         place = self._place(region, index)
         hint = ", !invariant.load !0" if region.given else ""
         name, home = self.fresh(), (region, index) if isinstance(index, int) else None
@@ -393,6 +395,9 @@ class Code:
 
     def store(self, region: Region, index: int | Value, value: Value) -> None:
         """Put a number at a place of memory, which must be one of its own."""
+        if isinstance(index, Value) and index.lanes:
+            self._scatter(region, index, value)
+            return
         operand = self.operand(value, lanes=region.lanes)
         if region.kind == "b":
             of = f"<{self.width} x i8>" if region.lanes else "i8"
@@ -401,6 +406,48 @@ class Code:
             ).name
         of, rest = self._place(region, index).split(", ", 1)
         self.lines.append(f"store {of} {operand}, {rest}")
+
+    def _gathered(self, region: Region, index: Value) -> Value:
+        """Return numbers at a place of memory that differs from lane to lane."""
+        places, of, kinds = self._places(region, index)
+        name, every = self.fresh(), self.operand(self.constant(True), lanes=True)
+        function = f"@llvm.masked.gather.{kinds}.v{self.width}p0"
+        self.intrinsics.add(f"declare {of} {function}(<{self.width} x ptr>, i32, <{self.width} x i1>, {of})")
+        align = DTYPES[region.kind].itemsize
+        given = f"<{self.width} x ptr> {places}, i32 {align}, <{self.width} x i1> {every}, {of} poison"
+        self.lines.append(f"{name} = call {of} {function}({given})")
+        if region.kind == "b":
+            byte, name = name, self.fresh()
+            self.lines.append(f"{name} = trunc {of} {byte} to {self.type_of('b', lanes=True)}")
+        return Value(name, region.kind, True)
+
+    def _scatter(self, region: Region, index: Value, value: Value) -> None:
+        """Put numbers at a place of memory that differs from lane to lane: each lane has places of its own."""
+        places, of, kinds = self._places(region, index)
+        operand, every = self.operand(value, lanes=True), self.operand(self.constant(True), lanes=True)
+        if region.kind == "b":
+            truth = self.type_of("b", lanes=True)
+            operand = self._found(f"zext {truth} {operand} to {of}", "b", lanes=True).name
+        function = f"@llvm.masked.scatter.{kinds}.v{self.width}p0"
+        self.intrinsics.add(f"declare void {function}({of}, <{self.width} x ptr>, i32, <{self.width} x i1>)")
+        align = DTYPES[region.kind].itemsize
+        given = f"{of} {operand}, <{self.width} x ptr> {places}, i32 {align}, <{self.width} x i1> {every}"
+        self.lines.append(f"call void {function}({given})")
+
+    def _places(self, region: Region, index: Value) -> tuple[str, str, str]:
+        """Return the addresses of numbers at places that differ from lane to lane, their type, and its short name."""
+        one = IN_MEMORY[region.kind]
+        if region.lanes:
+            apart = Value("%total", "l", False) if region.given else self.constant(self.width, "l")
+            counts = ", ".join(f"i64 {k}" for k in range(self.width))
+            lane = Value(f"<{counts}>", "l", True)
+            index = self.arithmetic("add", self.arithmetic("mul", index, apart), lane)
+            if region.given:
+                index = self.arithmetic("add", index, Value("%lane", "l", False))
+        vector = self.operand(index, lanes=True)
+        address = f"getelementptr {one}, ptr {region.pointer}, <{self.width} x i64> {vector}"
+        short = f"v{self.width}{'f64' if region.kind == 'f' else one}"
+        return self._found(address, "l", lanes=True).name, f"<{self.width} x {one}>", short
 
     def _place(self, region: Region, index: int | Value) -> str:
         """Return the type of a number in memory, its address, and of what this is a multiple."""

@@ -19,7 +19,6 @@ from jounce.native.stored import (
     Stored,
     at,
     between,
-    check_uniform,
     contiguous,
     copied,
     counted,
@@ -47,7 +46,7 @@ def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     rule, aval = RULES[equation.primitive.name], equation.outvars[0].aval
     arrays = [stored(code, array) for array in given]
     arrays = [spread(x, aval.shape, range(x.ndim)) if x.ndim else spread(x, aval.shape, ()) for x in arrays]
-    found = new(code, aval.shape, kind_of(aval.dtype), lanes=any(x.region.lanes for x in arrays))
+    found = new(code, aval.shape, kind_of(aval.dtype), lanes=any(x.lanes for x in arrays))
 
     def body(values: Sequence[Value]) -> Sequence[Value]:
         return [result.item() for result in rule(code, equation, [filled((), [value]) for value in values])]
@@ -86,19 +85,19 @@ def _transpose(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Ar
 
 def _reverse(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     array = stored(code, given[0])
-    for axis in equation.params["dimensions"]:
+    for axis in map(int, equation.params["dimensions"]):
         array = between(code, array, axis, array.shape[axis] - 1, array.shape[axis], -1)
     return [array]
 
 
 def _unstack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    array, axis = stored(code, given[0]), equation.params["axis"]
+    array, axis = stored(code, given[0]), int(equation.params["axis"])
     rows = transposed(array, [axis, *(k for k in range(array.ndim) if k != axis)])
     return [at(code, rows, k) for k in range(rows.shape[0])]
 
 
 def _split(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    array, axis, sizes = stored(code, given[0]), equation.params["axis"], equation.params["sizes"]
+    array, axis, sizes = stored(code, given[0]), int(equation.params["axis"]), equation.params["sizes"]
     starts = [0, *itertools.accumulate(map(int, sizes))]
     return [between(code, array, axis, start, int(size)) for start, size in zip(starts, sizes, strict=False)]
 
@@ -118,7 +117,7 @@ def _starts(code: Code, array: Array, sizes: Sequence[int], starts: Sequence[Val
     """Return where a part begins, moved so that all of it is in bounds."""
     found = []
     for whole, size, start in zip(array.shape, sizes, starts, strict=True):
-        index = check_uniform(within(code, start.item(), 0, whole - size))
+        index = within(code, start.item(), 0, whole - size)
         found.append(index if index.constant is None else int(index.constant))
     return found
 
@@ -127,7 +126,7 @@ def _starts(code: Code, array: Array, sizes: Sequence[int], starts: Sequence[Val
 
 
 def _lanes(arrays: Sequence[Array]) -> bool:
-    return any(x.region.lanes if isinstance(x, Stored) else any(v.lanes for v in flat(x)) for x in arrays)
+    return any(x.lanes if isinstance(x, Stored) else any(v.lanes for v in flat(x)) for x in arrays)
 
 
 def _made(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
@@ -137,7 +136,7 @@ def _made(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
 
 
 def _concatenate(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    found, axis, start = _made(code, equation, given), equation.params["dimension"], 0
+    found, axis, start = _made(code, equation, given), int(equation.params["dimension"]), 0
     for array in given:
         put(code, between(code, found, axis, start, array.shape[axis]), array)
         start += array.shape[axis]
@@ -145,7 +144,7 @@ def _concatenate(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[
 
 
 def _stack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    found, axis = _made(code, equation, given), equation.params["axis"]
+    found, axis = _made(code, equation, given), int(equation.params["axis"])
     rows = transposed(found, [axis, *(k for k in range(found.ndim) if k != axis)])
     for k, array in enumerate(given):
         row = between(code, rows, 0, k, 1)
@@ -180,8 +179,8 @@ def _dynamic_update_slice(code: Code, _: Any, given: Sequence[Array]) -> Sequenc
     """Change a part of an array: in its place where nobody else sees it."""
     array, part, *starts = given
     places = _starts(code, array, part.shape, starts)
-    lanes = _lanes([part])
-    if is_own(code, array) and (array.region.lanes or not lanes):
+    lanes = _lanes([part, *starts])
+    if is_own(code, array) and (array.lanes or not lanes):
         found = array
     elif lanes and not _lanes([array]):
         found = new(code, array.shape, _kind(array), lanes=True)
@@ -272,7 +271,7 @@ def _placed(
         where = rows.first
         for k, stride in zip((*batch, numbers[axis]), rows.strides, strict=True):
             where = further(code, where, k, stride)
-        index = code.converted(check_uniform(replace_home(code.load(rows.region, where))), "l")
+        index = code.converted(replace_home(code.load(rows.region, where)), "l")
         kept = within(code, index, 0, size - sizes[axis])
         inside = code.logic("and", inside, code.compare("eq", kept, index))
         place = further(code, place, kept, array.strides[axis])
@@ -293,7 +292,7 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
     """Return parts of an array at indices."""
     p, array, indices = equation.params, stored(code, given[0]), stored(code, given[1])
     numbers, aval = p["dimension_numbers"], equation.outvars[0].aval
-    found = new(code, aval.shape, kind_of(aval.dtype), lanes=array.region.lanes)
+    found = new(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
     offsets = list(numbers.offset_dims)
     batch = [axis for axis in range(found.ndim) if axis not in offsets]
     taken = [axis for axis in range(array.ndim) if axis not in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims)]
@@ -329,10 +328,10 @@ def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
         updates = copied(code, updates)
     p, add = equation.params, equation.primitive.name == "scatter-add"
     numbers = p["dimension_numbers"]
-    if is_own(code, array) and (array.region.lanes or not updates.region.lanes):
+    if is_own(code, array) and (array.lanes or not (updates.lanes or indices.lanes)):
         found = array
     else:
-        found = new(code, array.shape, _kind(array), lanes=_lanes([array, updates]))
+        found = new(code, array.shape, _kind(array), lanes=_lanes([array, updates, indices]))
         put(code, found, stored(code, array))
     if not updates.size or not found.size:
         return [found]

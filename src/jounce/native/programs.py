@@ -32,6 +32,8 @@ def object_file(
     *,
     rows: bool = False,
     most_lines: int = MOST_LINES,
+    large: int | None = None,
+    alone: bool = False,
 ) -> bytes:
     """Return the machine code of a function of one instant, as an object file.
 
@@ -48,6 +50,11 @@ def object_file(
         Whether arrays of many instants, those given and the results, have the instants along their first axis.
     most_lines : int, optional
         Of LLVM's text.
+    large : int, optional
+        Arrays of more numbers stay in memory, and operations on them are loops: shorter code that takes longer. None
+        unless given.
+    alone : bool, default False
+        Whether there is one instant only, all of whose arrays are in `shared`.
 
     Raises
     ------
@@ -55,7 +62,7 @@ def object_file(
         Where there is no code for it, or too much.
     """
     closed, count = jax.make_jaxpr(function)(shared, lanes), len(jax.tree.leaves(shared))
-    return compiled(_text(closed, count, known, vector_width(), rows=rows, most_lines=most_lines))
+    return compiled(_text(closed, count, known, vector_width(), rows=rows, most_lines=most_lines, large=large, alone=alone))
 
 
 class Program:

@@ -13,7 +13,7 @@ import numpy as np
 
 from jounce.native.arrays import Values, filled, in_memory
 from jounce.native.code import Code, flat
-from jounce.native.values import Region, UnsupportedOperationError, Value
+from jounce.native.values import Region, Value
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Stored:
     shape, strides : tuple of int
         As those of an array of NumPy; strides count numbers.
     first : int or Value
-        Place of the first number, the same for all lanes.
+        Place of the first number, which may differ from lane to lane.
     """
 
     region: Region
@@ -49,6 +49,11 @@ class Stored:
     def kind(self) -> str:
         """Kind of the numbers."""
         return self.region.kind
+
+    @property
+    def lanes(self) -> bool:
+        """Whether numbers differ from lane to lane."""
+        return self.region.lanes or (isinstance(self.first, Value) and self.first.lanes)
 
     def is_same(self, other: Any) -> bool:
         """Tell whether another array is this one."""
@@ -185,6 +190,8 @@ def stored(code: Code, array: Array) -> Stored:
     """Return an array in memory, put there if it is not yet; what is repeated is put there once."""
     if isinstance(array, Stored):
         return array
+    if not array.size:
+        return contiguous(Region("null", "f", False), array.shape)
     repeated = [size > 1 and stride == 0 for size, stride in zip(array.shape, array.strides, strict=True)]
     part = array[(*(slice(0, 1) if r else slice(None) for r in repeated), ...)]
     values = flat(part)
@@ -203,7 +210,7 @@ def settled(code: Code, array: Stored) -> Array:
 def copied(code: Code, array: Array) -> Stored:
     """Return an array with a place of its own, its numbers one after another."""
     if isinstance(array, Stored):
-        found = new(code, array.shape, array.kind, lanes=array.region.lanes)
+        found = new(code, array.shape, array.kind, lanes=array.lanes)
     else:
         values = flat(array)
         found = new(code, array.shape, values[0].kind, lanes=any(value.lanes for value in values))
@@ -354,10 +361,3 @@ def _inner(shape: Sequence[int], strides: Sequence[Sequence[int]], given: int) -
         return set(steps) <= {0, 1} and 0 not in steps[given:], 0 not in steps[given:], axis
 
     return max(range(len(shape)), key=rank)
-
-
-def check_uniform(value: Value) -> Value:
-    """Return an index, which must be one for all lanes."""
-    if value.lanes:
-        raise UnsupportedOperationError("an index into memory that differs from lane to lane")
-    return value

@@ -36,7 +36,7 @@ MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn af
 HOPE = 8  # times as many lines as in a later turn may be in one of the first, which later ones have in common with it
 
 
-def translate(code: Code, program: Any, constants_: Sequence[Values], given: Sequence[Values]) -> list[Values]:
+def translate(code: Code, program: Any, constants_: Sequence[Array], given: Sequence[Array]) -> list[Array]:
     """Write the operations of a program, and return its results.
 
     Parameters
@@ -127,14 +127,14 @@ def _checked(values: Any, aval: Any) -> Array:
     return array
 
 
-def _called(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
+def _called(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     """Write a program within the program."""
     p = equation.params
     closed = next(p[name] for name in ("jaxpr", "call_jaxpr", "fun_jaxpr") if name in p)
     return _closed(code, closed, given) if hasattr(closed, "jaxpr") else translate(code, closed, (), given)
 
 
-def _closed(code: Code, closed: Any, *given: Sequence[Values]) -> list[Values]:
+def _closed(code: Code, closed: Any, *given: Sequence[Array]) -> list[Array]:
     numbers = [constants(code, number) for number in closed.consts]
     return translate(code, closed.jaxpr, numbers, [array for some in given for array in some])
 
@@ -201,11 +201,11 @@ def _until_settled(code: Code, lanes: list[bool], attempt: Callable[[list[bool]]
         lanes = found
 
 
-def _in_lanes(arrays: Sequence[Values], already: Sequence[bool] | None = None) -> list[bool]:
+def _in_lanes(arrays: Sequence[Array], already: Sequence[bool] | None = None) -> list[bool]:
     """Tell which arrays have numbers that differ from lane to lane, or did already."""
     already = [False] * len(arrays) if already is None else already
     return [
-        before or (array.region.lanes if isinstance(array, Stored) else any(v.lanes for v in flat(array)))
+        before or (array.lanes if isinstance(array, Stored) else any(v.lanes for v in flat(array)))
         for before, array in zip(already, arrays, strict=True)
     ]
 
@@ -227,20 +227,20 @@ def _chosen(code: Code, choice: Value, new: Sequence[Array], old: Sequence[Array
         a, b = stored(code, x), stored(code, y)
         if a.is_same(b):
             return a
-        found = new_array(code, a.shape, a.kind, lanes=choice.lanes or a.region.lanes or b.region.lanes)
+        found = new_array(code, a.shape, a.kind, lanes=choice.lanes or a.lanes or b.lanes)
         nest(code, [a, b], [found], lambda values: [code.select(choice, *values)])
         return found
 
     return [chosen(x, y) for x, y in zip(new, old, strict=True)]
 
 
-def _while(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
+def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     """Write a loop that each lane leaves when its condition no longer holds."""
     p = equation.params
     split = p["cond_nconsts"], p["cond_nconsts"] + p["body_nconsts"]
     asked, needed, start = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
 
-    def attempt(lanes: list[bool]) -> tuple[list[bool], list[Values]]:
+    def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
         carried = _Carried(code, [variable.aval for variable in equation.outvars], lanes)
         carried.store(start)
         head, body, end = code.label(), code.label(), code.label()
@@ -273,7 +273,7 @@ def _among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
     return regions.__contains__
 
 
-def _scan(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Write a loop of known length over the first axis of arrays."""
     p = equation.params
     split = p["num_consts"], p["num_consts"] + p["num_carry"]
@@ -304,14 +304,14 @@ def _needs_known_places(program: Any) -> bool:
 
 
 def _rolled(
-    code: Code, equation: Any, needed: Sequence[Values], start: Sequence[Values], rows: Sequence[Values]
-) -> list[Values]:
+    code: Code, equation: Any, needed: Sequence[Array], start: Sequence[Array], rows: Sequence[Array]
+) -> list[Array]:
     """Write a loop of known length as one."""
     p, size = equation.params, len(start)
     made = [variable.aval for variable in equation.outvars[size:]]
     last = code.constant(p["length"] - 1, "l")
 
-    def attempt(lanes: list[bool]) -> tuple[list[bool], list[Values]]:
+    def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
         carried = _Carried(code, [variable.aval for variable in equation.outvars[:size]], lanes[:size])
         written, counter = _Carried(code, made, lanes[size:]), code.room(1, "l", lanes=False)
         carried.store(start)
@@ -339,8 +339,8 @@ def _rolled(
 
 
 def _unrolled(
-    code: Code, equation: Any, needed: Sequence[Values], start: Sequence[Values], rows: Sequence[Values], most: int
-) -> list[Values] | None:
+    code: Code, equation: Any, needed: Sequence[Array], start: Sequence[Array], rows: Sequence[Array], most: int
+) -> list[Array] | None:
     """Return the results of a loop turn after turn; None where that takes more lines than `most`.
 
     It is given up early where the turns so far, of which the first are longer than the others, leave no hope.
@@ -369,14 +369,14 @@ def _stacked(code: Code, parts: Sequence[Array]) -> Array:
     return found
 
 
-def _cond(code: Code, equation: Any, given: Sequence[Values]) -> list[Values]:
+def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     """Write ways of which each lane takes one: all that some lane takes are run."""
     ways, which, inputs = equation.params["branches"], given[0].item(), given[1:]
     which = code.converted(which, "i") if which.kind == "b" else which
     if len(ways) == 1 or which.constant is not None:
         return _closed(code, ways[min(max(int(which.constant or 0), 0), len(ways) - 1)], inputs)
 
-    def attempt(lanes: list[bool]) -> tuple[list[bool], list[Values]]:
+    def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
         results, found = _Carried(code, [variable.aval for variable in equation.outvars], lanes), lanes
         for k, way in enumerate(ways):
             word = "le" if k == 0 else "ge" if k == len(ways) - 1 else "eq"
