@@ -74,9 +74,29 @@ def assert_same(actual, expected, rtol=1e-13, names="", signs=True):
 
 def assert_agree(function, *lanes, shared=(), known=(), width=8, counts=(COUNT,), rtol=1e-13, signs=True):
     """Compare machine code with JAX for the first lanes of some numbers of them."""
+    if "ALONE" in os.environ:
+        alone_agrees(function, lanes, shared, known, width, rtol, signs)
+        return
     program = compiled(function, lanes, shared, known, width)
     expected = one_by_one(function, lanes, shared)
     for count in counts:
         first = (..., slice(count))
         actual = program(shared, [x[first] for x in lanes])
         assert_same(actual, jax.tree.map(operator.itemgetter(first), expected), rtol, f"{count} lanes: ", signs)
+
+
+def alone_agrees(function, lanes, shared, known, width, rtol, signs):
+    one = [np.ascontiguousarray(x[..., :1]) for x in lanes]
+    given = ([*shared], one)
+    whole_function = lambda given, _: function(*given[0], *given[1])  # noqa: E731
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(programs, "vector_width", lambda: width)
+        patch.setattr(programs, "compiled", verified)
+        binary = programs.object_file(
+            whole_function, given, (), {k: shared[k] for k in known}, large=LARGE, alone=True
+        )
+    program = programs.Single(binary, given, jax.eval_shape(whole_function, given, ()))
+    expected = one_by_one(function, lanes, shared)
+    for k in range(0, COUNT, 4):
+        leaves = [np.asarray(x) for x in [*shared, *(x[..., k : k + 1] for x in lanes)]]
+        assert_same(program(leaves), jax.tree.map(lambda x, k=k: x[..., k : k + 1], expected), rtol, f"{k}: ", signs)

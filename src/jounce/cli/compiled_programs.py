@@ -11,7 +11,7 @@ from typing import Any
 
 from jounce.errors import OutputError
 from jounce.io.files.writing import replacing
-from jounce.kinematics import compilation
+from jounce.kinematics import store
 from jounce.kinematics.compilation import compiles_anew
 
 LARGEST = 2**29  # bytes of programs in a folder, looked at when the first one of a process is added
@@ -95,7 +95,7 @@ class CheckedEntries:
 
 
 class JaxEntries(CheckedEntries):
-    """The programs that JAX keeps by itself: those that `jounce.kinematics.compilation` does not."""
+    """The programs that JAX keeps by itself: those that `jounce.kinematics.store` does not."""
 
     def get(self, key: str) -> bytes | None:
         """Return the program of this key, or None, as it is where programs are to be compiled anew."""
@@ -145,5 +145,5 @@ def use_compilation_cache() -> None:
     if not os.access(directory, os.W_OK | os.X_OK):
         return
     if keep_programs(directory):
-        compilation.keep_programs(CheckedEntries(directory))
+        store.keep_programs(CheckedEntries(directory))
     warnings.filterwarnings("ignore", message="Error (reading|writing) persistent compilation cache")

@@ -108,7 +108,12 @@ def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) 
     return IntegratorState(time, expansion, jnp.zeros(time.shape, int), outcome, nothing, time, *known, none, angles)
 
 
-@compiled("count", "keep", without=LIBRARIES)
+def _is_one(_: Equations, current: IntegratorState, *__: Any, **___: Any) -> bool:
+    """Tell whether there is one run."""
+    return len(current.time) == 1
+
+
+@compiled("count", "keep", without=LIBRARIES, alone=_is_one)
 def march(
     equations: Equations,
     current: IntegratorState,

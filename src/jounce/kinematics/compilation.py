@@ -13,36 +13,20 @@ import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property, lru_cache, partial, update_wrapper
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import jax
 import numpy as np
 from jax.core import Tracer
 from jax.experimental import serialize_executable
 
+from jounce.kinematics.alone import Alone
 from jounce.kinematics.device import on_processor
+from jounce.kinematics.store import Store, current_store
 from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
 from jounce.mechanism.preconditions import check_process
 
 
-@runtime_checkable
-class Store(Protocol):
-    """Where programs are kept, by their names: what it gives back was put there, whole and unchanged."""
-
-    def get(self, key: str) -> bytes | None:
-        """Return the program of this name, or None."""
-        ...
-
-    def put(self, key: str, value: bytes) -> None:
-        """Keep a program."""
-        ...
-
-    def drop(self, key: str) -> None:
-        """Forget a program that is of no use."""
-        ...
-
-
-_store: Store | None = None
 _thread = threading.local()
 
 
@@ -76,17 +60,6 @@ def stopped_by(event: threading.Event) -> Iterator[None]:
         yield
     finally:
         del _thread.enough
-
-
-def keep_programs(store: Store | None) -> None:
-    """Keep what is compiled from here on in a store, and take it from there; None for not."""
-    global _store
-    _store = store
-
-
-def current_store() -> Store | None:
-    """Return the store that programs go to."""
-    return _store
 
 
 UNENDING = ("simplify-while-loops", "while-loop-invariant-code-motion", "while-loop-constant-sinking", "reshape-mover")
@@ -143,6 +116,8 @@ class Compiled:
         Passes of XLA to leave out.
     narrow : bool, optional
         Whether its arrays are short, as `compiler_options` has it.
+    alone : callable, optional
+        Tells from the arguments whether machine code is better where there is a compiler for it, as `Alone` has it.
     """
 
     def __init__(
@@ -153,10 +128,12 @@ class Compiled:
         without: tuple[str, ...] = (),
         *,
         narrow: bool = False,
+        alone: Callable[..., bool] | None = None,
     ):
         self.function, self.static, self.made_of = function, static, made_of or (function,)
         self.without, self.narrow = without, narrow
         self._programs: dict[Any, Callable[..., Any]] = {}
+        self._suits_alone, self._alone = alone, Alone(function, self.made_of)
         self._names = tuple(inspect.signature(function).parameters)
         self._traced = min([self._names.index(name) for name in static], default=len(self._names))
         update_wrapper(self, function)
@@ -180,11 +157,17 @@ class Compiled:
         if traced := [leaf for leaf in jax.tree.leaves((arguments, keywords)) if isinstance(leaf, Tracer)]:
             whole = self.jitted if all(map(_runs_at_once, traced)) else self._within
             return whole(*arguments, **keywords)
-        if _store is None:
+        store = current_store()
+        if store is None and self._suits_alone is None:
             return self.jitted(*arguments, **keywords)
         keywords |= zip(self._names[self._traced :], arguments[self._traced :], strict=False)
         arguments = arguments[: self._traced]
         static = {name: keywords.pop(name) for name in self.static if name in keywords}
+        if self._suits_alone is not None and self._suits_alone(*arguments, **keywords):
+            if (code := self._alone.program(arguments, keywords, static)) is not None:
+                return code()
+        if store is None:
+            return self.jitted(*arguments, **keywords, **static)
         leaves, tree = jax.tree.flatten((arguments, keywords))
         kinds = tuple(map(_kind, leaves))
         if None in kinds or being_debugged():
@@ -192,7 +175,7 @@ class Compiled:
         key = (tree, kinds, tuple((name, type(value), value) for name, value in static.items()), settings())
         if (program := self._programs.get(key)) is not None:
             return program(*arguments, **keywords)
-        self._programs[key], results = self._begun(_store, tree, kinds, arguments, keywords, static)
+        self._programs[key], results = self._begun(store, tree, kinds, arguments, keywords, static)
         return results
 
     def _begun(
@@ -288,7 +271,10 @@ def _home() -> jax.sharding.Sharding:
 
 
 def compiled(
-    *static: str, without: tuple[str, ...] = (), narrow: bool = False
+    *static: str,
+    without: tuple[str, ...] = (),
+    narrow: bool = False,
+    alone: Callable[..., bool] | None = None,
 ) -> Callable[[Callable[..., Any]], Compiled]:
-    """Compile the decorated function at its first call, with these static arguments, as `compiler_options` has it."""
-    return lambda function: Compiled(function, static, without=without, narrow=narrow)
+    """Compile the decorated function at its first call, with these static arguments, as `Compiled` has it."""
+    return lambda function: Compiled(function, static, without=without, narrow=narrow, alone=alone)

@@ -10,6 +10,7 @@ import jaxlib.version
 from jax.experimental.xla_metadata import set_xla_metadata
 from jax.extend.core import ClosedJaxpr, Jaxpr, jaxpr_as_fun, jaxprs_in_params
 
+from jounce.kinematics.alone import is_traced_alone
 from jounce.kinematics.compilation import compiler_options
 
 LIBRARIES = ("dot-library-rewriter",)
@@ -47,7 +48,7 @@ def in_one_piece(function: Callable[[Any], Any], argument: Any, largest: int = L
     largest : int, optional
         Most operations of such a piece; of more, XLA makes what it makes by itself.
     """
-    if not largest:
+    if not largest or is_traced_alone():
         return function(argument)
     program, shape = jax.make_jaxpr(function, return_shape=True)(argument)
     leaves = jax.tree.leaves(argument)

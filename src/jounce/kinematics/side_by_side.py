@@ -5,10 +5,7 @@ one another in the registers of the processor, several instants at a time (see `
 """
 
 import dataclasses
-import os
-import pickle
 import threading
-import zlib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cached_property, partial
@@ -17,17 +14,15 @@ from typing import Any
 import jax
 import numpy as np
 
-from jounce.kinematics.compilation import current_store
-from jounce.kinematics.device import on_processor
-from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
+from jounce.kinematics.alone import is_wanted
+from jounce.kinematics.store import current_store, made_or_kept
+from jounce.kinematics.structure import UndescribedError, program_key, settings
 from jounce.kinematics.threads import Threads
 from jounce.native import machine
 from jounce.native.code import MOST_LINES
 from jounce.native.programs import Program, object_file
 from jounce.native.values import UnsupportedOperationError
 from jounce.shapes import is_traced
-
-VARIABLE = "JOUNCE_NATIVE"  # 0 leaves everything to XLA
 
 _registered: dict[str, Program] = {}  # by the names under which XLA calls them
 
@@ -102,7 +97,7 @@ class SideBySide:
 
         Whole numbers among what is shared, which say what is joined to what, are part of the program.
         """
-        if not _wanted() or is_traced((shared, lanes)):
+        if not is_wanted() or is_traced((shared, lanes)):
             return None
         leaves, structure = jax.tree.flatten(shared)
         arrays = [np.asarray(leaf) for leaf in leaves]
@@ -125,24 +120,18 @@ class SideBySide:
     def _made(
         self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: Mapping[str, Any]
     ) -> Program | None:
-        """Return a program from the store of programs, or one that is made, and kept there if it has a name."""
-        store, function = current_store(), partial(self.function, **static)
-        key = self._key(given, places, static) if store is not None else None
-        if store is not None and key is not None and (kept := store.get(key)) is not None:
+        """Return a program from the store of programs, or one that is made."""
+        function = partial(self.function, **static)
+
+        def make() -> tuple[Any, ...]:
             try:
-                return self._loaded(*pickle.loads(zlib.decompress(kept)))
-            except Exception:  # noqa: BLE001 - whatever is wrong with it, it is made again
-                store.drop(key)
-        made: tuple[Any, ...]
-        try:
-            binary = object_file(function, *given, places, rows=self.rows, most_lines=self.most_lines)
-            made = binary, tuple(map(jax.tree.leaves, given)), jax.eval_shape(function, *given)
-        except UnsupportedOperationError:  # which is kept, too: to find it out takes long
-            made = b"", None, None
-        if store is not None and key is not None:
-            with suppress(pickle.PicklingError, TypeError, AttributeError):
-                store.put(key, zlib.compress(pickle.dumps(made), level=1))
-        return self._loaded(*made)
+                binary = object_file(function, *given, places, rows=self.rows, most_lines=self.most_lines)
+            except UnsupportedOperationError:  # which is kept, too: to find it out takes long
+                return b"", None, None
+            return binary, tuple(map(jax.tree.leaves, given)), jax.eval_shape(function, *given)
+
+        key = self._key(given, places, static) if current_store() is not None else None
+        return made_or_kept(key, make, self._loaded)
 
     def _loaded(self, binary: bytes, given: Any, results: Any) -> Program | None:
         return Program(binary, given, results, rows=self.rows) if binary else None
@@ -154,7 +143,3 @@ class SideBySide:
         with suppress(UndescribedError):
             return program_key(self.made_of, tree, kinds, static)
         return None
-
-
-def _wanted() -> bool:
-    return os.environ.get(VARIABLE, "") != "0" and machine.is_usable() and on_processor() and not being_debugged()

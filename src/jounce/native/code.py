@@ -12,6 +12,7 @@ import numpy as np
 from jounce.native import values
 from jounce.native.values import DTYPES, IN_MEMORY, SCALARS, Region, UnsupportedOperationError, Value, kind_of, literal
 
+MOST_ON_STACK = 4096  # bytes of an array
 MOST_LINES = 120_000  # of text: LLVM makes some 20,000 of them into machine code in a second
 DOUBLES: dict[str, tuple[str, Any]] = {  # in LLVM, in Python
     "add": ("fadd contract", operator.add),
@@ -58,8 +59,8 @@ class Code:
         Lines that there may be.
     lines, entry : list of str
         Text of what is run for each vector of lanes, and before the first.
-    memory : int
-        Bytes that are taken before the first.
+    memory, heap : int
+        Bytes that are taken before the first, of the stack and elsewhere.
     functions : set
         Names and numbers of arguments of the functions of C's library that are called.
     intrinsics : set of str
@@ -81,6 +82,7 @@ class Code:
     lines: list[str] = field(default_factory=list)
     entry: list[str] = field(default_factory=list)
     memory: int = 0
+    heap: int = 0
     functions: set[tuple[str, int]] = field(default_factory=set)
     intrinsics: set[str] = field(default_factory=set)
     here: Value | None = None
@@ -306,10 +308,15 @@ class Code:
 
     def room(self, size: int, kind: str, *, lanes: bool) -> Region:
         """Return memory for numbers of one kind."""
-        name = self.fresh("m")
-        self.memory += max(1, size) * (self.width if lanes else 1) * DTYPES[kind].itemsize
-        of = f"<{self.width} x {IN_MEMORY[kind]}>" if lanes else IN_MEMORY[kind]
-        self.entry.append(f"{name} = alloca {of}, i64 {max(1, size)}, align 64")
+        name, count = self.fresh("m"), max(1, size)
+        taken = count * (self.width if lanes else 1) * DTYPES[kind].itemsize
+        if taken > MOST_ON_STACK:
+            self.entry.append(f"{name} = getelementptr i8, ptr %heap, i64 {self.heap}")
+            self.heap += -(-taken // 64) * 64
+        else:
+            of = f"<{self.width} x {IN_MEMORY[kind]}>" if lanes else IN_MEMORY[kind]
+            self.entry.append(f"{name} = alloca {of}, i64 {count}, align 64")
+            self.memory += taken
         return Region(name, kind, lanes)
 
     def taken_room(self, size: int, kind: str, *, lanes: bool) -> Region:
@@ -482,11 +489,11 @@ class Code:
     def mark(self) -> tuple[Any, ...]:
         """Return how far the text has come, for `back_to`."""
         rooms = {key: list(regions) for key, regions in self._rooms.items()}
-        return len(self.lines), len(self.entry), len(self._known[-1]), self.memory, rooms, dict(self._taken)
+        return len(self.lines), len(self.entry), len(self._known[-1]), self.memory, self.heap, rooms, dict(self._taken)
 
     def back_to(self, mark: tuple[Any, ...]) -> None:
         """Take back what was written since a mark in the same scope."""
-        lines, entry, known, self.memory, rooms, taken = mark
+        lines, entry, known, self.memory, self.heap, rooms, taken = mark
         self._rooms, self._taken = {key: list(regions) for key, regions in rooms.items()}, dict(taken)
         del self.lines[lines:], self.entry[entry:]
         while len(self._known[-1]) > known:

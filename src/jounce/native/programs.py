@@ -18,6 +18,7 @@ from jounce.native.translation import translate
 from jounce.native.values import Region, UnsupportedOperationError, kind_of
 
 MOST_MEMORY = 2**20  # bytes of the stack: threads have little
+MOST_HEAP = 2**28  # bytes elsewhere
 ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
 attributes #2 = { nounwind willreturn memory(none) "min-legal-vector-width"="512" "prefer-vector-width"="512" }
 attributes #1 = { nounwind "min-legal-vector-width"="512" "prefer-vector-width"="512" }
@@ -63,6 +64,34 @@ def object_file(
     """
     closed, count = jax.make_jaxpr(function)(shared, lanes), len(jax.tree.leaves(shared))
     return compiled(_text(closed, count, known, vector_width(), rows=rows, most_lines=most_lines, large=large, alone=alone))
+
+
+class Single:
+    """Machine code of a function of one instant, for it alone.
+
+    Parameters
+    ----------
+    binary : bytes
+        From `object_file`, with `alone`.
+    given, results : pytree
+        Of what has the shapes and types of the arguments and of the results.
+    """
+
+    def __init__(self, binary: bytes, given: Any, results: Any):
+        self._run = MachineCode(binary)
+        self._given = [(x.shape, x.dtype) for x in jax.tree.leaves(given)]
+        leaves, self._structure = jax.tree.flatten(results)
+        self._results = [(leaf.shape, leaf.dtype) for leaf in leaves]
+
+    def __call__(self, given: Sequence[np.ndarray]) -> Any:
+        """Return the results, for the leaves of the arguments."""
+        if [(x.shape, x.dtype) for x in given] != self._given:
+            raise ValueError(f"arrays of {[(x.shape, x.dtype) for x in given]}, where the program is for {self._given}")
+        found = [np.empty(*shape) for shape in self._results]
+        arrays = [*map(np.ascontiguousarray, given), *found]
+        addresses = [array.__array_interface__["data"][0] for array in arrays]
+        self._run((ctypes.c_void_p * len(addresses))(*addresses), 1)
+        return jax.tree.unflatten(self._structure, found)
 
 
 class Program:
@@ -192,8 +221,11 @@ def _text(
     results = translate(code, closed.jaxpr, [constants(code, number) for number in closed.consts], given)
     for number, array in enumerate(results, len(given)):
         _write(code, number, array, rows=rows)
-    if code.memory > MOST_MEMORY:
-        raise UnsupportedOperationError(f"{code.memory} bytes of memory")
+    if code.memory > MOST_MEMORY or code.heap > MOST_HEAP:
+        raise UnsupportedOperationError(f"{code.memory} bytes of the stack, and {code.heap} elsewhere")
+    borrowed, returned = [], []
+    if code.heap:
+        borrowed, returned = [f"%heap = call ptr @aligned_alloc(i64 64, i64 {code.heap})"], ["call void @free(ptr %heap)"]
     loop = [
         f"%most = sub i64 %total, {width}",
         "br label %lanes",
@@ -212,10 +244,14 @@ def _text(
         *code.constants,
         "define void @run(ptr noalias %arguments, i64 %total) #1 {",
         "begin:",
+        *borrowed,
         *code.entry,
         *(code.lines if alone else loop),
+        *returned,
         "ret void",
         "}",
+        "declare ptr @aligned_alloc(i64, i64)",
+        "declare void @free(ptr)",
         *sorted(code.intrinsics | {"declare i64 @llvm.smin.i64(i64, i64)"}),
     ]
     for name, count in sorted(code.functions):

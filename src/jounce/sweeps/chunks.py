@@ -120,7 +120,7 @@ def _loaded(content: bytes) -> Plan:
         prepare()
     if user_files:
         from jounce.io.mechanisms.user_classes import import_file
-        from jounce.kinematics.compilation import keep_programs
+        from jounce.kinematics.store import keep_programs
 
         keep_programs(None)  # what is compiled may be other than this package says
         for path in user_files:
