@@ -13,8 +13,9 @@ from jax.extend.core import ClosedJaxpr, Jaxpr, jaxpr_as_fun, jaxprs_in_params
 from jounce.kinematics.alone import is_traced_alone
 from jounce.kinematics.compilation import compiler_options
 
-LIBRARIES = ("dot-library-rewriter",)
-"""Passes of XLA to leave out of programs with such functions: they put sums into a library as well."""
+LIBRARIES = ("dot-library-rewriter", "cpu-parallel-task-assigner")
+"""Passes of XLA to leave out of programs with such functions: they put sums into a library as well, and share large
+operations among threads, by functions that are out of reach there."""
 
 TRIED = (0, 10)  # releases of jaxlib: of others it is not known whether they break off
 LARGEST = 6000  # operations: of a march of twice as many LLVM makes one function in a minute, and many in ten seconds

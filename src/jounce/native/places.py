@@ -12,7 +12,7 @@ from jounce.native.arrays import Values, constants, each, filled, in_memory, row
 from jounce.native.code import Code, flat
 from jounce.native.values import DTYPES, UnsupportedOperationError, Value, kind_of
 
-MOST_CANDIDATES = 64  # places of an array among which a number is picked by comparing
+MOST_CANDIDATES = 64  # places of an array among which a number is picked by comparing, and not from memory
 
 # -- at places that are known -----------------------------------------------------------------------------------------
 
@@ -108,7 +108,9 @@ def _element(code: Code, values: Sequence[Value], index: Value) -> Value:
     if not index.lanes and len(values) > 2:
         return row(code, in_memory(code, values), index, ()).item()
     if len(values) > MOST_CANDIDATES:
-        raise UnsupportedOperationError(f"picking one of {len(values)} numbers")
+        region, first = in_memory(code, values)
+        place = code.arithmetic("add", code.converted(index, "l"), code.constant(first, "l"))
+        return code.load(region, place)
     found = values[-1]
     for k in reversed(range(len(values) - 1)):
         found = code.select(code.compare("eq", index, code.constant(k, index.kind)), values[k], found)
