@@ -7,7 +7,8 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.kinematics.grid import GridSolver
+from jounce.kinematics.advance import SolvedState
+from jounce.kinematics.grid import GridSolver, room_for
 from jounce.kinematics.path_following import FollowedPath
 from jounce.kinematics.solver import Solver
 from jounce.mechanism.time import Instants
@@ -63,22 +64,22 @@ def solve_grid(
     """
     kept = len(time) <= STRETCH if keep is None else keep
     status, faults = np.empty(len(time), int), {}
-    whole: Any = None
-    for first, part in stretches(solver, path, time, progress, threads):
-        state = part.state if kept else part.state[1]
-        lanes = slice(first, first + len(part.time))
-        if len(part.time) == len(time):
-            whole = state
-        else:
-            if whole is None:
-                whole = jax.tree.map(lambda x: np.empty((*x.shape[:-1], len(time))), state)
-            _put(whole, state, lanes)
-        status[lanes] = part.status
+    anchors = len(path.anchors)
+    rooms = [len(time) if kept else min(len(time), STRETCH), len(time), min(len(time), STRETCH)]
+    whole = [room_for(part, room + anchors) for part, room in zip(path.anchors[0].state, rooms, strict=True)]
+
+    def store(first: int) -> Any:
+        """Return where the states of a stretch go; those of its anchors will make room for those of the next one."""
+        begins = first if kept else 0, first, 0
+        return tuple(jax.tree.map(lambda x, begin=begin: x[..., begin:], part) for part, begin in zip(whole, begins, strict=True))
+
+    for first, part in stretches(solver, path, time, progress, threads, store):
+        status[first : first + len(part.time)] = part.status
         faults |= {first + lane: fault for lane, fault in part.faults.items()}
+    coordinates, outputs = jax.tree.map(lambda x: x[..., : len(time)], whole[:2])
     if kept:
-        coordinates, outputs = whole
         return Solved(coordinates, outputs, status, faults)
-    return Solved(lambda: _coordinates(solver, path, time, threads), whole, status, faults)
+    return Solved(lambda: _coordinates(solver, path, time, threads), outputs, status, faults)
 
 
 def _coordinates(
@@ -95,8 +96,12 @@ def stretches(
     time: Instants,
     progress: Callable[[int, int], None] | None,
     threads: int,
+    store: Callable[[int], SolvedState] | None = None,
 ) -> Iterator[tuple[int, GridSolver]]:
-    """Yield the stretches of a grid one after another, solved, with the index of their first instant."""
+    """Yield the stretches of a grid one after another, solved, with the index of their first instant.
+
+    It tells a `store` in which arrays the states of a stretch are to be kept, unless each has arrays of its own.
+    """
     for first in range(0, len(time), STRETCH):
 
         def told(done: int, _: int, first: int = first) -> None:
@@ -104,11 +109,8 @@ def stretches(
                 progress(first + done, len(time))
 
         before = time[first - 1] if first else -np.inf
-        part = GridSolver(solver, path, time[first : first + STRETCH], span=time[-1] - time[0])
+        kept = None if store is None else store(first)
+        part = GridSolver(solver, path, time[first : first + STRETCH], time[-1] - time[0], kept)
         part.solve(None if progress is None else told, threads, explain=bool(before < path.ended_at))
         yield first, part
 
-
-def _put(whole: Any, part: Any, lanes: slice) -> None:
-    for into, values in zip(jax.tree.leaves(whole), jax.tree.leaves(part), strict=True):
-        into[..., lanes] = values

@@ -1,0 +1,75 @@
+"""In which order the instants of a long grid are solved: in rounds, of as many as a vector has lanes.
+
+An instant is predicted from the one that is its index without the last binary digit that is one, as far as the stride
+of the first level. So what follows a multiple of a power of two, up to the next one, starts from nothing else: as many
+of these groups as a vector has lanes are solved side by side, each instant after instant. What they start from and
+what they find stays in the cache, and groups can be shared among threads.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Int
+
+GROUP = 64  # instants that follow one another in a lane, from coarser ones, which as many follow one another of
+LEAST, MOST = 512, 8192  # instants of a part: many enough that what Python does for it does not count
+PARTS = 4  # for each thread at least, where they are not too small, so that none waits long for another
+
+
+class Part(NamedTuple):
+    """The rounds of some groups of instants that start from nothing beyond them but what is solved before.
+
+    Attributes
+    ----------
+    turns : range
+        Which instants of each group are solved.
+    group, unit : int
+        How many instants belong to a group, and how far apart they are in the grid, powers of two.
+    starts : range
+        The first instants of the groups that come first among those that are solved side by side.
+    """
+
+    turns: range
+    group: int
+    unit: int
+    starts: range
+
+    def rounds(self, width: int, count: int) -> Int[np.ndarray, "round lane"]:
+        """Return the indices of a grid of so many instants; where lanes lie beyond it, the first is solved again."""
+        lanes = np.arange(width) * (self.group * self.unit)
+        block = np.array(self.turns, np.int64)[:, None] * self.unit + lanes
+        found = (np.array(self.starts, np.int64)[:, None, None] + block).reshape(-1, width)
+        if self.starts.stop > count:
+            found = found[found[:, 0] < count]
+            found = np.where(found < count, found, found[:, :1])
+        return found
+
+
+def phases(count: int, stride: int, width: int, threads: int) -> Iterator[list[Part]]:
+    """Yield the parts of a grid: those of a list start from nothing but what is solved in the lists before.
+
+    Parameters
+    ----------
+    count : int
+        Instants.
+    stride : int
+        Of the first level, a power of two.
+    width : int
+        Lanes of a vector.
+    threads : int
+        That the parts are for.
+    """
+    group = min(GROUP, stride)
+    yield _parts(count, range(stride // group), stride // group, group, width, threads)
+    if group > 1:
+        yield _parts(count, range(1, group), group, 1, width, threads)
+
+
+def _parts(count: int, turns: range, group: int, unit: int, width: int, threads: int) -> list[Part]:
+    """Return the parts of groups of all instants of a grid that are `unit` apart."""
+    step, together = group * unit * width, group * width
+    blocks = -(-count // step)
+    size = max(min(blocks // (PARTS * threads), MOST // together), LEAST // together, 1)
+    starts = range(0, blocks * step, step)
+    return [Part(turns, group, unit, starts[k : k + size]) for k in range(0, blocks, size)]
