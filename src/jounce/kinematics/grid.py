@@ -130,7 +130,7 @@ class GridSolver:
 
         for _ in pool.map(link, range(0, count, LINKED)):
             pass
-        relay = self.solver.relay(self._store, step, self.time[:count], self.status, source)
+        relay = self.solver.relay(self._store, step, self.time[:count], self.status[:count], source)
 
         def solve(part: Part) -> int:
             rounds = part.rounds(relay.width, count)

@@ -71,7 +71,7 @@ def solve_grid(
     def store(first: int) -> Any:
         """Return where the states of a stretch go; those of its anchors will make room for those of the next one."""
         begins = first if kept else 0, first, 0
-        return tuple(jax.tree.map(lambda x, begin=begin: x[..., begin:], part) for part, begin in zip(whole, begins, strict=True))
+        return tuple(_from(part, begin) for part, begin in zip(whole, begins, strict=True))
 
     for first, part in stretches(solver, path, time, progress, threads, store):
         status[first : first + len(part.time)] = part.status
@@ -114,3 +114,6 @@ def stretches(
         part.solve(None if progress is None else told, threads, explain=bool(before < path.ended_at))
         yield first, part
 
+
+def _from(arrays: Any, first: int) -> Any:
+    return jax.tree.map(lambda x: x[..., first:], arrays)

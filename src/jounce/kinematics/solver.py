@@ -95,8 +95,9 @@ class Solver:
             From which of the store each instant is predicted.
         """
         coordinates, outputs, sign = store
-        kept = {"coordinates": coordinates, "outputs": outputs, "sign": sign, "status": status}
-        results, native = Arrival(**(dict.fromkeys(Arrival._fields) | kept)), self._native
+        nothing: dict[str, Any] = dict.fromkeys(Arrival._fields)
+        wanted = {"coordinates": coordinates, "outputs": outputs, "status": status, "sign": sign}
+        results, native = Arrival(**(nothing | wanted)), self._native
         assert native is not None
         return native.relay((self.needed(store), (step, instant), np.zeros(1, bool)), results, sources)
 

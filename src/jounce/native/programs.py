@@ -125,7 +125,7 @@ class Program:
     def relay(
         self,
         shared: Sequence[np.ndarray],
-        lanes: tuple[Sequence[np.ndarray], Sequence[np.ndarray], Sequence[np.ndarray]],
+        lanes: Sequence[Sequence[np.ndarray]],
         results: Sequence[np.ndarray | None],
         sources: np.ndarray,
     ) -> Relay:
@@ -135,7 +135,7 @@ class Program:
         ----------
         shared : sequence of array
             Leaves of what all instants share.
-        lanes : tuple of sequence of array
+        lanes : three sequences of array
             Leaves of the arguments of an instant: those that it takes from its source, those that are its own, and
             those that all have the same; see `Relay`.
         results : sequence of array
@@ -143,6 +143,8 @@ class Program:
         sources : array of int
             Index of the source of each instant.
         """
+        if self._rows:
+            raise ValueError("instants are along the first axis")
         _agree(shared, self._shared)
         columns = [Column(*kind, x) for kind, x in zip(self._lanes, itertools.chain(*lanes), strict=True)]
         first, second = itertools.accumulate(map(len, lanes[:2]))
@@ -167,7 +169,7 @@ class Program:
         return jax.tree.unflatten(self._structure, jax.ffi.ffi_call(self.name, shapes)(*shared, *lanes))
 
     def _check(self, shared: Sequence[Any], lanes: Sequence[Any], count: int) -> None:
-        """Raise ValueError unless arrays of so many instants are of the shapes and types that the machine code reads."""
+        """Raise ValueError unless arrays of so many instants are of the shapes and types that the code reads."""
         many = [((count, *shape) if self._rows else (*shape, count), dtype) for shape, dtype in self._lanes]
         _agree([*shared, *lanes], [*self._shared, *many])
 

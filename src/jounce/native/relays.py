@@ -5,7 +5,6 @@ are in arrays of the caller, solves them, and copies what it finds to where they
 for each round, and Python's lock is not held for any of them.
 """
 
-import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
@@ -38,7 +37,9 @@ class Column(NamedTuple):
         whole: Any = self.whole
         found = whole.shape[:-1], whole.dtype, whole.dtype.itemsize, whole.strides[-1]
         if found != (self.shape, self.dtype, ENTRY, ENTRY) or whole.shape[-1] < least:
-            raise ValueError(f"an array of {whole.dtype}{whole.shape}, for {self.dtype}{self.shape} of {least} instants")
+            raise ValueError(
+                f"an array of {whole.dtype}{whole.shape}, for {self.dtype}{self.shape} of {least} instants"
+            )
         places = np.asarray(_address(whole))
         for size, step in zip(whole.shape[:-1], whole.strides[:-1], strict=True):
             places = places[..., None] + np.arange(size) * step
@@ -52,9 +53,9 @@ class Column(NamedTuple):
 def relay_text(width: int) -> str:
     """Return the text of a function `relay`, which calls `run` for one round after another.
 
-    Its arguments: the addresses for `run`; pairs of addresses, of numbers of all instants and of those of a round, in
-    the order in which it copies them; how many of these are read at the sources and at the targets, and written; where
-    the sources of all instants and the targets of all rounds are; and the number of rounds.
+    Its arguments: the addresses for `run`; pairs of addresses, of a number of the first instant and of that of the
+    first lane, in the order in which they are copied; how many of these are read at sources, read at targets, and
+    written at targets; the sources of all instants, the targets of all rounds, and how many rounds there are.
 
     Parameters
     ----------
@@ -101,7 +102,7 @@ def relay_text(width: int) -> str:
 
 
 def _copies(name: str, span: tuple[str, str, str], after: str, copy: Sequence[str]) -> list[str]:
-    """Return a loop over some of the pairs, with the block that it is come to from, the first pair and the end."""
+    """Return a loop over pairs; their span is the block before the loop, the first of them and where they end."""
     before, first, stop = span
     return [
         f"{name}:",
@@ -185,19 +186,19 @@ class Relay:
             raise ValueError("sources that are no indices")
         columns = [*linked, *own, *held, *results]
         self._run, self.width, self._sources = run, width, np.ascontiguousarray(sources)
-        self._shared, self._columns = [np.ascontiguousarray(x) for x in shared], columns  # read by their addresses
-        self._known = np.array([_address(x) for x in self._shared], np.int64)
+        self._arrays = [np.ascontiguousarray(x) for x in shared], columns  # kept, since addresses do not keep them
+        self._common = np.array([_address(x) for x in self._arrays[0]], np.int64)
         ends = np.cumsum([0, *(column.room(width) for column in columns)])
         self._begins, self._blank = ends[:-1], np.zeros(ends[-1], np.uint8)
         begins = iter(self._begins.tolist())
-        read = _pairs(linked, begins, width, int(sources.max(initial=-1)) + 1)
-        owned = _pairs(own, begins, width, len(sources))
+        at_source = _pairs(linked, begins, width, int(sources.max(initial=-1)) + 1)
+        at_target = _pairs(own, begins, width, len(sources))
         for column, begin in zip(held, begins, strict=False):
             numbers = np.repeat(np.asarray(column.whole, column.dtype).reshape(*column.shape, 1), width, axis=-1)
             self._blank[begin : begin + numbers.nbytes] = numbers.ravel().view(np.uint8)
-        kept = _pairs(results, begins, width, len(sources))
-        self._counts = len(read), len(owned), len(kept)
-        self._pairs = np.concatenate([read, owned, kept])
+        found = _pairs(results, begins, width, len(sources))
+        self._counts = len(at_source), len(at_target), len(found)
+        self._pairs = np.concatenate([at_source, at_target, found])
 
     def __call__(self, targets: Int[np.ndarray, "round lane"]) -> None:
         """Solve instants by their indices; in several threads at once, if they have none of them in common.
@@ -205,22 +206,20 @@ class Relay:
         The lanes of a round depend on none of the same round; sources are solved, or are in an earlier one.
         """
         count, width = len(self._sources), self.width
-        if targets.dtype != np.int64 or targets.shape[1:] != (width,) or not _within(targets, count):
+        within = targets.min(initial=0) >= 0 and targets.max(initial=-1) < count
+        if targets.dtype != np.int64 or targets.shape[1:] != (width,) or not within:
             raise ValueError(f"targets that are not {width} indices below {count} for each round")
         targets = np.ascontiguousarray(targets)
-        room = np.empty(len(self._blank) + LINE, np.uint8)
+        room = np.empty(len(self._blank) + LINE, np.uint8)  # of its own for each call, and so for each thread
         first = -_address(room) % LINE
         room[first : first + len(self._blank)] = self._blank
         start = _address(room) + first
-        addresses = np.concatenate([self._known, start + self._begins])
-        pairs = self._pairs + [0, start]
-        given = map(_address, (addresses, pairs)), self._counts, map(_address, (self._sources, targets)), (len(targets),)
-        self._run(*itertools.chain(*given))
+        addresses, pairs = np.concatenate([self._common, start + self._begins]), self._pairs + np.array([0, start])
+        indices = _address(self._sources), _address(targets)
+        self._run(_address(addresses), _address(pairs), *self._counts, *indices, len(targets))
 
 
-def _pairs(
-    columns: Sequence[Column], begins: Iterator[int], width: int, least: int
-) -> Int[np.ndarray, "number 2"]:
+def _pairs(columns: Sequence[Column], begins: Iterator[int], width: int, least: int) -> Int[np.ndarray, "number 2"]:
     """Return the address of each number of the first of `least` instants, and where those of a round begin."""
     found = [np.empty((0, 2), np.int64)]
     for column, begin in zip(columns, begins, strict=False):
@@ -228,10 +227,6 @@ def _pairs(
             places = begin + np.arange(math.prod(column.shape)) * (width * ENTRY)
             found.append(np.stack([column.addresses(least), places], axis=1))
     return np.concatenate(found)
-
-
-def _within(indices: Int[np.ndarray, "*any"], count: int) -> bool:
-    return indices.min(initial=0) >= 0 and indices.max(initial=-1) < count
 
 
 def _address(array: np.ndarray) -> int:
