@@ -14,6 +14,11 @@ needs_machine_code = pytest.mark.skipif(
 )
 
 
+@pytest.fixture(autouse=True)
+def _wanted(monkeypatch):
+    monkeypatch.delenv("JOUNCE_NATIVE", raising=False)  # as where all tests run without machine code
+
+
 @pytest.mark.parametrize("width", [2, 4, 8])
 @pytest.mark.parametrize("stride", [1, 2, 8, 64, 256])
 @pytest.mark.parametrize("count", [1, 7, 64, 65, 1025, 3000, 20_000])
