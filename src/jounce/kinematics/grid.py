@@ -28,7 +28,7 @@ from jounce.mechanism.time import nearest_instants
 
 Indices = Int[np.ndarray, " lane"]
 LONG_GRID = 1024  # instants: from here on in large batches
-LINKED = 2**14  # instants of which a thread looks for the sources at once
+LINKED = 2**15  # instants of which a thread looks for the sources at once, at most
 FEW_BATCHES = 4  # of instants: no level of its own for each halving of the spacing
 
 
@@ -121,14 +121,15 @@ class GridSolver:
         if count == 0:
             return left
         source, step = np.empty(count, np.int64), np.empty(count)
+        size = min(LINKED, -(-count // pool.count))
 
         def link(first: int) -> None:
-            lanes = np.arange(first, min(first + LINKED, count))
-            here = slice(first, first + LINKED)
-            source[here] = self._sources(lanes, lanes & (lanes - 1), lanes % stride != 0)
-            step[here] = self.time[lanes] - self._instants[source[here]]
+            lanes = np.arange(first, min(first + size, count))
+            here = slice(first, first + len(lanes))
+            source[here] = self._sources(lanes, lanes & (lanes - 1), lanes & (stride - 1) > 0)
+            step[here] = self.time[here] - self._instants[source[here]]
 
-        for _ in pool.map(link, range(0, count, LINKED)):
+        for _ in pool.map(link, range(0, count, size)):
             pass
         relay = self.solver.relay(self._store, step, self.time[:count], self.status[:count], source)
 
