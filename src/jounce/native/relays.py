@@ -5,6 +5,7 @@ are in arrays of the caller, solves them, and copies what it finds to where they
 for each round, and Python's lock is not held for any of them.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
@@ -26,7 +27,7 @@ class Column(NamedTuple):
     dtype: np.dtype[Any]
     whole: np.ndarray | None
 
-    def addresses(self, least: int) -> Int[np.ndarray, " number"]:
+    def addresses(self, least: int) -> list[int]:
         """Return where each number of the first instant is, in an array of so many instants at least.
 
         Raises
@@ -40,10 +41,10 @@ class Column(NamedTuple):
             raise ValueError(
                 f"an array of {whole.dtype}{whole.shape}, for {self.dtype}{self.shape} of {least} instants"
             )
-        places = np.asarray(_address(whole))
+        places = [_address(whole)]
         for size, step in zip(whole.shape[:-1], whole.strides[:-1], strict=True):
-            places = places[..., None] + np.arange(size) * step
-        return places.ravel()
+            places = [place + k * step for place in places for k in range(size)]
+        return places
 
     def room(self, width: int) -> int:
         """Return how many bytes the numbers of a round take, in whole lines of the cache."""
@@ -198,7 +199,7 @@ class Relay:
             self._blank[begin : begin + numbers.nbytes] = numbers.ravel().view(np.uint8)
         found = _pairs(results, begins, width, len(sources))
         self._counts = len(at_source), len(at_target), len(found)
-        self._pairs = np.concatenate([at_source, at_target, found])
+        self._pairs = np.array([*at_source, *at_target, *found], np.int64).reshape(-1, 2)
 
     def __call__(self, targets: Int[np.ndarray, "round lane"]) -> None:
         """Solve instants by their indices; in several threads at once, if they have none of them in common.
@@ -219,15 +220,14 @@ class Relay:
         self._run(_address(addresses), _address(pairs), *self._counts, *indices, len(targets))
 
 
-def _pairs(columns: Sequence[Column], begins: Iterator[int], width: int, least: int) -> Int[np.ndarray, "number 2"]:
+def _pairs(columns: Sequence[Column], begins: Iterator[int], width: int, least: int) -> list[tuple[int, int]]:
     """Return the address of each number of the first of `least` instants, and where those of a round begin."""
-    found = [np.empty((0, 2), np.int64)]
+    found: list[tuple[int, int]] = []
     for column, begin in zip(columns, begins, strict=False):
         if column.whole is not None:
-            places = begin + np.arange(math.prod(column.shape)) * (width * ENTRY)
-            found.append(np.stack([column.addresses(least), places], axis=1))
-    return np.concatenate(found)
+            found += zip(column.addresses(least), itertools.count(begin, width * ENTRY), strict=False)
+    return found
 
 
 def _address(array: np.ndarray) -> int:
-    return array.__array_interface__["data"][0]
+    return array.ctypes.data
