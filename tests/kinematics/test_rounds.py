@@ -45,10 +45,12 @@ def test_parts_have_no_instant_in_common(threads):
         assert len(np.unique(together)) == len(together)
 
 
-def test_threads_have_as_many_parts():
+def test_threads_have_as_many_parts_of_nearly_one_size():
     assert [len(parts) for parts in phases(65_536, 1024, 8, 2)] == [2, 8]
-    assert [len(parts) for parts in phases(65_536, 1024, 8, 8)] == [2, 32]
-    assert [len(parts) for parts in phases(2_000_000, 16_384, 8, 1)][1] == 245
+    assert [len(parts) for parts in phases(65_536, 1024, 8, 3)] == [3, 12]
+    assert len([*phases(2_000_000, 16_384, 8, 1)][1]) == 245
+    sizes = [len(part.starts) for part in [*phases(34_464, 512, 8, 2)][1]]
+    assert (len(sizes), min(sizes), max(sizes)) == (8, 8, 9)
 
 
 def test_lanes_beyond_the_grid_solve_the_first_one_again():

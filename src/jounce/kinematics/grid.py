@@ -2,7 +2,9 @@
 
 A long grid is not solved one instant after another. The instants start from their nearest anchor, in levels that halve
 the spacing, so that most are predicted to rounding by an instant solved before and all of a level are solved together.
-Between two anchors lies no singular position, so that the sign of the determinant tells an instant on another branch.
+Machine code takes them up in another order, from the same neighbours (see `rounds`): what it tells to have failed is
+solved in levels again. Between two anchors lies no singular position, so that the sign of the determinant tells an
+instant on another branch.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -57,8 +59,7 @@ class GridSolver:
         self._instants = np.concatenate([time, [anchor.instant for anchor in self._anchors]])
         self._reached = time < path.ended_at
         self._store = room_for(self._anchors[0].state, len(self._instants)) if store is None else store
-        for lanes, state in path.on_the_way:
-            self._keep(lanes, state)
+        for lanes, _ in path.on_the_way:
             self.status[lanes] = Status.OK
 
     @property
@@ -89,7 +90,7 @@ class GridSolver:
 
         in_rounds = count > LONG_GRID and self.solver.is_compiled
         with Threads(threads, compiled=in_rounds) as pool:
-            self._place_anchors(pool.map if in_rounds else map)
+            self._place_known(pool.map if in_rounds else map)
             if in_rounds:
                 left = self._in_rounds(left, stride, pool, tell)
             for lanes, distance in _levels(left, stride):
@@ -173,8 +174,8 @@ class GridSolver:
     def _away(self, lanes: Indices, source: Indices) -> Float[np.ndarray, " lane"]:
         return np.abs(self.time[lanes] - self._instants[source])
 
-    def _place_anchors(self, each: Callable[..., Iterable[None]]) -> None:
-        """Put the states of the anchors behind those of the instants, and zeros where no instant is reached."""
+    def _place_known(self, each: Callable[..., Iterable[None]]) -> None:
+        """Put the anchors behind the instants, those solved on the way among them, and zeros where none is reached."""
         count, reached = len(self.time), int(np.count_nonzero(self._reached))
 
         def place(arrays: tuple[np.ndarray, ...]) -> None:
@@ -185,6 +186,8 @@ class GridSolver:
         states = self._store, *(anchor.state for anchor in self._anchors)
         for _ in each(place, zip(*map(jax.tree.leaves, states), strict=True)):
             pass
+        for lanes, state in self.path.on_the_way:
+            self._keep(lanes, state)
 
     def _keep(self, lanes: slice | Indices, state: SolvedState) -> None:
         def put(whole: np.ndarray, part: np.ndarray) -> None:

@@ -6,15 +6,16 @@ of these groups as a vector has lanes are solved side by side, each instant afte
 what they find stays in the cache, and groups can be shared among threads.
 """
 
+import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Int
 
-GROUP = 64  # instants that follow one another in a lane, from coarser ones, which as many follow one another of
+GROUP = 64  # instants that a lane takes up one after another, once all multiples of so many are solved
 LEAST, MOST = 512, 8192  # instants of a part: many enough that what Python does for it does not count
-PARTS = 4  # for each thread at least, where they are not too small, so that none waits long for another
+PARTS = 4  # for each thread, unless they have fewer or more instants then: none is to wait long for another
 
 
 class Part(NamedTuple):
@@ -67,9 +68,10 @@ def phases(count: int, stride: int, width: int, threads: int) -> Iterator[list[P
 
 
 def _parts(count: int, turns: range, group: int, unit: int, width: int, threads: int) -> list[Part]:
-    """Return the parts of groups of all instants of a grid that are `unit` apart."""
+    """Return the parts of groups of all instants of a grid that are `unit` apart, as many for each thread."""
     step, together = group * unit * width, group * width
     blocks = -(-count // step)
-    size = max(min(blocks // (PARTS * threads), MOST // together), LEAST // together, 1)
-    starts = range(0, blocks * step, step)
-    return [Part(turns, group, unit, starts[k : k + size]) for k in range(0, blocks, size)]
+    wanted = max(min(PARTS * threads, blocks * together // LEAST), -(-blocks * together // MOST), 1)
+    parts = min(-(-wanted // threads) * threads, blocks)
+    ends = [blocks * k // parts * step for k in range(parts + 1)]
+    return [Part(turns, group, unit, range(*span, step)) for span in itertools.pairwise(ends)]
