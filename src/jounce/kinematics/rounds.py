@@ -1,9 +1,9 @@
 """In which order the instants of a long grid are solved: in rounds, of as many as a vector has lanes.
 
-An instant is predicted from the one that is its index without the last binary digit that is one, as far as the stride
-of the first level. So what follows a multiple of a power of two, up to the next one, starts from nothing else: as many
-of these groups as a vector has lanes are solved side by side, each instant after instant. What they start from and
-what they find stays in the cache, and groups can be shared among threads.
+An instant is predicted from the one whose index is its own with the last binary one set to zero, unless it is of the
+first level. So the instants from a multiple of a power of two up to the next one, a group, start from nothing beyond
+it, and as many groups as a vector has lanes are solved side by side, each instant after instant: in the cache are those
+that they start from, and groups can be shared among threads.
 """
 
 import itertools
