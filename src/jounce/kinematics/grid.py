@@ -2,11 +2,12 @@
 
 A long grid is not solved one instant after another. The instants start from their nearest anchor, in levels that halve
 the spacing, so that most are predicted to rounding by an instant solved before and all of a level are solved together.
-Between two anchors lies no singular position, so that the sign of the determinant tells an instant on another branch.
+Machine code takes them up in another order, from the same neighbours (see `rounds`): what it tells to have failed is
+solved in levels again. Between two anchors lies no singular position, so that the sign of the determinant tells an
+instant on another branch.
 """
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import jax
@@ -21,6 +22,7 @@ from jounce.kinematics.path_following import (
     Passage,
     follow,
 )
+from jounce.kinematics.rounds import Part, phases
 from jounce.kinematics.solver import SMALL_BATCH, Solver
 from jounce.kinematics.status import Status
 from jounce.kinematics.threads import Threads
@@ -28,6 +30,7 @@ from jounce.mechanism.time import nearest_instants
 
 Indices = Int[np.ndarray, " lane"]
 LONG_GRID = 1024  # instants: from here on in large batches
+LINKED = 2**15  # instants of which a thread looks for the sources at once, at most
 FEW_BATCHES = 4  # of instants: no level of its own for each halving of the spacing
 
 
@@ -41,17 +44,22 @@ class GridSolver:
         For instants that failed, the body farthest from its prediction, or the driver without a permitted value.
     """
 
-    def __init__(self, solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"], span: float):
+    def __init__(
+        self,
+        solver: Solver,
+        path: FollowedPath,
+        time: Float[np.ndarray, " time"],
+        span: float,
+        store: SolvedState | None = None,
+    ):
         self.solver, self.path, self.time, self.span = solver, path, time, span
         self.status = np.full(len(time), int(Status.NOT_REACHED))
         self.faults: dict[int, str] = {}
         self._anchors = path.anchors_around(time[0], time[-1])
-        anchors = np.array([anchor.instant for anchor in self._anchors])
-        self._instants = np.concatenate([time, anchors])
-        self._nearest = len(time) + nearest_instants(anchors, time)
-        self._store = jax.tree.map(partial(_with_room, len(time)), *(anchor.state for anchor in self._anchors))
-        for lanes, state in path.on_the_way:
-            self._keep(lanes, state)
+        self._instants = np.concatenate([time, [anchor.instant for anchor in self._anchors]])
+        self._reached = time < path.ended_at
+        self._store = room_for(self._anchors[0].state, len(self._instants)) if store is None else store
+        for lanes, _ in path.on_the_way:
             self.status[lanes] = Status.OK
 
     @property
@@ -67,39 +75,84 @@ class GridSolver:
         is to say at the first instant that was not reached why.
         """
         count = len(self.time)
-        reached = self.time < self.path.ended_at
         width, most = SMALL_BATCH, 1
         if count > LONG_GRID:
             width, most = self.solver.width, self.solver.together // self.solver.width
-        left = reached & (self.status != Status.OK)
+        left = self._reached & (self.status != Status.OK)
+        stride = _stride(left, len(self._anchors), width)
         done = count - int(np.count_nonzero(left))
-        with Threads(threads, compiled=count > LONG_GRID and self.solver.is_compiled) as pool:
-            for lanes, distance in _levels(left, len(self._anchors), width):
-                source = self._sources(lanes, distance)
+
+        def tell(solved: int) -> None:
+            nonlocal done
+            done = min(done + solved, count)
+            if progress is not None:
+                progress(done, count)
+
+        in_rounds = count > LONG_GRID and self.solver.is_compiled
+        with Threads(threads, compiled=in_rounds) as pool:
+            self._place_known(pool.map if in_rounds else map)
+            if in_rounds:
+                left = self._in_rounds(left, stride, pool, tell)
+            for lanes, distance in _levels(left, stride):
+                neighbour = lanes - distance
+                known = (self.status[neighbour] == Status.OK) & (distance > 0)
+                source = self._sources(lanes, neighbour, known)
                 size = width * _lots(len(lanes), width, most, threads)
                 batches = [(lanes[k : k + size], source[k : k + size]) for k in range(0, len(lanes), size)]
                 for (batch, _), arrival in zip(batches, pool.map(self._solved, batches), strict=True):
                     self._take(batch, arrival)
-                    done += len(batch)
-                    if progress is not None:
-                        progress(done, count)
+                    tell(len(batch))
         for point in self.path.change_points:
             self._bridge(point)
         for point in self.path.singular_positions_outside():
             self._refuse(np.abs(self.time - point.instant) < spoiled_width(point, self.solver.order))
-        if explain and not reached.all():
-            self._explain_end(int(np.argmin(reached)))
+        if explain and not self._reached.all():
+            self._explain_end(int(np.argmin(self._reached)))
         if progress is not None and done < count:
             progress(count, count)
 
-    def _sources(self, lanes: Indices, distance: int | None) -> Indices:
-        """Return from where each instant is predicted: its neighbour, where that is solved, or its nearest anchor."""
-        source = self._nearest[lanes]
-        if distance is None:
-            return source
-        neighbour = lanes - distance
-        nearer = self._away(lanes, neighbour) <= self._away(lanes, source)
-        return np.where(nearer & (self.status[neighbour] == Status.OK), neighbour, source)
+    def _in_rounds(
+        self, left: Bool[np.ndarray, " time"], stride: int, pool: Threads, tell: Callable[[int], None]
+    ) -> Bool[np.ndarray, " time"]:
+        """Solve instants in rounds of machine code; return what is left: those that failed, and what starts from them.
+
+        Nothing is known of a failure but that there is one, so that these are solved once more, level after level.
+        """
+        count = int(np.count_nonzero(left))  # a long grid is reached up to some instant, and nothing is solved yet
+        if count == 0:
+            return left
+        source, step = np.empty(count, np.int64), np.empty(count)
+        size = min(LINKED, -(-count // pool.count))
+
+        def link(first: int) -> None:
+            lanes = np.arange(first, min(first + size, count))
+            here = slice(first, first + len(lanes))
+            source[here] = self._sources(lanes, lanes & (lanes - 1), lanes & (stride - 1) > 0)
+            step[here] = self.time[here] - self._instants[source[here]]
+
+        for _ in pool.map(link, range(0, count, size)):
+            pass
+        relay = self.solver.relay(self._store, step, self.time[:count], self.status[:count], source)
+
+        def solve(part: Part) -> int:
+            rounds = part.rounds(relay.width, count)
+            relay(rounds)
+            return rounds.size
+
+        for parts in phases(count, stride, relay.width, pool.count):
+            for solved in pool.map(solve, parts):
+                tell(solved)
+        failed = left & (self.status != Status.OK)
+        if failed.any():
+            for lanes, distance in _levels(left, stride):
+                failed[lanes] |= failed[lanes - distance]
+        return failed
+
+    def _sources(self, lanes: Indices, neighbour: Indices, known: Bool[np.ndarray, " lane"]) -> Indices:
+        """Return from where each instant is predicted: its neighbour, where that is known, or its nearest anchor."""
+        nearest = len(self.time) + nearest_instants(self._instants[len(self.time) :], self.time[lanes])
+        nearer = self._away(lanes, neighbour) <= self._away(lanes, nearest)
+        return np.where(nearer & known, neighbour, nearest)
 
     def _solved(self, batch: tuple[Indices, Indices]) -> Arrival:
         """Return what comes of a batch of instants, with their sources; nothing is kept but the state at its lanes."""
@@ -120,6 +173,21 @@ class GridSolver:
 
     def _away(self, lanes: Indices, source: Indices) -> Float[np.ndarray, " lane"]:
         return np.abs(self.time[lanes] - self._instants[source])
+
+    def _place_known(self, each: Callable[..., Iterable[None]]) -> None:
+        """Put the anchors behind the instants, those solved on the way among them, and zeros where none is reached."""
+        count, reached = len(self.time), int(np.count_nonzero(self._reached))
+
+        def place(arrays: tuple[np.ndarray, ...]) -> None:
+            whole, *parts = arrays
+            whole[..., reached:count] = 0
+            whole[..., count : len(self._instants)] = np.concatenate(parts, axis=-1)
+
+        states = self._store, *(anchor.state for anchor in self._anchors)
+        for _ in each(place, zip(*map(jax.tree.leaves, states), strict=True)):
+            pass
+        for lanes, state in self.path.on_the_way:
+            self._keep(lanes, state)
 
     def _keep(self, lanes: slice | Indices, state: SolvedState) -> None:
         def put(whole: np.ndarray, part: np.ndarray) -> None:
@@ -174,12 +242,9 @@ class GridSolver:
             self.status[lost], self.faults[lost] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
 
 
-def _with_room(count: int, *arrays: np.ndarray) -> np.ndarray:
-    """Return arrays one after another along the last axis, behind room for as many lanes as asked for."""
-    parts = np.concatenate(arrays, axis=-1)
-    whole = np.zeros((*parts.shape[:-1], count + parts.shape[-1]))
-    whole[..., count:] = parts
-    return whole
+def room_for(state: Any, lanes: int) -> Any:
+    """Return arrays for the states of so many instants and anchors; whoever solves an instant is first to touch it."""
+    return jax.tree.map(lambda x: np.empty((*x.shape[:-1], lanes)), state)
 
 
 def _lots(count: int, width: int, most: int, threads: int) -> int:
@@ -198,20 +263,28 @@ def _slice_of(indices: Indices) -> slice | Indices:
     return indices
 
 
-def _levels(left: Bool[np.ndarray, " time"], anchors: int, width: int) -> list[tuple[Indices, int | None]]:
-    """Return the instants of each level, with the distance in the grid of the neighbour that each is predicted from.
+def _stride(left: Bool[np.ndarray, " time"], anchors: int, width: int) -> int:
+    """Return how far apart the instants of the first level are, which start from the anchors, a power of two.
 
-    The first level starts from the anchors, and fills at least one batch. Where few instants are left, it is the only
-    one.
+    They fill at least one batch. Where few instants are left, they are all of the first level.
     """
     count, stride = len(left), 1
-    if np.count_nonzero(left) <= FEW_BATCHES * width:
-        return [(np.flatnonzero(left), None)]
-    while count // (2 * stride) >= max(2 * anchors, width):
-        stride *= 2
-    levels: list[tuple[Indices, int | None]] = [(np.arange(0, count, stride), None)]
+    if np.count_nonzero(left) > FEW_BATCHES * width:
+        while count // (2 * stride) >= max(2 * anchors, width):
+            stride *= 2
+    return stride
+
+
+def _levels(left: Bool[np.ndarray, " time"], stride: int) -> Iterator[tuple[Indices, int]]:
+    """Yield the instants left of each level, with the distance of the neighbour that each is predicted from.
+
+    It is zero for those of the first level, which are predicted from anchors.
+    """
+    firsts = [(0, stride, 0)]
     while stride > 1:
-        half = stride // 2
-        levels.append((np.arange(half, count, stride), half))
-        stride = half
-    return [(level[left[level]], distance) for level, distance in levels]
+        firsts.append((stride // 2, stride, stride // 2))
+        stride //= 2
+    for first, apart, distance in firsts:
+        lanes = first + apart * np.flatnonzero(left[first::apart])
+        if lanes.size:
+            yield lanes, distance

@@ -7,7 +7,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.kinematics.grid import GridSolver
+from jounce.kinematics.grid import GridSolver, room_for
 from jounce.kinematics.path_following import FollowedPath
 from jounce.kinematics.solver import Solver
 from jounce.mechanism.time import Instants
@@ -63,22 +63,41 @@ def solve_grid(
     """
     kept = len(time) <= STRETCH if keep is None else keep
     status, faults = np.empty(len(time), int), {}
-    whole: Any = None
-    for first, part in stretches(solver, path, time, progress, threads):
-        state = part.state if kept else part.state[1]
-        lanes = slice(first, first + len(part.time))
-        if len(part.time) == len(time):
-            whole = state
-        else:
-            if whole is None:
-                whole = jax.tree.map(lambda x: np.empty((*x.shape[:-1], len(time))), state)
-            _put(whole, state, lanes)
-        status[lanes] = part.status
+    store = None if len(time) <= STRETCH else _Store(path, len(time), kept=kept)
+    state: Any = None
+    for first, part in stretches(solver, path, time, progress, threads, store):
+        status[first : first + len(part.time)] = part.status
         faults |= {first + lane: fault for lane, fault in part.faults.items()}
+        state = part.state
+    coordinates, outputs = state if store is None else store.state
     if kept:
-        coordinates, outputs = whole
         return Solved(coordinates, outputs, status, faults)
-    return Solved(lambda: _coordinates(solver, path, time, threads), whole, status, faults)
+    return Solved(lambda: _coordinates(solver, path, time, threads), outputs, status, faults)
+
+
+class _Store:
+    """Arrays for the states of a grid of several stretches; of coordinates, unless kept, for one stretch after another.
+
+    Behind those of a stretch are those of its anchors, which make room for those of the next one.
+    """
+
+    def __init__(self, path: FollowedPath, count: int, *, kept: bool):
+        self._count, self._kept = count, kept
+        rooms = [count if kept else STRETCH, count, STRETCH]
+        states = zip(path.anchors[0].state, rooms, strict=True)
+        self._arrays: Any = tuple(room_for(part, room + len(path.anchors)) for part, room in states)
+
+    def of_stretch(self, first: int) -> Any:
+        """Return the arrays of a stretch, by its first instant."""
+        begins = first if self._kept else 0, first, 0
+        parts = zip(self._arrays, begins, strict=True)
+        return tuple(jax.tree.map(lambda x, begin=begin: x[..., begin:], part) for part, begin in parts)
+
+    @property
+    def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:
+        """Jets of the coordinates, if they are kept, and of the outputs, time last."""
+        coordinates, outputs, _ = jax.tree.map(lambda x: x[..., : self._count], self._arrays)
+        return coordinates, outputs
 
 
 def _coordinates(
@@ -95,8 +114,12 @@ def stretches(
     time: Instants,
     progress: Callable[[int, int], None] | None,
     threads: int,
+    store: _Store | None = None,
 ) -> Iterator[tuple[int, GridSolver]]:
-    """Yield the stretches of a grid one after another, solved, with the index of their first instant."""
+    """Yield the stretches of a grid one after another, solved, with the index of their first instant.
+
+    Their states go into a store, unless each has arrays of its own.
+    """
     for first in range(0, len(time), STRETCH):
 
         def told(done: int, _: int, first: int = first) -> None:
@@ -104,11 +127,7 @@ def stretches(
                 progress(first + done, len(time))
 
         before = time[first - 1] if first else -np.inf
-        part = GridSolver(solver, path, time[first : first + STRETCH], span=time[-1] - time[0])
+        arrays = None if store is None else store.of_stretch(first)
+        part = GridSolver(solver, path, time[first : first + STRETCH], time[-1] - time[0], arrays)
         part.solve(None if progress is None else told, threads, explain=bool(before < path.ended_at))
         yield first, part
-
-
-def _put(whole: Any, part: Any, lanes: slice) -> None:
-    for into, values in zip(jax.tree.leaves(whole), jax.tree.leaves(part), strict=True):
-        into[..., lanes] = values

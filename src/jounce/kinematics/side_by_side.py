@@ -21,6 +21,7 @@ from jounce.kinematics.threads import Threads
 from jounce.native import machine
 from jounce.native.code import MOST_LINES
 from jounce.native.programs import Program, object_file
+from jounce.native.relays import Relay
 from jounce.native.values import UnsupportedOperationError
 from jounce.shapes import is_traced
 
@@ -41,6 +42,12 @@ class Prepared:
             return self.machine_code(self.shared, leaves)
         with Threads(threads, compiled=True) as pool:
             return self.machine_code(self.shared, leaves, threads, pool.map)
+
+    def relay(self, lanes: tuple[Any, Any, Any], results: Any, sources: np.ndarray) -> Relay:
+        """Return what solves instants in rounds, see `Program.relay`; what is None among the results is not wanted."""
+        leaves: Any = [[np.asarray(leaf) for leaf in jax.tree.leaves(group)] for group in lanes]
+        kept = jax.tree.leaves(results, is_leaf=lambda x: x is None)
+        return self.machine_code.relay(self.shared, leaves, kept, sources)
 
     @cached_property
     def name(self) -> str | None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Float, Shaped
+from jaxtyping import Float, Int, Shaped
 
 from jounce.kinematics.advance import LARGEST_GAP, Arrival, SolvedState, predictor
 from jounce.kinematics.instant_program import advance_instant
@@ -16,6 +16,7 @@ from jounce.kinematics.side_by_side import Prepared
 from jounce.kinematics.status import Status
 from jounce.kinematics.wide_batches import CALL_ENTRIES, advance_in_lots, lot_width, lots_in_a_call
 from jounce.mechanism import Model
+from jounce.native.relays import Relay
 
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 LONGEST_LEG = 32  # batches
@@ -71,6 +72,34 @@ class Solver:
         return advance_in_lots(
             self.model.system, *given, settings, np.asarray(lots), pose_type=kind, order=self.order, width=self.width
         )
+
+    def relay(
+        self,
+        store: SolvedState,
+        step: Float[np.ndarray, " time"],
+        instant: Float[np.ndarray, " time"],
+        status: Int[np.ndarray, " time"],
+        sources: Int[np.ndarray, " time"],
+    ) -> Relay:
+        """Return what solves instants of a grid in rounds of machine code; only where solving `is_compiled`.
+
+        Parameters
+        ----------
+        store : tuple
+            Jets of all instants, solved or to be solved, as an `Arrival` has them.
+        step, instant : array of shape (time,)
+            Time from the source, and the time arrived at, s.
+        status : array of int, shape (time,)
+            What comes of each.
+        sources : array of int, shape (time,)
+            From which of the store each instant is predicted.
+        """
+        coordinates, outputs, sign = store
+        nothing: dict[str, Any] = dict.fromkeys(Arrival._fields)
+        wanted = {"coordinates": coordinates, "outputs": outputs, "status": status, "sign": sign}
+        results, native = Arrival(**(nothing | wanted)), self._native
+        assert native is not None
+        return native.relay((self.needed(store), (step, instant), np.zeros(1, bool)), results, sources)
 
     def leg(self, way: Way, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> Leg:
         """Go on along a way with the next instants of a grid, as far as they fit; see `legs.leg`."""

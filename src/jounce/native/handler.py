@@ -28,7 +28,7 @@ def is_known() -> bool:
     return tuple(map(int, found)) == TRIED
 
 
-def handler_text(arguments: int, results: int, first_of_lanes: int | None) -> str:
+def handler_text(arguments: int, results: int, first_of_lanes: int) -> str:
     """Return the text of a function `handle`, which calls `run`.
 
     Parameters
@@ -36,7 +36,7 @@ def handler_text(arguments: int, results: int, first_of_lanes: int | None) -> st
     arguments, results : int
         How many arrays there are.
     first_of_lanes : int
-        The first argument that has lanes, along its last axis; None if none has.
+        The first argument that has lanes, along its last axis.
     """
     major, minor = TRIED
     lines = [
@@ -73,8 +73,6 @@ def handler_text(arguments: int, results: int, first_of_lanes: int | None) -> st
                 f"{at}to = getelementptr ptr, ptr %addresses, i64 {first + k}",
                 f"store ptr {at}data, ptr {at}to",
             ]
-    if first_of_lanes is None:
-        return "\n".join([*lines, "call void @run(ptr %addresses, i64 1)", "ret ptr null", "}"])
     lanes = f"%a{first_of_lanes}"
     lines += [
         f"%rp0 = getelementptr i8, ptr {lanes}, i64 {RANK}",

@@ -2,6 +2,7 @@
 
 import ctypes
 import hashlib
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -13,6 +14,7 @@ from jounce.native.arrays import constants
 from jounce.native.code import MOST_LINES, Code, flat
 from jounce.native.handler import handler_text, is_known
 from jounce.native.machine import MachineCode, compiled, vector_width
+from jounce.native.relays import Column, Relay, relay_text
 from jounce.native.stored import Array, Stored, contiguous, is_large, put, values_of
 from jounce.native.translation import translate
 from jounce.native.values import Region, UnsupportedOperationError, kind_of
@@ -157,6 +159,36 @@ class Program:
             list(each(run, range(parts)))
         return jax.tree.unflatten(self._structure, [x[:count] if self._rows else x[..., :count] for x in found])
 
+    def relay(
+        self,
+        shared: Sequence[np.ndarray],
+        lanes: Sequence[Sequence[np.ndarray]],
+        results: Sequence[np.ndarray | None],
+        sources: np.ndarray,
+    ) -> Relay:
+        """Return what solves instants in rounds, of which later ones start from the results of earlier ones.
+
+        Parameters
+        ----------
+        shared : sequence of array
+            Leaves of what all instants share.
+        lanes : three sequences of array
+            Leaves of the arguments of an instant: those that it takes from its source, those that are its own, and
+            those that all have the same; see `Relay`.
+        results : sequence of array
+            Where the leaves of the results go; None for those that nobody wants.
+        sources : array of int
+            Index of the source of each instant.
+        """
+        if self._rows:
+            raise ValueError("instants are along the first axis")
+        _agree(shared, self._shared)
+        columns = [Column(*kind, x) for kind, x in zip(self._lanes, itertools.chain(*lanes), strict=True)]
+        first, second = itertools.accumulate(map(len, lanes[:2]))
+        kept = [Column(*kind, x) for kind, x in zip(self._results, results, strict=True)]
+        groups = columns[:first], columns[first:second], columns[second:], kept
+        return Relay(self._run.relay, shared, *groups, sources, self._width)
+
     def register(self) -> bool:
         """Make it known to XLA by its name, for `in_program`; tell whether that goes."""
         if self._rows or not is_known():
@@ -174,11 +206,16 @@ class Program:
         return jax.tree.unflatten(self._structure, jax.ffi.ffi_call(self.name, shapes)(*shared, *lanes))
 
     def _check(self, shared: Sequence[Any], lanes: Sequence[Any], count: int) -> None:
-        """Raise ValueError unless arrays are of the shapes and types that the machine code reads."""
+        """Raise ValueError unless arrays of so many instants are of the shapes and types that the code reads."""
         many = [((count, *shape) if self._rows else (*shape, count), dtype) for shape, dtype in self._lanes]
-        wanted, found = [*self._shared, *many], [(x.shape, x.dtype) for x in (*shared, *lanes)]
-        if found != wanted:
-            raise ValueError(f"arrays of {found}, where the program was made for {wanted}")
+        _agree([*shared, *lanes], [*self._shared, *many])
+
+
+def _agree(arrays: Sequence[Any], wanted: Sequence[tuple[tuple[int, ...], Any]]) -> None:
+    """Raise ValueError unless arrays are of the shapes and types wanted."""
+    found = [(x.shape, x.dtype) for x in arrays]
+    if found != wanted:
+        raise ValueError(f"arrays of {found}, where the program was made for {wanted}")
 
 
 def _filled(x: np.ndarray, total: int, axis: int) -> np.ndarray:
@@ -256,7 +293,8 @@ def _text(
     ]
     for name, count in sorted(code.functions):
         lines += [f"declare double @{name}({', '.join(['double'] * count)}) #0", _lane_by_lane(name, count, width)]
-    lines.append(handler_text(len(given), len(results), None if alone else shared))
+    if not alone:
+        lines += [handler_text(len(given), len(results), shared), relay_text(width)]
     return "\n".join([*lines, ATTRIBUTES])
 
 

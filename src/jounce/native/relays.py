@@ -1,0 +1,233 @@
+"""A function of one instant run for many in rounds, of which later ones start from what earlier ones have found.
+
+A round is as many instants as a vector has lanes. The machine code copies what they need from wherever their sources
+are in arrays of the caller, solves them, and copies what it finds to where they are themselves: no call, and no array,
+for each round, and Python's lock is not held for any of them.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Int
+
+LINE = 64  # bytes of the cache's lines, at which vectors begin
+ENTRY = 8  # bytes of a number that is copied
+
+
+class Column(NamedTuple):
+    """An argument or a result of an instant, and the array of those of all instants, time last.
+
+    None where a result is not wanted.
+    """
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    whole: np.ndarray | None
+
+    def addresses(self, least: int) -> list[int]:
+        """Return where each number of the first instant is, in an array of so many instants at least.
+
+        Raises
+        ------
+        ValueError
+            If the array is not one that the machine code can read.
+        """
+        whole: Any = self.whole
+        found = whole.shape[:-1], whole.dtype, whole.dtype.itemsize, whole.strides[-1]
+        if found != (self.shape, self.dtype, ENTRY, ENTRY) or whole.shape[-1] < least:
+            raise ValueError(
+                f"an array of {whole.dtype}{whole.shape}, for {self.dtype}{self.shape} of {least} instants"
+            )
+        places = [_address(whole)]
+        for size, step in zip(whole.shape[:-1], whole.strides[:-1], strict=True):
+            places = [place + k * step for place in places for k in range(size)]
+        return places
+
+    def room(self, width: int) -> int:
+        """Return how many bytes the numbers of a round take, in whole lines of the cache."""
+        return -(-math.prod(self.shape) * width * self.dtype.itemsize // LINE) * LINE
+
+
+def relay_text(width: int) -> str:
+    """Return the text of a function `relay`, which calls `run` for one round after another.
+
+    Its arguments: the addresses for `run`; pairs of addresses, of a number of the first instant and of that of the
+    first lane, in the order in which they are copied; how many of these are read at sources, read at targets, and
+    written at targets; the sources of all instants, the targets of all rounds, and how many rounds there are.
+
+    Parameters
+    ----------
+    width : int
+        Lanes of a vector.
+    """
+    lines = [
+        "define void @relay(ptr %addresses, ptr %pairs, i64 %linked, i64 %own, i64 %kept, "
+        "ptr %sources, ptr %targets, i64 %rounds) #1 {",
+        "start:",
+        "%begun = icmp sgt i64 %rounds, 0",
+        "br i1 %begun, label %round, label %end",
+        "round:",
+        "%turn = phi i64 [0, %start], [%following, %written]",
+        f"%first = mul i64 %turn, {width}",
+        "%here = getelementptr i64, ptr %targets, i64 %first",
+    ]
+    for lane in range(width):
+        lines += [
+            f"%place{lane} = getelementptr i64, ptr %here, i64 {lane}",
+            f"%target{lane} = load i64, ptr %place{lane}",
+            f"%from{lane} = getelementptr i64, ptr %sources, i64 %target{lane}",
+            f"%source{lane} = load i64, ptr %from{lane}",
+        ]
+    lines += [
+        "%owns = add i64 %linked, %own",
+        "%ends = add i64 %owns, %kept",
+        "br label %at_source",
+        *_copies("at_source", ("round", "0", "%linked"), "at_target", _gathered("at_source", "source", width)),
+        *_copies("at_target", ("at_source", "%linked", "%owns"), "solve", _gathered("at_target", "target", width)),
+        "solve:",
+        f"call void @run(ptr %addresses, i64 {width})",
+        "br label %found",
+        *_copies("found", ("solve", "%owns", "%ends"), "written", _scattered("found", width)),
+        "written:",
+        "%following = add i64 %turn, 1",
+        "%more = icmp slt i64 %following, %rounds",
+        "br i1 %more, label %round, label %end",
+        "end:",
+        "ret void",
+        "}",
+    ]
+    return "\n".join(lines)
+
+
+def _copies(name: str, span: tuple[str, str, str], after: str, copy: Sequence[str]) -> list[str]:
+    """Return a loop over pairs; their span is the block before the loop, the first of them and where they end."""
+    before, first, stop = span
+    return [
+        f"{name}:",
+        f"%{name}_pair = phi i64 [{first}, %{before}], [%{name}_next, %{name}_copy]",
+        f"%{name}_left = icmp slt i64 %{name}_pair, {stop}",
+        f"br i1 %{name}_left, label %{name}_copy, label %{after}",
+        f"{name}_copy:",
+        f"%{name}_at = getelementptr {{ptr, ptr}}, ptr %pairs, i64 %{name}_pair",
+        f"%{name}_whole = load ptr, ptr %{name}_at",
+        f"%{name}_beside = getelementptr ptr, ptr %{name}_at, i64 1",
+        f"%{name}_round = load ptr, ptr %{name}_beside",
+        *copy,
+        f"%{name}_next = add i64 %{name}_pair, 1",
+        f"br label %{name}",
+    ]
+
+
+def _gathered(name: str, index: str, width: int) -> list[str]:
+    """Return what copies a number of some instants to where those of a round are side by side."""
+    of, lines, vector = f"<{width} x i64>", [], "poison"
+    for lane in range(width):
+        at = f"%{name}_{lane}"
+        lines += [
+            f"{at}p = getelementptr i64, ptr %{name}_whole, i64 %{index}{lane}",
+            f"{at}v = load i64, ptr {at}p",
+            f"{at}w = insertelement {of} {vector}, i64 {at}v, i64 {lane}",
+        ]
+        vector = f"{at}w"
+    return [*lines, f"store {of} {vector}, ptr %{name}_round, align 8"]
+
+
+def _scattered(name: str, width: int) -> list[str]:
+    """Return what copies a number of the instants of a round to where each of them is."""
+    of = f"<{width} x i64>"
+    lines = [f"%{name}_all = load {of}, ptr %{name}_round, align 8"]
+    for lane in range(width):
+        at = f"%{name}_{lane}"
+        lines += [
+            f"{at}v = extractelement {of} %{name}_all, i64 {lane}",
+            f"{at}p = getelementptr i64, ptr %{name}_whole, i64 %target{lane}",
+            f"store i64 {at}v, ptr {at}p",
+        ]
+    return lines
+
+
+class Relay:
+    """Machine code that solves instants in rounds, straight from and into arrays of all of them.
+
+    Parameters
+    ----------
+    run : callable
+        The function `relay` of machine code.
+    shared : sequence of array
+        What all instants share.
+    linked, own, held, results : sequence of Column
+        The arguments of an instant in their order: those that it takes from its source, those that are its own, and
+        those that all have the same, from arrays of one instant; and the results.
+    sources : array of shape (time,)
+        Index of the source of each instant.
+    width : int
+        Lanes of a vector.
+
+    Raises
+    ------
+    ValueError
+        If the machine code would read or write what does not belong to the arrays.
+    """
+
+    def __init__(
+        self,
+        run: Callable[..., None],
+        shared: Sequence[np.ndarray],
+        linked: Sequence[Column],
+        own: Sequence[Column],
+        held: Sequence[Column],
+        results: Sequence[Column],
+        sources: Int[np.ndarray, " time"],
+        width: int,
+    ):
+        if sources.dtype != np.int64 or sources.min(initial=0) < 0:
+            raise ValueError("sources that are no indices")
+        columns = [*linked, *own, *held, *results]
+        self._run, self.width, self._sources = run, width, np.ascontiguousarray(sources)
+        self._arrays = [np.ascontiguousarray(x) for x in shared], columns  # kept, since addresses do not keep them
+        self._common = np.array([_address(x) for x in self._arrays[0]], np.int64)
+        ends = np.cumsum([0, *(column.room(width) for column in columns)])
+        self._begins, self._blank = ends[:-1], np.zeros(ends[-1], np.uint8)
+        begins = iter(self._begins.tolist())
+        at_source = _pairs(linked, begins, width, int(sources.max(initial=-1)) + 1)
+        at_target = _pairs(own, begins, width, len(sources))
+        for column, begin in zip(held, begins, strict=False):
+            numbers = np.repeat(np.asarray(column.whole, column.dtype).reshape(*column.shape, 1), width, axis=-1)
+            self._blank[begin : begin + numbers.nbytes] = numbers.ravel().view(np.uint8)
+        found = _pairs(results, begins, width, len(sources))
+        self._counts = len(at_source), len(at_target), len(found)
+        self._pairs = np.array([*at_source, *at_target, *found], np.int64).reshape(-1, 2)
+
+    def __call__(self, targets: Int[np.ndarray, "round lane"]) -> None:
+        """Solve instants by their indices; in several threads at once, if they have none of them in common.
+
+        The lanes of a round depend on none of the same round; sources are solved, or are in an earlier one.
+        """
+        count, width = len(self._sources), self.width
+        within = targets.min(initial=0) >= 0 and targets.max(initial=-1) < count
+        if targets.dtype != np.int64 or targets.shape[1:] != (width,) or not within:
+            raise ValueError(f"targets that are not {width} indices below {count} for each round")
+        targets = np.ascontiguousarray(targets)
+        room = np.empty(len(self._blank) + LINE, np.uint8)  # of its own for each call, and so for each thread
+        first = -_address(room) % LINE
+        room[first : first + len(self._blank)] = self._blank
+        start = _address(room) + first
+        addresses, pairs = np.concatenate([self._common, start + self._begins]), self._pairs + np.array([0, start])
+        indices = _address(self._sources), _address(targets)
+        self._run(_address(addresses), _address(pairs), *self._counts, *indices, len(targets))
+
+
+def _pairs(columns: Sequence[Column], begins: Iterator[int], width: int, least: int) -> list[tuple[int, int]]:
+    """Return the address of each number of the first of `least` instants, and where those of a round begin."""
+    found: list[tuple[int, int]] = []
+    for column, begin in zip(columns, begins, strict=False):
+        if column.whole is not None:
+            found += zip(column.addresses(least), itertools.count(begin, width * ENTRY), strict=False)
+    return found
+
+
+def _address(array: np.ndarray) -> int:
+    return array.ctypes.data
