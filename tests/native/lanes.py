@@ -7,14 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jounce.native import machine, programs
-from jounce.native.code import MOST_LINES
+from jounce.native import machine, modules, programs
+from jounce.native.scalars import MOST_LINES
 
 llvm = pytest.importorskip("llvmlite.binding", reason="the compiler is an extra")
 
-import os
-LARGE = int(os.environ["LARGE"]) if "LARGE" in os.environ else None
 COUNT = 17  # two whole vectors and a rest
+FEW = 3  # numbers of an array that is a single value each
 SPECIAL = np.array(
     [np.nan, np.inf, -np.inf, 0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 2.5, -2.5, 1e300, -1e300, 3.0, 1e-300, 1.5, -3.7]
 )
@@ -39,15 +38,18 @@ def verified(text):
     return machine.compiled(text)
 
 
-def compiled(function, lanes, shared=(), known=(), width=8, most_lines=MOST_LINES):
+def compiled(function, lanes, shared=(), known=(), width=8, most_lines=MOST_LINES, large=None):
     """Return what runs a function of one instant for many, by machine code for vectors of `width` lanes."""
     one = [jax.ShapeDtypeStruct((*x.shape[:-1], 1), x.dtype) for x in lanes]
     kinds = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in shared]
     whole_function = lambda shared, lanes: function(*shared, *lanes)  # noqa: E731
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(modules, "vector_width", lambda: width)
         patch.setattr(programs, "vector_width", lambda: width)
-        patch.setattr(programs, "compiled", verified)
-        binary = programs.object_file(whole_function, kinds, one, {k: shared[k] for k in known}, most_lines=most_lines, large=LARGE)
+        patch.setattr(modules, "compiled", verified)
+        binary = modules.object_file(
+            whole_function, kinds, one, {k: shared[k] for k in known}, most_lines=most_lines, large=large
+        )
         return programs.Program(binary, (kinds, one), jax.eval_shape(whole_function, kinds, one))
 
 
@@ -73,30 +75,32 @@ def assert_same(actual, expected, rtol=1e-13, names="", signs=True):
 
 
 def assert_agree(function, *lanes, shared=(), known=(), width=8, counts=(COUNT,), rtol=1e-13, signs=True):
-    """Compare machine code with JAX for the first lanes of some numbers of them."""
-    if "ALONE" in os.environ:
-        alone_agrees(function, lanes, shared, known, width, rtol, signs)
-        return
-    program = compiled(function, lanes, shared, known, width)
+    """Compare machine code with JAX for the first lanes of some numbers of them: arrays as values, and in memory."""
     expected = one_by_one(function, lanes, shared)
-    for count in counts:
-        first = (..., slice(count))
-        actual = program(shared, [x[first] for x in lanes])
-        assert_same(actual, jax.tree.map(operator.itemgetter(first), expected), rtol, f"{count} lanes: ", signs)
+    for large in (None, FEW):
+        program = compiled(function, lanes, shared, known, width, large=large)
+        for count in counts:
+            first = (..., slice(count))
+            actual = program(shared, [x[first] for x in lanes])
+            names = f"{count} lanes, {large}: "
+            assert_same(actual, jax.tree.map(operator.itemgetter(first), expected), rtol, names, signs)
+    assert_agree_alone(function, lanes, shared, expected, width, rtol, signs)
 
 
-def alone_agrees(function, lanes, shared, known, width, rtol, signs):
-    one = [np.ascontiguousarray(x[..., :1]) for x in lanes]
-    given = ([*shared], one)
-    whole_function = lambda given, _: function(*given[0], *given[1])  # noqa: E731
+def assert_agree_alone(function, lanes, shared, expected, width, rtol, signs):
+    """Compare machine code for one instant alone with JAX, for some of the lanes."""
+
+    def of_one(given, _):
+        return function(*given[0], *given[1])
+
+    places = range(0, lanes[0].shape[-1], 4)
+    each = [([*shared], [np.ascontiguousarray(x[..., k : k + 1]) for x in lanes]) for k in places]
+    kinds = jax.tree.map(lambda x: jax.ShapeDtypeStruct(np.shape(x), np.asarray(x).dtype), each[0])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(programs, "vector_width", lambda: width)
-        patch.setattr(programs, "compiled", verified)
-        binary = programs.object_file(
-            whole_function, given, (), {k: shared[k] for k in known}, large=LARGE, alone=True
-        )
-    program = programs.Single(binary, given, jax.eval_shape(whole_function, given, ()))
-    expected = one_by_one(function, lanes, shared)
-    for k in range(0, COUNT, 4):
-        leaves = [np.asarray(x) for x in [*shared, *(x[..., k : k + 1] for x in lanes)]]
-        assert_same(program(leaves), jax.tree.map(lambda x, k=k: x[..., k : k + 1], expected), rtol, f"{k}: ", signs)
+        patch.setattr(modules, "vector_width", lambda: width)
+        patch.setattr(modules, "compiled", verified)
+        binary = modules.object_file(of_one, kinds, (), {}, large=FEW, alone=True)
+    program = programs.Single(binary, kinds, jax.eval_shape(of_one, kinds, ()))
+    for k, given in zip(places, each, strict=True):
+        actual = program([np.asarray(x) for x in jax.tree.leaves(given)])
+        assert_same(actual, jax.tree.map(lambda x, k=k: x[..., k : k + 1], expected), rtol, f"lane {k}: ", signs)

@@ -151,9 +151,9 @@ def test_clamp():
 
 
 def test_a_thing_found_twice_is_written_once():
-    import jounce.native.programs as programs
+    import jounce.native.modules as modules
 
     closed = jax.make_jaxpr(lambda x: (jnp.sin(x) * x + 1.0, x * jnp.sin(x), jnp.sin(x * 1.0)))(np.ones(1))
-    text = programs._text(closed, 0, {}, 8)
+    text = modules._text(closed, 0, {}, 8)
     assert text.count("call <8 x double> @sin_of_lanes") == 1
     assert text.count("fmul") == 1

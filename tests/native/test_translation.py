@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from jax import lax
 
-from jounce.native import code, programs, translation
+from jounce.native import code, modules, translation
 from jounce.native.values import UnsupportedOperationError
 from tests.native.lanes import COUNT, TRUTH, assert_agree, assert_same, compiled, one_by_one, ordinary, whole
 
@@ -372,7 +372,7 @@ def test_what_there_is_no_code_for_is_refused(name):
 
 
 def test_what_is_too_long_or_takes_too_much_memory_is_refused(monkeypatch):
-    monkeypatch.setattr(programs, "MOST_MEMORY", 10_000)
+    monkeypatch.setattr(modules, "MOST_MEMORY", 10_000)
     for run in (
         lambda x: jnp.sin(jnp.arange(1.0, 2000.0) * x).sum()[None],
         lambda x: (jnp.sin(jnp.arange(50.0)[:, None] * x[0]) @ jnp.ones((1, 50))).sum()[None],

@@ -19,7 +19,8 @@ from jounce.kinematics.device import on_processor
 from jounce.kinematics.store import current_store, made_or_kept
 from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
 from jounce.native import machine
-from jounce.native.programs import Single, object_file
+from jounce.native.modules import object_file
+from jounce.native.programs import Single
 from jounce.native.values import UnsupportedOperationError
 
 VARIABLE = "JOUNCE_NATIVE"  # 0 leaves everything to XLA

@@ -26,7 +26,6 @@ from jounce.kinematics.store import Store, current_store
 from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
 from jounce.mechanism.preconditions import check_process
 
-
 _thread = threading.local()
 
 

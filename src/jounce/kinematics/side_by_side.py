@@ -19,9 +19,10 @@ from jounce.kinematics.store import current_store, made_or_kept
 from jounce.kinematics.structure import UndescribedError, program_key, settings
 from jounce.kinematics.threads import Threads
 from jounce.native import machine
-from jounce.native.code import MOST_LINES
-from jounce.native.programs import Program, object_file
+from jounce.native.modules import object_file
+from jounce.native.programs import Program
 from jounce.native.relays import Relay
+from jounce.native.scalars import MOST_LINES
 from jounce.native.values import UnsupportedOperationError
 from jounce.shapes import is_traced
 

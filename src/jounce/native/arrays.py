@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from jounce.native.code import MOST_LINES, Code, flat
+from jounce.native.code import Code, flat
+from jounce.native.scalars import MOST_LINES
 from jounce.native.values import Region, UnsupportedOperationError, Value
 
 Values = np.ndarray  # of objects, each a Value

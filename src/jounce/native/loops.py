@@ -1,12 +1,10 @@
 """JAX's operations on arrays that stay in memory: views where numbers keep their places, and loops elsewhere."""
 
 import itertools
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 from jax.lax import GatherScatterMode
 
 from jounce.native.arrays import Values, filled
@@ -19,7 +17,6 @@ from jounce.native.stored import (
     Stored,
     at,
     between,
-    contiguous,
     copied,
     counted,
     further,
@@ -229,7 +226,10 @@ def _dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
         [axis for axis in range(x.ndim) if axis not in (*batch, *summed)]
         for x, batch, summed in ((left, left_batch, left_sum), (right, right_batch, right_sum))
     )
-    left, right = transposed(left, (*left_batch, *left_free, *left_sum)), transposed(right, (*right_batch, *right_free, *right_sum))
+    left, right = (
+        transposed(left, (*left_batch, *left_free, *left_sum)),
+        transposed(right, (*right_batch, *right_free, *right_sum)),
+    )
     batch, summed = len(left_batch), len(left_sum)
     shape = (*found.shape, *left.shape[left.ndim - summed :])
     after, end = batch + len(left_free), len(shape) - summed
@@ -249,7 +249,13 @@ def _dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
 
 
 def _placed(
-    code: Code, p: Any, array: Stored, rows: Stored, numbers: Mapping[int, int], sizes: Sequence[int], batch: Sequence[int | Value]
+    code: Code,
+    p: Any,
+    array: Stored,
+    rows: Stored,
+    numbers: Mapping[int, int],
+    sizes: Sequence[int],
+    batch: Sequence[int | Value],
 ) -> tuple[int | Value, Value]:
     """Return the place of the first number of a window, moved into the array, and whether it was there already.
 
@@ -295,7 +301,11 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
     found = new(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
     offsets = list(numbers.offset_dims)
     batch = [axis for axis in range(found.ndim) if axis not in offsets]
-    taken = [axis for axis in range(array.ndim) if axis not in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims)]
+    taken = [
+        axis
+        for axis in range(array.ndim)
+        if axis not in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims)
+    ]
     sizes, named = p["slice_sizes"], {axis: k for k, axis in enumerate(numbers.start_index_map)}
     beyond = stored(code, filled((), [code.constant(filler(p, aval.dtype), found.kind)]))
 
@@ -338,7 +348,9 @@ def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
     windows = list(numbers.update_window_dims)
     batch = [axis for axis in range(updates.ndim) if axis not in windows]
     kept = [
-        axis for axis in range(found.ndim) if axis not in (*numbers.inserted_window_dims, *numbers.operand_batching_dims)
+        axis
+        for axis in range(found.ndim)
+        if axis not in (*numbers.inserted_window_dims, *numbers.operand_batching_dims)
     ]
     sizes = [1] * found.ndim
     for axis, of in zip(kept, windows, strict=True):

@@ -310,7 +310,11 @@ def nest(code: Code, given: Sequence[Stored], found: Sequence[Stored], body: Bod
             def last(k: int | Value) -> None:
                 start = further(code, 0, k, width)
                 most = size - width
-                start = min(start, most) if isinstance(start, int) else code.arithmetic("min", start, code.constant(most, "l"))
+                start = (
+                    min(start, most)
+                    if isinstance(start, int)
+                    else code.arithmetic("min", start, code.constant(most, "l"))
+                )
                 visit(start, True)
 
             counted(code, whole + 1, last)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from jax.extend.core import Literal, jaxprs_in_params
 
-from jounce.native.arrays import Values, constants, each, filled
+from jounce.native.arrays import constants, each, filled
 from jounce.native.code import Code, flat
 from jounce.native.loops import STORED
 from jounce.native.operations import RULES
@@ -163,9 +163,7 @@ class _Carried:
     def store(self, arrays: Sequence[Array]) -> None:
         """Change the arrays: where a number is what was there when it was loaded, there is nothing to do."""
         targets = [contiguous(region, shape) for region, shape in zip(self.regions, self.shapes, strict=True)]
-        changing = {
-            target.region for target, array in zip(targets, arrays, strict=True) if not target.is_same(array)
-        }
+        changing = {target.region for target, array in zip(targets, arrays, strict=True) if not target.is_same(array)}
         apart = [  # what is a part of an array that changes is read before
             copied(self.code, array)
             if isinstance(array, Stored) and array.region in changing and not target.is_same(array)
@@ -384,7 +382,10 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
             begin, end = code.label(), code.label()
             code.branch(code.anywhere(here), begin, end)
             code.begin(begin)
-            with code.scope(here if here.lanes else None), code.used(_among(inputs if k < len(ways) - 1 or here.lanes else [])):
+            with (
+                code.scope(here if here.lanes else None),
+                code.used(_among(inputs if k < len(ways) - 1 or here.lanes else [])),
+            ):
                 made = _closed(code, way, inputs)
                 found = _in_lanes(made, found)
                 if which.lanes and k > 0:
