@@ -100,10 +100,19 @@ class SideBySide:
         """How many programs were wanted, those that there is no code for included."""
         return len(self._programs)
 
-    def program(self, shared: Any, lanes: Any, **static: Any) -> Prepared | None:
+    def program(self, shared: Any, lanes: Any, *, large: int | None = None, **static: Any) -> Prepared | None:
         """Return its machine code; None where there is none: no compiler, or no code for what it does.
 
         Whole numbers among what is shared, which say what is joined to what, are part of the program.
+
+        Parameters
+        ----------
+        shared, lanes : pytree
+            Of arrays, as the function has them.
+        large : int, optional
+            Arrays of more numbers are in memory, as `object_file` has it.
+        **static
+            Further arguments of the function.
         """
         if not is_wanted() or is_traced((shared, lanes)):
             return None
@@ -114,10 +123,10 @@ class SideBySide:
         places = {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
         kinds = tuple((x.shape, x.dtype.str) for x in (*arrays, *jax.tree.leaves(one)))
         known = tuple(x.tobytes() for x in places.values())
-        key = structure, jax.tree.structure(one), kinds, known, tuple(static.items()), settings()
+        key = structure, jax.tree.structure(one), kinds, known, large, tuple(static.items()), settings()
         with self._lock:
             if key not in self._programs:
-                self._programs[key] = self._made((shapes, one), places, static)
+                self._programs[key] = self._made((shapes, one), places, large, static)
             program = self._programs[key]
         return None if program is None else Prepared(program, arrays)
 
@@ -126,25 +135,25 @@ class SideBySide:
         return (*(shape[1:] if self.rows else shape[:-1]), 1)
 
     def _made(
-        self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: Mapping[str, Any]
+        self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], large: int | None, static: dict[str, Any]
     ) -> Program | None:
         """Return a program from the store of programs, or one that is made."""
-        function = partial(self.function, **static)
+        function, options = partial(self.function, **static), {"most_lines": self.most_lines, "large": large}
 
         def make() -> tuple[Any, ...]:
             try:
-                binary = object_file(function, *given, places, rows=self.rows, most_lines=self.most_lines)
+                binary = object_file(function, *given, places, rows=self.rows, **options)
             except UnsupportedOperationError:  # which is kept, too: to find it out takes long
                 return b"", None, None
             return binary, tuple(map(jax.tree.leaves, given)), jax.eval_shape(function, *given)
 
-        key = self._key(given, places, static) if current_store() is not None else None
+        key = self._key(given, places, static | {"large": large}) if current_store() is not None else None
         return made_or_kept(key, make, self._loaded)
 
     def _loaded(self, binary: bytes, given: Any, results: Any) -> Program | None:
         return Program(binary, given, results, rows=self.rows) if binary else None
 
-    def _key(self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: Mapping[str, Any]) -> str | None:
+    def _key(self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: dict[str, Any]) -> str | None:
         """Return the name of a program in other processes, None where it holds something of a user's own."""
         leaves, tree = jax.tree.flatten(given)
         kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *places.values(), machine.processor()]

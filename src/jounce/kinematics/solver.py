@@ -22,6 +22,8 @@ SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one
 LONGEST_LEG = 32  # batches
 LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
 FEWEST_SIDE_BY_SIDE, MOST_SIDE_BY_SIDE = 64, 1024  # instants of a long grid in a call of machine code
+MOST_COLUMNS = 120  # of a Jacobian: of more, machine code of single values is too long
+LARGE = 64  # numbers of an array that stays in memory there
 NO_GRID = np.empty(0)
 
 
@@ -146,7 +148,9 @@ class Solver:
         outputs = tuple(np.zeros((self.order + 1, 1, group.instances, 1)) for group in system.outputs)
         instants = self.needed((still, outputs, nothing)), nothing, nothing, np.zeros(1, bool)
         kind = self.model.pose_type
-        return advance_instant.program((system, tolerance, refine, wanted), instants, pose_type=kind, order=self.order)
+        large = None if system.shape[1] <= MOST_COLUMNS else LARGE
+        shared = system, tolerance, refine, wanted
+        return advance_instant.program(shared, instants, large=large, pose_type=kind, order=self.order)
 
     @cached_property
     def _batches(self) -> int:

@@ -56,20 +56,26 @@ def reduction(operation: str) -> Rule:
 
 def extreme(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
     """Return where the largest or smallest number along an axis is, the first of equals; NaN before all."""
-    (axis,), word = equation.params["axes"], "gt" if equation.primitive.name == "argmax" else "lt"
+    (axis,) = equation.params["axes"]
     kind, rows = kind_of(equation.params["index_dtype"]), np.moveaxis(given[0], axis, -1)
     found = np.empty(rows.shape[:-1], object)
     for place in np.ndindex(found.shape):
         best, at = rows[place][0], code.constant(0, kind)
         for k, value in enumerate(flat(rows[place])[1:], 1):
-            better = code.compare(word, value, best)
-            if value.kind == "f":
-                nan, known = code.compare("ne", value, value), code.compare("eq", best, best)
-                better = code.logic("or", better, code.logic("and", nan, known))
+            better = is_better(code, equation.primitive.name, value, best)
             best = code.select(better, value, best)
             at = code.select(better, code.constant(k, kind), at)
         found[place] = at
     return [found]
+
+
+def is_better(code: Code, operation: str, value: Value, best: Value) -> Value:
+    """Tell whether a number is rather what `argmax` or `argmin` looks for than the best before: NaN before all."""
+    better = code.compare("gt" if operation == "argmax" else "lt", value, best)
+    if value.kind != "f":
+        return better
+    nan, known = code.compare("ne", value, value), code.compare("eq", best, best)
+    return code.logic("or", better, code.logic("and", nan, known))
 
 
 def cumulative(operation: str) -> Rule:

@@ -8,7 +8,7 @@ from typing import Any
 from jax.lax import GatherScatterMode
 
 from jounce.native.arrays import Values, filled
-from jounce.native.axes import combination, nothing
+from jounce.native.axes import combination, is_better, nothing
 from jounce.native.code import Code, flat
 from jounce.native.operations import ELEMENTWISE, RULES
 from jounce.native.places import filler, within
@@ -215,6 +215,32 @@ def _reduction(operation: str) -> StoredRule:
     return rule
 
 
+def _extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Return where the largest or smallest number along an axis is, the first of equals; NaN before all."""
+    array, found, word = stored(code, given[0]), _made(code, equation, given), equation.primitive.name
+    (axis,) = map(int, equation.params["axes"])
+    rows = transposed(array, [k for k in range(array.ndim) if k != axis] + [axis])
+    best = new(code, found.shape, array.kind, lanes=array.lanes)
+    first = between(code, rows, rows.ndim - 1, 0, 1)
+    put(code, best, replace(first, shape=first.shape[:-1], strides=first.strides[:-1]))
+    put(code, found, stored(code, np.broadcast_to(filled((), [code.constant(0, found.kind)]), found.shape)))
+
+    def look(k: int | Value) -> None:
+        index = code.converted(k, found.kind) if isinstance(k, Value) else code.constant(k, found.kind)
+        part = between(code, rows, rows.ndim - 1, k, 1)
+        part = replace(part, shape=part.shape[:-1], strides=part.strides[:-1])
+
+        def body(values: Sequence[Value]) -> Sequence[Value]:
+            value, largest, place = values
+            better = is_better(code, word, value, largest)
+            return code.select(better, value, largest), code.select(better, index, place)
+
+        nest(code, [part, best, found], [best, found], body, adds=True)
+
+    counted(code, rows.shape[-1], look)
+    return [found]
+
+
 def _dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Return products of matrices: sums of products over some axes, for each place along those that are joined."""
     (left_sum, right_sum), (left_batch, right_batch) = equation.params["dimension_numbers"]
@@ -387,6 +413,8 @@ STORED: Mapping[str, StoredRule] = {
     "reduce_min": _reduction("min"),
     "reduce_and": _reduction("and"),
     "reduce_or": _reduction("or"),
+    "argmax": _extreme,
+    "argmin": _extreme,
     "dot_general": _dot,
     "slice": _part,
     "broadcast_in_dim": _broadcast,

@@ -196,6 +196,10 @@ def stored(code: Code, array: Array) -> Stored:
     part = array[(*(slice(0, 1) if r else slice(None) for r in repeated), ...)]
     values = flat(part)
     if all(value.constant is not None for value in values):
+        table = np.array([value.constant for value in values])
+        if len(values) > 1 and len({number.tobytes() for number in table}) == 1:
+            one = contiguous(code.constants_region(table[:1], values[0].kind), ())
+            return spread(one, array.shape, ())
         region, first = code.constants_region([v.constant for v in values], values[0].kind), 0
     else:
         region, first = in_memory(code, values)
@@ -222,6 +226,8 @@ def put(code: Code, target: Stored, array: Array) -> None:
     """Write an array where another one is, which it does not overlap."""
     if not target.size:
         return
+    if not isinstance(array, Stored) and is_large(code, array):
+        array = stored(code, array)
     if isinstance(array, Stored):
         nest(code, [array], [target], lambda values: values)
         return

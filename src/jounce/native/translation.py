@@ -171,7 +171,7 @@ class _Carried:
             for target, array in zip(targets, arrays, strict=True)
         ]
         for target, array in zip(targets, apart, strict=True):
-            if isinstance(array, Stored):
+            if isinstance(array, Stored) or is_large(self.code, array):
                 if not target.is_same(array):
                     put(self.code, target, array)
                 continue
