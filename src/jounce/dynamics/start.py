@@ -2,7 +2,7 @@
 
 import dataclasses
 from functools import cached_property
-from typing import Any
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -92,7 +92,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
         whole, coordinates = _assembled(model, instant)
         model = released(model)
         driven = equations_of(mechanism, whole, masses)
-        state = _set_in_motion(driven, whole, coordinates, instant)
+        state = _set_in_motion(driven, whole, coordinates, instant).state
         _check_rates(driven, whole, state, instant)
         system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
         model = dataclasses.replace(
@@ -101,10 +101,10 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     model, coordinates = assemble(model, instant, TOLERANCE, free=True)
     equations = resident(equations_of(mechanism, model, masses))
     if state is None:
-        state = _set_in_motion(equations, model, coordinates, instant)
+        begun = _set_in_motion(equations, model, coordinates, instant)
     else:
-        state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
-    jacobian = _checked_jacobian(equations, model, state, instant)
+        begun = _begun(equations, state, instant)
+    state, jacobian = begun.state, _checked_jacobian(equations, model, begun, instant)
     _check_rates(equations, model, state, instant)
     return ConsistentStart(model, equations, state, jacobian)
 
@@ -158,11 +158,26 @@ def with_rates(equations: Equations, state: State, time: Instants) -> State:
     return _moving(equations, state, time)
 
 
+class _Begun(NamedTuple):
+    """What is to be known of a state before a mechanism starts from it; arrays of NumPy once it was computed."""
+
+    state: State  # with velocities
+    rates: Float[Numbers, "row 1"]  # of all rows, before velocities were changed
+    turning: Float[Numbers, "attitude body 1"]  # how the attitude moves
+    matrix: Float[Numbers, "size size"]  # of the equations of motion
+    entries: Float[Numbers, " entry"]  # of the Jacobian
+
+
 @compiled(narrow=True)
-def _with_rates_told(equations: Equations, state: State, time: Instants) -> tuple[State, Any, Any]:
-    """Return the state of bodies at rest with velocities, what rates they fulfil, and how the attitude moves."""
-    moving = _moving(equations, state, time)
-    return moving, _row_rates(equations, state, time), equations.attitude_rate(moving)
+def _beginning(equations: Equations, state: State, time: Instants) -> _Begun:
+    moving, pose = _moving(equations, state, time), equations.still(state.position, state.attitude)
+    matrix, entries = equations.matrix(state, time)[..., 0], equations.system.entries(pose, Jet([time]))[..., 0]
+    return _Begun(moving, _row_rates(equations, state, time), equations.attitude_rate(moving), matrix, entries)
+
+
+def _begun(equations: Equations, state: State, instant: float) -> _Begun:
+    """Return a state with the least change of its velocities that fulfils the rates of all constraints."""
+    return jax.tree.map(np.asarray, _beginning(equations, state, np.array([[instant]])))
 
 
 def _moving(equations: Equations, state: State, time: Instants) -> State:
@@ -171,24 +186,24 @@ def _moving(equations: Equations, state: State, time: Instants) -> State:
     return jax.lax.fori_loop(0, 2, lambda _, moving: equations.with_rates(factor, moving, time), state)
 
 
-def _set_in_motion(equations: Equations, model: Model, coordinates: dict[str, np.ndarray], instant: float) -> State:
+def _set_in_motion(equations: Equations, model: Model, coordinates: dict[str, np.ndarray], instant: float) -> _Begun:
     """Return the assembled bodies with the velocities that laws prescribe, or raise where rounding would decide them.
 
     At a limit position, such as an arm stretched out, a residual changes with the square of a displacement: what
     rounding leaves of it hides a place 1e-8 away, at which the velocities are others, and finite.
     """
-    still, time = at_rest(model, coordinates), np.array([[instant]])
-    state, rates, turning = jax.tree.map(np.asarray, _with_rates_told(equations, still, time))
+    still = at_rest(model, coordinates)
+    begun = state, rates, turning, *_ = _begun(equations, still, instant)
     speeds = np.concatenate([state.velocity / model.length, state.spin])[..., 0]
     size, told = (float(np.max(np.abs(x), initial=0.0)) for x in (speeds, rates))
     if not (np.isfinite(size) and size > 0 and told > 0):
-        return state
+        return begun
     away = ROUNDING / told  # s, at those velocities
     there = still._replace(position=still.position + away * state.velocity, attitude=still.attitude + away * turning)
-    other = jax.tree.map(np.asarray, _with_rates_told(equations, there, time)[0])
+    other = _begun(equations, there, instant).state
     change = np.concatenate([(other.velocity - state.velocity) / model.length, other.spin - state.spin])[..., 0]
     if np.max(np.abs(change)) <= LARGEST_CHANGE * size:
-        return state
+        return begun
     message = (
         f"the start is a singular position (a dead point) at t = {instant:g} s, where the rates of the laws do not "
         f"determine the velocities of {freely_moving(model, speeds.T.reshape(1, -1))}: start at another instant, or "
@@ -219,20 +234,10 @@ def _check_rates(equations: Equations, model: Model, state: State, instant: floa
         raise AssemblyError(f"{message}; correct the laws of those named", status=Status.INCONSISTENT)
 
 
-@compiled(narrow=True)
-def _matrices(
-    equations: Equations, state: State, time: Instants
-) -> tuple[Float[Numbers, "size size"], Float[Numbers, " entry"]]:
-    """Return the matrix of the equations, and the entries of the Jacobian."""
-    pose = equations.still(state.position, state.attitude)
-    return equations.matrix(state, time)[..., 0], equations.system.entries(pose, Jet([time]))[..., 0]
-
-
-def _checked_jacobian(equations: Equations, model: Model, state: State, instant: float) -> HostJacobian:
+def _checked_jacobian(equations: Equations, model: Model, begun: _Begun, instant: float) -> HostJacobian:
     """Return the Jacobian, or raise for a body whose acceleration nothing determines, or of negative energy."""
-    state = state._replace(velocity=np.zeros_like(state.velocity), spin=np.zeros_like(state.spin))
-    whole, entries = (np.asarray(x) for x in _matrices(equations, state, np.array([[instant]])))
-    jacobian = HostJacobian.of(model.system.pattern, entries).scaled(np.asarray(model.system.row_scale)[:, 0])
+    whole, system = begun.matrix, model.system
+    jacobian = HostJacobian.of(system.pattern, begun.entries).scaled(np.asarray(system.row_scale)[:, 0])
     columns = jacobian.shape[1]
     loose = _loose(whole, columns)
     if len(loose):

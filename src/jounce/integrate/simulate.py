@@ -307,7 +307,7 @@ class _Run:
         order = self.method.expansion_order(self.tolerance)
         current = unexpanded(equations, self.start.state, instants[:1], order=order)
         how, options = (stop, self.tolerance, self.longest), {"method": self.method, "count": STEPS}
-        new = first_time("march", (equations, current), self.method)
+        new = first_time("march", equations, order, self.method)
         with rehearsed(lambda: evaluate(self._standing(current, stop)), wanted=new):
             while current.outcome.item() in MOVING and self.events.stopped_at is None:
                 current, steps, tried = march(equations, current, *how, **options)
