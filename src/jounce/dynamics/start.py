@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.forward import Equations, Instants, State
-from jounce.dynamics.masses import Masses, gravity_of, required_masses
+from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses
 from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.dynamics.saddle_point import even_scale
 from jounce.errors import AssemblyError, MechanismError, MobilityError
@@ -87,11 +87,11 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     """
     mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
-    model, state = build(mechanism, initial=True), None
+    model, gravity, state = build(mechanism, initial=True), gravity_of(mechanism), None
     if mechanism.initial:
         whole, coordinates = _assembled(model, instant)
         model = released(model)
-        driven = equations_of(mechanism, whole, masses)
+        driven = equations_of(whole, masses, gravity)
         state = _set_in_motion(driven, whole, coordinates, instant).state
         _check_rates(driven, whole, state, instant)
         system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
@@ -99,7 +99,7 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
         )
     model, coordinates = assemble(model, instant, TOLERANCE, free=True)
-    equations = resident(equations_of(mechanism, model, masses))
+    equations = resident(equations_of(model, masses, gravity))
     if state is None:
         begun = _set_in_motion(equations, model, coordinates, instant)
     else:
@@ -109,13 +109,13 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     return ConsistentStart(model, equations, state, jacobian)
 
 
-def equations_of(mechanism: Mechanism, model: Model, masses: Masses) -> Equations:
+def equations_of(model: Model, masses: Masses, gravity: Gravity) -> Equations:
     """Return the equations of motion of a mechanism."""
     system = with_fields(model.system, outputs=())
     values = {
         "system": system,
         "masses": masses,
-        "gravity": gravity_of(mechanism),
+        "gravity": gravity,
         "scale": masses.scale(model.length),
         "pose_type": model.pose_type,
         "saddle": SaddleFronts.of(system.pattern),
@@ -264,8 +264,10 @@ def _loose(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndar
     even = whole * scale * scale[:, None]
     if is_clearly_regular(even, tolerance):
         return np.zeros((0, len(whole)))
-    _, sizes, right = np.linalg.svd(even)
-    found = right[sizes <= tolerance * sizes.max()] * scale
+    small = (sizes := np.linalg.svd(even, compute_uv=False)) <= tolerance * sizes.max()
+    if not small.any():
+        return np.zeros((0, len(whole)))
+    found = np.linalg.svd(even)[2][small] * scale
     return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
@@ -275,7 +277,9 @@ def _is_solid(masses: Masses) -> bool:
     The least moment about an axis through the centre of mass is the sum of the two lowest second moments.
     """
     mass, _, moments = map(np.asarray, masses)
-    return bool(np.all(mass >= 0) and np.all(np.linalg.eigvalsh(moments[..., 0].T)[:, :2].sum(axis=1) >= 0))
+    planar = len(moments) == 2
+    sums = np.trace(moments) if planar else np.linalg.eigvalsh(moments[..., 0].T)[:, :2].sum(axis=1)
+    return bool(np.all(mass >= 0) and np.all(sums >= 0))
 
 
 def _check_energy(model: Model, mass: Float[np.ndarray, "column column"], jacobian: HostJacobian) -> None:

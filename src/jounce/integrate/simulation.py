@@ -74,7 +74,9 @@ class Simulation(Motion):
         state, self._angles = _at(start.equations, dense, instants, chosen, order + max(lost, 1))
         pose_type = start.model.pose_type
         coordinates = pose_coordinates(state)
-        groups = tuple(self._series(group, coordinates, pose_type, instants) for group in start.model.system.outputs)
+        outputs = start.model.system.outputs
+        found = zip(outputs, series_of(outputs, coordinates, pose_type), strict=True)
+        groups = tuple(self._counted(group, series, instants) for group, series in found)
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         faults = {}
         lost = reached & ~np.all([np.isfinite(p).all(axis=tuple(range(p.ndim - 1))) for p in state], axis=0)
@@ -188,13 +190,14 @@ class Simulation(Motion):
 
     def _coefficients(self, group: Group) -> np.ndarray:
         pose_type, coordinates = self.poses
-        return self._series(group, coordinates, pose_type, self.time)
+        (series,) = series_of((group,), coordinates, pose_type)
+        return self._counted(group, series, self.time)
 
-    def _series(
-        self, group: Group, coordinates: Coordinates, pose_type: type, instants: np.ndarray
+    def _counted(
+        self, group: Group, series: Float[np.ndarray, "order component instance time"], instants: np.ndarray
     ) -> Float[np.ndarray, "order component instance time"]:
         """Return the series of outputs at instants; angles known up to whole turns go on from step to step."""
-        series, dense = series_of(group, coordinates, pose_type), self.dense_output
+        dense = self.dense_output
         if not group.element.turning or not dense.length.any():  # no steps: states that another solver gave
             return continuous(group, series, instants)
         if measures_angle(group):
