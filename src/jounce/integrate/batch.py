@@ -332,9 +332,8 @@ class _Runs:
             time = self.instants[at[lanes]]
             since = time - begin[lanes]
             started = polynomial.map(lambda part, lanes=lanes: part[..., lanes])
-            coordinates = pose_coordinates(expanded(equations, started, since, time, order=self._expansion)[0])
-            found = map(np.array, output_series(outputs, coordinates, self.parametric.model.pose_type))
-            for which, (group, series) in enumerate(zip(outputs, found, strict=True)):
+            *_, found = expanded(equations, outputs, started, since, time, order=self._expansion)
+            for which, (group, series) in enumerate(zip(outputs, map(np.array, found), strict=True)):
                 if which in before and measures_angle(group):
                     series[0, 0] = brought_near(series[0, 0], before[which][:, lanes])
                 elif which in before:

@@ -22,10 +22,11 @@ from jounce.jet import Jet, dot
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.motion import output_series
 from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle, with_turns
 from jounce.mechanism.system import Group
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, Numbers
 
 MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
@@ -71,11 +72,10 @@ class Simulation(Motion):
         self._ending = ending
         lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
         reached, chosen = _steps_of(dense, instants)
-        state, self._angles = _at(start.equations, dense, instants, chosen, order + max(lost, 1))
-        pose_type = start.model.pose_type
-        coordinates = pose_coordinates(state)
         outputs = start.model.system.outputs
-        found = zip(outputs, series_of(outputs, coordinates, pose_type), strict=True)
+        state, self._angles, found = _at(start.equations, outputs, dense, instants, chosen, order + max(lost, 1))
+        coordinates = pose_coordinates(state)
+        found = zip(outputs, found, strict=True)
         groups = tuple(self._counted(group, series, instants) for group, series in found)
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         faults = {}
@@ -232,31 +232,40 @@ def _steps_of(dense: DenseOutput, instants: np.ndarray) -> tuple[np.ndarray, np.
     return reached, np.clip(chosen, 0, len(dense.start) - 1)
 
 
-def _at(equations: Equations, dense: DenseOutput, instants: np.ndarray, chosen: np.ndarray, order: int) -> Any:
-    """Return the Taylor coefficients of the motion at instants, order first and the instants last, and its angles."""
+def _at(
+    equations: Equations,
+    outputs: tuple[Group, ...],
+    dense: DenseOutput,
+    instants: np.ndarray,
+    chosen: np.ndarray,
+    order: int,
+) -> Any:
+    """Return what `expanded` does at instants in chosen steps, all of them."""
 
     def chunk(lanes: np.ndarray) -> Any:
         steps, now = chosen[lanes], instants[lanes]
         polynomial = dense.polynomial.map(lambda part: np.moveaxis(part[steps], 0, -1))
         begun = equations.near(tuple(part[steps].T for part in dense.angles))
-        return expanded(begun, polynomial, now - dense.start[steps], now, order=order)
+        return expanded(begun, outputs, polynomial, now - dense.start[steps], now, order=order)
 
     return in_chunks(chunk, len(instants), (FEW_INSTANTS, *WIDTHS))
 
 
 @compiled("order", narrow=True)
 def expanded(
-    equations: Equations, polynomial: State, step: Lanes, instants: Lanes, *, order: int
-) -> tuple[State, AnglesOfForces]:
+    equations: Equations, outputs: tuple[Group, ...], polynomial: State, step: Lanes, instants: Lanes, *, order: int
+) -> tuple[State, AnglesOfForces, tuple[Float[Numbers, "_ _ _ batch"], ...]]:
     """Return the Taylor coefficients of the motion at instants a time `step` into steps, from the equations there.
 
     Angles about axes that forces measure are, in the equations, those at the beginnings of the steps; those at the
-    instants are returned too.
+    instants are returned too, and then the series of outputs, as `output_series` gives them.
     """
     begun = measured(equations, polynomial.map(lambda part: part[0]))
     there = equations.near(followed(equations, begun, polynomial, step).at(step))
     state, _, inverse = projected(there, evaluated(polynomial, step), instants[None])
-    return expand(there, state, instants[None], order, inverse).state, measured(there, state)
+    series = expand(there, state, instants[None], order, inverse).state
+    found = output_series(outputs, pose_coordinates(series), equations.pose_type)
+    return series, measured(there, state), found
 
 
 def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:
