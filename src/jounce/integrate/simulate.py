@@ -39,6 +39,7 @@ from jounce.shapes import ArrayLike, Numbers
 
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite
+GOING = frozenset(MOVING.tolist())
 STEPS = 64  # tried between two looks at progress and events
 ROBOT_OPTIONS = tuple(RobotOptions.__annotations__)
 
@@ -225,7 +226,7 @@ def _detector_of(event: Event, mechanism: Mechanism, start: ConsistentStart) -> 
 
 def _check_forces(start: ConsistentStart, instant: float) -> None:
     """Raise SolveError where an applied force has no finite value at the start."""
-    names = _unfit(start, jax.tree.map(np.asarray, start.state), instant)
+    names = _unfit(start, start.state, instant)
     if names:
         status = Status.INADMISSIBLE
         message = f"t = {instant:g} s, {names}: the force is not finite: check its law and its parameters"
@@ -309,7 +310,7 @@ class _Run:
         how, options = (stop, self.tolerance, self.longest), {"method": self.method, "count": STEPS}
         new = first_time("march", equations, order, self.method)
         with rehearsed(lambda: evaluate(self._standing(current, stop)), wanted=new):
-            while current.outcome.item() in MOVING and self.events.stopped_at is None:
+            while current.outcome.item() in GOING and self.events.stopped_at is None:
                 current, steps, tried = march(equations, current, *how, **options)
                 found, taken = steps
                 taken = np.asarray(taken)[: int(tried), 0]

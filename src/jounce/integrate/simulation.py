@@ -79,13 +79,12 @@ class Simulation(Motion):
         groups = tuple(self._counted(group, series, instants) for group, series in found)
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         faults = {}
-        lost = reached & ~np.all([np.isfinite(p).all(axis=tuple(range(p.ndim - 1))) for p in state], axis=0)
+        lost = reached & ~np.isfinite(np.concatenate([p.reshape(-1, len(instants)) for p in state])).all(axis=0)
         for names, series in zip(start.model.outputs, groups, strict=True):
             bad = ~np.isfinite(series[: order + 1]).all(axis=(0, 1)) & reached & ~lost  # (outputs, time)
-            status[bad.any(axis=0)] = int(Status.UNDEFINED)
-            faults |= {
-                int(lane): f"output {names[int(np.argmax(bad[:, lane]))]}" for lane in np.flatnonzero(bad.any(0))
-            }
+            undefined = np.flatnonzero(bad.any(axis=0))
+            status[undefined] = int(Status.UNDEFINED)
+            faults |= {int(lane): f"output {names[int(np.argmax(bad[:, lane]))]}" for lane in undefined}
         if lost.any():  # the state is known there, but not its derivatives
             status[lost], faults[int(np.argmax(lost))] = int(Status.INADMISSIBLE), ending[1]
         beyond = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
@@ -244,7 +243,7 @@ def _at(
 
     def chunk(lanes: np.ndarray) -> Any:
         steps, now = chosen[lanes], instants[lanes]
-        polynomial = dense.polynomial.map(lambda part: np.moveaxis(part[steps], 0, -1))
+        polynomial = dense.polynomial.map(lambda part: part[steps].transpose(1, 2, 3, 0))
         begun = equations.near(tuple(part[steps].T for part in dense.angles))
         return expanded(begun, outputs, polynomial, now - dense.start[steps], now, order=order)
 
