@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jounce.dynamics.forward import Equations, Instants, State
 from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses
@@ -45,12 +45,15 @@ class ConsistentStart:
         That fulfils joints, drivers and initial conditions with their rates; a batch of one.
     jacobian : HostJacobian
         Of its constraints there.
+    sound : array of bool, shape (forces,)
+        Which applied forces are finite there.
     """
 
     model: Model
     equations: Equations
     state: State
     jacobian: HostJacobian
+    sound: Bool[np.ndarray, " force"]
 
     @cached_property
     def mobility(self) -> str:
@@ -87,26 +90,26 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     """
     mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
-    model, gravity, state = build(mechanism, initial=True), gravity_of(mechanism), None
+    model, gravity, begun = build(mechanism, initial=True), gravity_of(mechanism), None
     if mechanism.initial:
         whole, coordinates = _assembled(model, instant)
         model = released(model)
         driven = equations_of(whole, masses, gravity)
-        state = _set_in_motion(driven, whole, coordinates, instant).state
-        _check_rates(driven, whole, state, instant)
+        begun = _set_in_motion(driven, whole, coordinates, instant)
+        _check_rates(whole, begun, instant)
         system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
         model = dataclasses.replace(
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
         )
     model, coordinates = assemble(model, instant, TOLERANCE, free=True)
     equations = resident(equations_of(model, masses, gravity))
-    if state is None:
+    if begun is None:
         begun = _set_in_motion(equations, model, coordinates, instant)
     else:
-        begun = _begun(equations, state, instant)
-    state, jacobian = begun.state, _checked_jacobian(equations, model, begun, instant)
-    _check_rates(equations, model, state, instant)
-    return ConsistentStart(model, equations, state, jacobian)
+        begun = _begun(equations, begun.state, instant)
+    jacobian = _checked_jacobian(equations, model, begun, instant)
+    _check_rates(model, begun, instant)
+    return ConsistentStart(model, equations, begun.state, jacobian, begun.sound[:, 0])
 
 
 def equations_of(model: Model, masses: Masses, gravity: Gravity) -> Equations:
@@ -162,17 +165,21 @@ class _Begun(NamedTuple):
     """What is to be known of a state before a mechanism starts from it; arrays of NumPy once it was computed."""
 
     state: State  # with velocities
-    rates: Float[Numbers, "row 1"]  # of all rows, before velocities were changed
+    rates: Float[Numbers, "row 1"]  # of all rows, before velocities were changed,
+    left: Float[Numbers, "row 1"]  # and after that
     turning: Float[Numbers, "attitude body 1"]  # how the attitude moves
     matrix: Float[Numbers, "size size"]  # of the equations of motion
     entries: Float[Numbers, " entry"]  # of the Jacobian
+    sound: Bool[Numbers, "force 1"]  # which applied forces are finite
 
 
 @compiled(narrow=True)
 def _beginning(equations: Equations, state: State, time: Instants) -> _Begun:
-    moving, pose = _moving(equations, state, time), equations.still(state.position, state.attitude)
-    matrix, entries = equations.matrix(state, time)[..., 0], equations.system.entries(pose, Jet([time]))[..., 0]
-    return _Begun(moving, _row_rates(equations, state, time), equations.attitude_rate(moving), matrix, entries)
+    moving, still = _moving(equations, state, time), equations.still(state.position, state.attitude)
+    rates, left = (_row_rates(equations, x, time) for x in (state, moving))
+    matrix, entries = equations.matrix(state, time)[..., 0], equations.system.entries(still, Jet([time]))[..., 0]
+    sound = equations.system.finite_forces(equations.pose(moving), Jet.variable(time, 1))
+    return _Begun(moving, rates, left, equations.attitude_rate(moving), matrix, entries, sound)
 
 
 def _begun(equations: Equations, state: State, instant: float) -> _Begun:
@@ -193,7 +200,7 @@ def _set_in_motion(equations: Equations, model: Model, coordinates: dict[str, np
     rounding leaves of it hides a place 1e-8 away, at which the velocities are others, and finite.
     """
     still = at_rest(model, coordinates)
-    begun = state, rates, turning, *_ = _begun(equations, still, instant)
+    begun = state, rates, _, turning, *_ = _begun(equations, still, instant)
     speeds = np.concatenate([state.velocity / model.length, state.spin])[..., 0]
     size, told = (float(np.max(np.abs(x), initial=0.0)) for x in (speeds, rates))
     if not (np.isfinite(size) and size > 0 and told > 0):
@@ -216,17 +223,11 @@ def _row_rates(equations: Equations, state: State, time: Instants) -> Float[Numb
     return equations.system.residual(equations.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
 
 
-@compiled(narrow=True)
-def _rates(equations: Equations, state: State, time: Instants) -> Float[Numbers, "row 1"]:
-    """Return the rates of all rows."""
-    return _row_rates(equations, state, time)
-
-
-def _check_rates(equations: Equations, model: Model, state: State, instant: float) -> None:
+def _check_rates(model: Model, begun: _Begun, instant: float) -> None:
     """Raise AssemblyError, by name, where redundant rows contradict each other in their rates."""
     if model.system.rank is None:
         return
-    gaps = np.abs(np.asarray(_rates(equations, state, np.array([[instant]]))))[:, 0]
+    gaps, state = np.abs(begun.left)[:, 0], begun.state
     size = max(float(np.max(np.abs(state.velocity))) / model.length, float(np.max(np.abs(state.spin))))
     if gaps.max() > LARGEST_CONTRADICTION * size:
         names = dict.fromkeys(row for row, gap in zip(model.rows, gaps, strict=True) if gap > 0.1 * gaps.max())

@@ -226,7 +226,7 @@ def _detector_of(event: Event, mechanism: Mechanism, start: ConsistentStart) -> 
 
 def _check_forces(start: ConsistentStart, instant: float) -> None:
     """Raise SolveError where an applied force has no finite value at the start."""
-    names = _unfit(start, start.state, instant)
+    names = _unsound(start, start.sound)
     if names:
         status = Status.INADMISSIBLE
         message = f"t = {instant:g} s, {names}: the force is not finite: check its law and its parameters"
@@ -238,8 +238,11 @@ def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
     system = start.equations.system
     if not system.forces:
         return ""
-    fit = np.asarray(_finite_forces(start.equations, state, np.array([[instant]])))[:, 0]
-    return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), fit, strict=True) if not good)
+    return _unsound(start, np.asarray(_finite_forces(start.equations, state, np.array([[instant]])))[:, 0])
+
+
+def _unsound(start: ConsistentStart, sound: Bool[np.ndarray, " force"]) -> str:
+    return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), sound, strict=True) if not good)
 
 
 @compiled(narrow=True)
