@@ -2,7 +2,7 @@
 
 import dataclasses
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -165,12 +165,12 @@ class _Begun(NamedTuple):
     """What is to be known of a state before a mechanism starts from it; arrays of NumPy once it was computed."""
 
     state: State  # with velocities
-    rates: Float[Numbers, "row 1"]  # of all rows, before velocities were changed,
-    left: Float[Numbers, "row 1"]  # and after that
-    turning: Float[Numbers, "attitude body 1"]  # how the attitude moves
-    matrix: Float[Numbers, "size size"]  # of the equations of motion
-    entries: Float[Numbers, " entry"]  # of the Jacobian
-    sound: Bool[Numbers, "force 1"]  # which applied forces are finite
+    rates: Float[Any, "row 1"]  # of all rows, before velocities were changed,
+    left: Float[Any, "row 1"]  # and after that
+    turning: Float[Any, "attitude body 1"]  # how the attitude moves
+    matrix: Float[Any, "size size"]  # of the equations of motion
+    entries: Float[Any, " entry"]  # of the Jacobian
+    sound: Bool[Any, "force 1"]  # which applied forces are finite
 
 
 @compiled(narrow=True)

@@ -275,8 +275,8 @@ class _Runs:
             if group.element.turning and not measures_angle(group):
                 state = steps.polynomial.map(lambda part: np.moveaxis(part[:, :3], 0, -2))
                 state = state.map(lambda part: part.reshape(*part.shape[:-2], -1))
-                (series,) = map(np.array, output_series((group,), pose_coordinates(state), self.parametric.model.pose_type))
-                series = series.reshape(*series.shape[:-1], *steps.start.shape)[..., :tried, :]
+                (series,) = output_series((group,), pose_coordinates(state), self.parametric.model.pose_type)
+                series = np.array(series).reshape(*series.shape[:-1], *steps.start.shape)[..., :tried, :]
                 last = self._angles.setdefault(which, np.full((*series.shape[:-2], len(self.steps)), np.nan))
                 whole = np.concatenate([last[..., runs][..., None, :], series], axis=-2)
                 series[0] -= np.cumsum(turned(whole[..., :-1, :], whole[..., 1:, :], np.diff(time, axis=0)), axis=-2)
