@@ -36,7 +36,8 @@ def test_a_short_run_calls_few_programs(monkeypatch):
     jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)  # `expanded` is traced here, with `output_series` in it
     monkeypatch.setattr(Compiled, "__call__", told)
     jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)
-    assert called == ["_moved", "_beginning", "_moved", "_moved", "_beginning", "march", "expanded"]
+    start = ["_moved", "_with_rates_told", "_moved", "_moved", "with_rates", "_judged"]
+    assert called == [*start, "march", "expanded"]
 
 
 @pytest.mark.slow

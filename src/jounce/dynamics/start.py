@@ -90,26 +90,29 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     """
     mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
-    model, gravity, begun = build(mechanism, initial=True), gravity_of(mechanism), None
+    model, gravity, state = build(mechanism, initial=True), gravity_of(mechanism), None
     if mechanism.initial:
         whole, coordinates = _assembled(model, instant)
         model = released(model)
         driven = equations_of(whole, masses, gravity)
-        begun = _set_in_motion(driven, whole, coordinates, instant)
-        _check_rates(whole, begun, instant)
+        state = _set_in_motion(driven, whole, coordinates, instant)
+        if whole.system.rank is not None:
+            _check_rates(whole, state, _facts(driven, state, instant).rates, instant)
         system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
         model = dataclasses.replace(
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
         )
     model, coordinates = assemble(model, instant, TOLERANCE, free=True)
     equations = resident(equations_of(model, masses, gravity))
-    if begun is None:
-        begun = _set_in_motion(equations, model, coordinates, instant)
+    if state is None:
+        state = _set_in_motion(equations, model, coordinates, instant)
     else:
-        begun = _begun(equations, begun.state, instant)
-    jacobian = _checked_jacobian(equations, model, begun, instant)
-    _check_rates(model, begun, instant)
-    return ConsistentStart(model, equations, begun.state, jacobian, begun.sound[:, 0])
+        state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
+    facts = _facts(equations, state, instant)
+    jacobian = _checked_jacobian(equations, model, facts, instant)
+    if model.system.rank is not None:
+        _check_rates(model, state, facts.rates, instant)
+    return ConsistentStart(model, equations, state, jacobian, facts.sound[:, 0])
 
 
 def equations_of(model: Model, masses: Masses, gravity: Gravity) -> Equations:
@@ -161,30 +164,33 @@ def with_rates(equations: Equations, state: State, time: Instants) -> State:
     return _moving(equations, state, time)
 
 
-class _Begun(NamedTuple):
-    """What is to be known of a state before a mechanism starts from it; arrays of NumPy once it was computed."""
+@compiled(narrow=True)
+def _with_rates_told(equations: Equations, state: State, time: Instants) -> tuple[State, Any, Any]:
+    """Return the state of bodies at rest with velocities, what rates they fulfil, and how the attitude moves."""
+    moving = _moving(equations, state, time)
+    return moving, _row_rates(equations, state, time), equations.attitude_rate(moving)
 
-    state: State  # with velocities
-    rates: Float[Any, "row 1"]  # of all rows, before velocities were changed,
-    left: Float[Any, "row 1"]  # and after that
-    turning: Float[Any, "attitude body 1"]  # how the attitude moves
+
+class _Facts(NamedTuple):
+    """What decides whether a mechanism can start from a state; arrays of NumPy once it was computed."""
+
     matrix: Float[Any, "size size"]  # of the equations of motion
     entries: Float[Any, " entry"]  # of the Jacobian
+    rates: Float[Any, "row 1"]  # of all rows
     sound: Bool[Any, "force 1"]  # which applied forces are finite
 
 
 @compiled(narrow=True)
-def _beginning(equations: Equations, state: State, time: Instants) -> _Begun:
-    moving, still = _moving(equations, state, time), equations.still(state.position, state.attitude)
-    rates, left = (_row_rates(equations, x, time) for x in (state, moving))
+def _judged(equations: Equations, state: State, time: Instants) -> _Facts:
+    """Return these facts from a program of their own: in that of the velocities they would change its last digits."""
+    still = equations.still(state.position, state.attitude)
     matrix, entries = equations.matrix(state, time)[..., 0], equations.system.entries(still, Jet([time]))[..., 0]
-    sound = equations.system.finite_forces(equations.pose(moving), Jet.variable(time, 1))
-    return _Begun(moving, rates, left, equations.attitude_rate(moving), matrix, entries, sound)
+    sound = equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
+    return _Facts(matrix, entries, _row_rates(equations, state, time), sound)
 
 
-def _begun(equations: Equations, state: State, instant: float) -> _Begun:
-    """Return a state with the least change of its velocities that fulfils the rates of all constraints."""
-    return jax.tree.map(np.asarray, _beginning(equations, state, np.array([[instant]])))
+def _facts(equations: Equations, state: State, instant: float) -> _Facts:
+    return jax.tree.map(np.asarray, _judged(equations, state, np.array([[instant]])))
 
 
 def _moving(equations: Equations, state: State, time: Instants) -> State:
@@ -193,24 +199,24 @@ def _moving(equations: Equations, state: State, time: Instants) -> State:
     return jax.lax.fori_loop(0, 2, lambda _, moving: equations.with_rates(factor, moving, time), state)
 
 
-def _set_in_motion(equations: Equations, model: Model, coordinates: dict[str, np.ndarray], instant: float) -> _Begun:
+def _set_in_motion(equations: Equations, model: Model, coordinates: dict[str, np.ndarray], instant: float) -> State:
     """Return the assembled bodies with the velocities that laws prescribe, or raise where rounding would decide them.
 
     At a limit position, such as an arm stretched out, a residual changes with the square of a displacement: what
     rounding leaves of it hides a place 1e-8 away, at which the velocities are others, and finite.
     """
-    still = at_rest(model, coordinates)
-    begun = state, rates, _, turning, *_ = _begun(equations, still, instant)
+    still, time = at_rest(model, coordinates), np.array([[instant]])
+    state, rates, turning = jax.tree.map(np.asarray, _with_rates_told(equations, still, time))
     speeds = np.concatenate([state.velocity / model.length, state.spin])[..., 0]
     size, told = (float(np.max(np.abs(x), initial=0.0)) for x in (speeds, rates))
     if not (np.isfinite(size) and size > 0 and told > 0):
-        return begun
+        return state
     away = ROUNDING / told  # s, at those velocities
     there = still._replace(position=still.position + away * state.velocity, attitude=still.attitude + away * turning)
-    other = _begun(equations, there, instant).state
+    other = jax.tree.map(np.asarray, _with_rates_told(equations, there, time)[0])
     change = np.concatenate([(other.velocity - state.velocity) / model.length, other.spin - state.spin])[..., 0]
     if np.max(np.abs(change)) <= LARGEST_CHANGE * size:
-        return begun
+        return state
     message = (
         f"the start is a singular position (a dead point) at t = {instant:g} s, where the rates of the laws do not "
         f"determine the velocities of {freely_moving(model, speeds.T.reshape(1, -1))}: start at another instant, or "
@@ -223,11 +229,9 @@ def _row_rates(equations: Equations, state: State, time: Instants) -> Float[Numb
     return equations.system.residual(equations.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
 
 
-def _check_rates(model: Model, begun: _Begun, instant: float) -> None:
+def _check_rates(model: Model, state: State, rates: Float[np.ndarray, "row 1"], instant: float) -> None:
     """Raise AssemblyError, by name, where redundant rows contradict each other in their rates."""
-    if model.system.rank is None:
-        return
-    gaps, state = np.abs(begun.left)[:, 0], begun.state
+    gaps = np.abs(rates)[:, 0]
     size = max(float(np.max(np.abs(state.velocity))) / model.length, float(np.max(np.abs(state.spin))))
     if gaps.max() > LARGEST_CONTRADICTION * size:
         names = dict.fromkeys(row for row, gap in zip(model.rows, gaps, strict=True) if gap > 0.1 * gaps.max())
@@ -235,10 +239,10 @@ def _check_rates(model: Model, begun: _Begun, instant: float) -> None:
         raise AssemblyError(f"{message}; correct the laws of those named", status=Status.INCONSISTENT)
 
 
-def _checked_jacobian(equations: Equations, model: Model, begun: _Begun, instant: float) -> HostJacobian:
+def _checked_jacobian(equations: Equations, model: Model, facts: _Facts, instant: float) -> HostJacobian:
     """Return the Jacobian, or raise for a body whose acceleration nothing determines, or of negative energy."""
-    whole, system = begun.matrix, model.system
-    jacobian = HostJacobian.of(system.pattern, begun.entries).scaled(np.asarray(system.row_scale)[:, 0])
+    whole, system = facts.matrix, model.system
+    jacobian = HostJacobian.of(system.pattern, facts.entries).scaled(np.asarray(system.row_scale)[:, 0])
     columns = jacobian.shape[1]
     loose = _loose(whole, columns)
     if len(loose):
