@@ -20,6 +20,14 @@ def test_one_length_serves_motions_of_any_number_of_instants(count):
     assert lengths == {256}
 
 
+@pytest.mark.parametrize("axis", [0, 1, -1])
+@pytest.mark.parametrize("count", [3, 8, 20])
+def test_instants_may_stand_along_any_axis(count, axis):
+    found = in_chunks(lambda lanes: np.moveaxis(np.ones((4, 5, 1)) * lanes, -1, axis), count, (8,), axis)
+    np.testing.assert_array_equal(np.moveaxis(found, axis, -1), np.ones((4, 5, 1)) * np.arange(count))
+    found[:] = 0.0  # an array of the caller's own
+
+
 @pytest.mark.parametrize("count", [1, 15, 16, 17, 64, 71])
 def test_instants_that_are_computed_a_few_together_are_those_computed_at_once(count):
     chance = np.random.default_rng(count)

@@ -21,7 +21,7 @@ def test_what_a_run_begins_with_is_compiled_for_once():
     )
     start = consistent_start(mass, 0.0)
     equations, state = start.equations, start.state
-    begun = jax.eval_shape(partial(unexpanded.function, order=4), equations, state, np.zeros(1))
+    begun = jax.eval_shape(lambda: unexpanded(equations, state, np.zeros(1), order=4))
     going = partial(march.function, method=jn.Taylor(4), count=1)
     onwards = jax.eval_shape(going, equations, begun, 1.0, 1e-9, np.inf)[0]
     assert jax.tree.structure(begun) == jax.tree.structure(onwards)

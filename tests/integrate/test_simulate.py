@@ -7,6 +7,7 @@ import pytest
 
 import jounce as jn
 from jounce import drivers, forces, planar, spatial
+from jounce.kinematics.compilation import Compiled
 from tests.problems.dynamics import GRAVITY, simple_pendulum
 
 GRID = [0.0, 0.4, 1.1, 2.0]
@@ -22,6 +23,21 @@ def pendulum_derivatives(angle, rate, w=GRAVITY):
     second = -w * np.cos(angle)
     third = w * np.sin(angle) * rate
     return np.array([angle, rate, second, third, w * (np.cos(angle) * rate**2 + np.sin(angle) * second)]).T
+
+
+def test_a_short_run_calls_few_programs(monkeypatch):
+    called, call = [], Compiled.__call__
+
+    def told(self, *arguments, **keywords):
+        called.append(self.__name__)
+        return call(self, *arguments, **keywords)
+
+    pendulum = simple_pendulum(0.3, 0.0)
+    jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)  # `expanded` is traced here, with `output_series` in it
+    monkeypatch.setattr(Compiled, "__call__", told)
+    jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)
+    start = ["_moved", "_with_rates_told", "_moved", "_moved", "with_rates", "_judged"]
+    assert called == [*start, "march", "expanded"]
 
 
 @pytest.mark.slow

@@ -63,7 +63,7 @@ def mode_motion(
             coordinates = trial.coordinates
         frames.append(coordinates)
     whole = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[None], *frames)
-    groups = tuple(np.asarray(output_series(g, whole, model.pose_type)) for g in model.system.outputs)
+    groups = tuple(map(np.asarray, output_series(model.system.outputs, whole, model.pose_type)))
     status = np.full(len(instants), int(Status.OK))
     return Motion(place.mechanism, model, instants, 0, (whole, groups), status, {})
 

@@ -59,7 +59,12 @@ def in_chunks(
 
     with Threads(thread_count()) as threads:
         parts = list(threads.map(computed, range(0, count, width)))
-    return jax.tree.map(lambda *xs: np.split(np.concatenate(xs, axis), [count], axis)[0], *parts)
+
+    def whole(*arrays: np.ndarray) -> np.ndarray:
+        joined = np.concatenate(arrays, axis)
+        return joined[(slice(None),) * (axis % joined.ndim) + (slice(count),)]
+
+    return jax.tree.map(whole, *parts)
 
 
 def along_motion(motion: Motion, function: Callable[[Int[np.ndarray, " chunk"]], Found]) -> Found:

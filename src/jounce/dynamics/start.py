@@ -2,14 +2,14 @@
 
 import dataclasses
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jounce.dynamics.forward import Equations, Instants, State
-from jounce.dynamics.masses import Masses, gravity_of, required_masses
+from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses
 from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.dynamics.saddle_point import even_scale
 from jounce.errors import AssemblyError, MechanismError, MobilityError
@@ -45,12 +45,15 @@ class ConsistentStart:
         That fulfils joints, drivers and initial conditions with their rates; a batch of one.
     jacobian : HostJacobian
         Of its constraints there.
+    sound : array of bool, shape (forces,)
+        Which applied forces are finite there.
     """
 
     model: Model
     equations: Equations
     state: State
     jacobian: HostJacobian
+    sound: Bool[np.ndarray, " force"]
 
     @cached_property
     def mobility(self) -> str:
@@ -87,35 +90,38 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     """
     mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
-    model, state = build(mechanism, initial=True), None
+    model, gravity, state = build(mechanism, initial=True), gravity_of(mechanism), None
     if mechanism.initial:
         whole, coordinates = _assembled(model, instant)
         model = released(model)
-        driven = equations_of(mechanism, whole, masses)
+        driven = equations_of(whole, masses, gravity)
         state = _set_in_motion(driven, whole, coordinates, instant)
-        _check_rates(driven, whole, state, instant)
+        if whole.system.rank is not None:
+            _check_rates(whole, state, _facts(driven, state, instant).rates, instant)
         system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
         model = dataclasses.replace(
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
         )
     model, coordinates = assemble(model, instant, TOLERANCE, free=True)
-    equations = resident(equations_of(mechanism, model, masses))
+    equations = resident(equations_of(model, masses, gravity))
     if state is None:
         state = _set_in_motion(equations, model, coordinates, instant)
     else:
         state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
-    jacobian = _checked_jacobian(equations, model, state, instant)
-    _check_rates(equations, model, state, instant)
-    return ConsistentStart(model, equations, state, jacobian)
+    facts = _facts(equations, state, instant)
+    jacobian = _checked_jacobian(equations, model, facts, instant)
+    if model.system.rank is not None:
+        _check_rates(model, state, facts.rates, instant)
+    return ConsistentStart(model, equations, state, jacobian, facts.sound[:, 0])
 
 
-def equations_of(mechanism: Mechanism, model: Model, masses: Masses) -> Equations:
+def equations_of(model: Model, masses: Masses, gravity: Gravity) -> Equations:
     """Return the equations of motion of a mechanism."""
     system = with_fields(model.system, outputs=())
     values = {
         "system": system,
         "masses": masses,
-        "gravity": gravity_of(mechanism),
+        "gravity": gravity,
         "scale": masses.scale(model.length),
         "pose_type": model.pose_type,
         "saddle": SaddleFronts.of(system.pattern),
@@ -165,6 +171,28 @@ def _with_rates_told(equations: Equations, state: State, time: Instants) -> tupl
     return moving, _row_rates(equations, state, time), equations.attitude_rate(moving)
 
 
+class _Facts(NamedTuple):
+    """What decides whether a mechanism can start from a state; arrays of NumPy once it was computed."""
+
+    matrix: Float[Any, "size size"]  # of the equations of motion
+    entries: Float[Any, " entry"]  # of the Jacobian
+    rates: Float[Any, "row 1"]  # of all rows
+    sound: Bool[Any, "force 1"]  # which applied forces are finite
+
+
+@compiled(narrow=True)
+def _judged(equations: Equations, state: State, time: Instants) -> _Facts:
+    """Return these facts from a program of their own: in that of the velocities they would change its last digits."""
+    still = equations.still(state.position, state.attitude)
+    matrix, entries = equations.matrix(state, time)[..., 0], equations.system.entries(still, Jet([time]))[..., 0]
+    sound = equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
+    return _Facts(matrix, entries, _row_rates(equations, state, time), sound)
+
+
+def _facts(equations: Equations, state: State, instant: float) -> _Facts:
+    return jax.tree.map(np.asarray, _judged(equations, state, np.array([[instant]])))
+
+
 def _moving(equations: Equations, state: State, time: Instants) -> State:
     """Return a state with velocities, corrected once: masses that gears weight unlike each other cost digits."""
     factor = equations.factored(state, time)
@@ -201,17 +229,9 @@ def _row_rates(equations: Equations, state: State, time: Instants) -> Float[Numb
     return equations.system.residual(equations.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
 
 
-@compiled(narrow=True)
-def _rates(equations: Equations, state: State, time: Instants) -> Float[Numbers, "row 1"]:
-    """Return the rates of all rows."""
-    return _row_rates(equations, state, time)
-
-
-def _check_rates(equations: Equations, model: Model, state: State, instant: float) -> None:
+def _check_rates(model: Model, state: State, rates: Float[np.ndarray, "row 1"], instant: float) -> None:
     """Raise AssemblyError, by name, where redundant rows contradict each other in their rates."""
-    if model.system.rank is None:
-        return
-    gaps = np.abs(np.asarray(_rates(equations, state, np.array([[instant]]))))[:, 0]
+    gaps = np.abs(rates)[:, 0]
     size = max(float(np.max(np.abs(state.velocity))) / model.length, float(np.max(np.abs(state.spin))))
     if gaps.max() > LARGEST_CONTRADICTION * size:
         names = dict.fromkeys(row for row, gap in zip(model.rows, gaps, strict=True) if gap > 0.1 * gaps.max())
@@ -219,20 +239,10 @@ def _check_rates(equations: Equations, model: Model, state: State, instant: floa
         raise AssemblyError(f"{message}; correct the laws of those named", status=Status.INCONSISTENT)
 
 
-@compiled(narrow=True)
-def _matrices(
-    equations: Equations, state: State, time: Instants
-) -> tuple[Float[Numbers, "size size"], Float[Numbers, " entry"]]:
-    """Return the matrix of the equations, and the entries of the Jacobian."""
-    pose = equations.still(state.position, state.attitude)
-    return equations.matrix(state, time)[..., 0], equations.system.entries(pose, Jet([time]))[..., 0]
-
-
-def _checked_jacobian(equations: Equations, model: Model, state: State, instant: float) -> HostJacobian:
+def _checked_jacobian(equations: Equations, model: Model, facts: _Facts, instant: float) -> HostJacobian:
     """Return the Jacobian, or raise for a body whose acceleration nothing determines, or of negative energy."""
-    state = state._replace(velocity=np.zeros_like(state.velocity), spin=np.zeros_like(state.spin))
-    whole, entries = (np.asarray(x) for x in _matrices(equations, state, np.array([[instant]])))
-    jacobian = HostJacobian.of(model.system.pattern, entries).scaled(np.asarray(model.system.row_scale)[:, 0])
+    whole, system = facts.matrix, model.system
+    jacobian = HostJacobian.of(system.pattern, facts.entries).scaled(np.asarray(system.row_scale)[:, 0])
     columns = jacobian.shape[1]
     loose = _loose(whole, columns)
     if len(loose):
@@ -259,8 +269,10 @@ def _loose(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndar
     even = whole * scale * scale[:, None]
     if is_clearly_regular(even, tolerance):
         return np.zeros((0, len(whole)))
-    _, sizes, right = np.linalg.svd(even)
-    found = right[sizes <= tolerance * sizes.max()] * scale
+    small = (sizes := np.linalg.svd(even, compute_uv=False)) <= tolerance * sizes.max()
+    if not small.any():
+        return np.zeros((0, len(whole)))
+    found = np.linalg.svd(even)[2][small] * scale
     return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
@@ -270,7 +282,9 @@ def _is_solid(masses: Masses) -> bool:
     The least moment about an axis through the centre of mass is the sum of the two lowest second moments.
     """
     mass, _, moments = map(np.asarray, masses)
-    return bool(np.all(mass >= 0) and np.all(np.linalg.eigvalsh(moments[..., 0].T)[:, :2].sum(axis=1) >= 0))
+    planar = len(moments) == 2
+    sums = np.trace(moments) if planar else np.linalg.eigvalsh(moments[..., 0].T)[:, :2].sum(axis=1)
+    return bool(np.all(mass >= 0) and np.all(sums >= 0))
 
 
 def _check_energy(model: Model, mass: Float[np.ndarray, "column column"], jacobian: HostJacobian) -> None:

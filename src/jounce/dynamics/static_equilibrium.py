@@ -126,7 +126,7 @@ class Equilibrium(Displayed):
         place, model = self.place, self.place.model
         lost = max((output.lost_orders for output in self.mechanism.outputs.values()), default=0)
         coordinates = {name: _padded(x, lost) for name, x in place.coordinates.items()}
-        groups = tuple(np.asarray(output_series(g, coordinates, model.pose_type)) for g in model.system.outputs)
+        groups = tuple(map(np.asarray, output_series(model.system.outputs, coordinates, model.pose_type)))
         status = np.array([int(Status.OK)])
         return Motion(self.mechanism, model, np.array([self.time]), 2, (coordinates, groups), status, {})
 

@@ -275,8 +275,8 @@ class _Runs:
             if group.element.turning and not measures_angle(group):
                 state = steps.polynomial.map(lambda part: np.moveaxis(part[:, :3], 0, -2))
                 state = state.map(lambda part: part.reshape(*part.shape[:-2], -1))
-                series = np.array(output_series(group, pose_coordinates(state), self.parametric.model.pose_type))
-                series = series.reshape(*series.shape[:-1], *steps.start.shape)[..., :tried, :]
+                (series,) = output_series((group,), pose_coordinates(state), self.parametric.model.pose_type)
+                series = np.array(series).reshape(*series.shape[:-1], *steps.start.shape)[..., :tried, :]
                 last = self._angles.setdefault(which, np.full((*series.shape[:-2], len(self.steps)), np.nan))
                 whole = np.concatenate([last[..., runs][..., None, :], series], axis=-2)
                 series[0] -= np.cumsum(turned(whole[..., :-1, :], whole[..., 1:, :], np.diff(time, axis=0)), axis=-2)
@@ -332,9 +332,8 @@ class _Runs:
             time = self.instants[at[lanes]]
             since = time - begin[lanes]
             started = polynomial.map(lambda part, lanes=lanes: part[..., lanes])
-            coordinates = pose_coordinates(expanded(equations, started, since, time, order=self._expansion)[0])
-            for which, group in enumerate(outputs):
-                series = np.array(output_series(group, coordinates, self.parametric.model.pose_type))
+            *_, found = expanded(equations, outputs, started, since, time, order=self._expansion)
+            for which, (group, series) in enumerate(zip(outputs, map(np.array, found), strict=True)):
                 if which in before and measures_angle(group):
                     series[0, 0] = brought_near(series[0, 0], before[which][:, lanes])
                 elif which in before:

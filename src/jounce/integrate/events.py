@@ -111,12 +111,12 @@ def pose_coordinates(state: State) -> dict[str, Any]:
 
 
 def series_of(
-    group: Group, coordinates: Coordinates, pose_type: type
-) -> Float[np.ndarray, "order component instance batch"]:
+    groups: tuple[Group, ...], coordinates: Coordinates, pose_type: type
+) -> tuple[Float[np.ndarray, "_ _ _ batch"], ...]:
     """Return `output_series` of a batch of any size, compiled for one size only."""
 
     def chunk(lanes: np.ndarray) -> Any:
-        return output_series(group, {name: part[..., lanes] for name, part in coordinates.items()}, pose_type)
+        return output_series(groups, {name: part[..., lanes] for name, part in coordinates.items()}, pose_type)
 
     return in_chunks(chunk, coordinates["position"].shape[-1], WIDTHS)
 
@@ -225,7 +225,7 @@ def _at(
     weights = binomials[:, :, None, None] * powers
     shifted = (np.einsum("jksn,skcb->jcbsn", weights, part) for part in polynomial)
     coordinates = pose_coordinates(State(*(part.reshape(*part.shape[:3], -1) for part in shifted)))
-    series = series_of(group, coordinates, pose_type)
+    (series,) = series_of((group,), coordinates, pose_type)
     return series.reshape(*series.shape[:3], *since.shape)
 
 

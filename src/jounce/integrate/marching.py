@@ -8,13 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, begun_series, expand, inverted
+from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, expand, inverted
 from jounce.integrate.lookahead import HARMLESS, SHORTEST, Lookahead, look_ahead, mobility_of
 from jounce.integrate.methods import AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import AnglesOfForces, followed, measured
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.kernels import LIBRARIES, in_one_piece
+from jounce.mechanism.axis_angles import measures_angle
 from jounce.shapes import Numbers
 
 SMALLEST_STEP = 1e-13  # of the span, or of the time itself
@@ -77,19 +78,26 @@ class DenseOutput(NamedTuple):
         return float(self.start[-1] + self.length[-1])
 
 
-@compiled("order")
 def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -> IntegratorState:
-    """Return what `begin_march` does, but for the expansion, which is left to `march`: one large program less."""
+    """Return what `begin_march` does, but for the expansion, which is left to `march`: there is nothing to compile.
+
+    The arrays are of NumPy, but for angles about axes.
+    """
     *_, bodies, lanes = state.position.shape
     size, columns = equations.system.shape
-    series = state.map(lambda c: begun_series([c], order + 1))
-    rates = jnp.zeros((1, columns // bodies, bodies, lanes)), jnp.zeros((1, size, lanes))
-    # of NumPy, so that their types are as strict as those that `march` returns: it is compiled once for both
+    series = state.map(lambda known: np.concatenate([known[None], np.zeros((order, *known.shape))]))
+    rates = np.zeros((1, columns // bodies, bodies, lanes)), np.zeros((1, size, lanes))
     opening, none = (np.full(time.shape, value) for value in (int(Outcome.UNEXPANDED), -1))
-    nothing = jnp.zeros(time.shape)
-    known = jnp.zeros((bodies + 1, lanes)), jnp.zeros(time.shape, bool)
-    expansion, refused = Expansion(series, *rates), jnp.zeros(time.shape, int)
-    return IntegratorState(time, expansion, refused, opening, nothing, time, *known, none, measured(equations, state))
+    nothing = np.zeros(time.shape)
+    known = np.zeros((bodies + 1, lanes)), np.zeros(time.shape, bool)
+    angles = _measured(equations, state) if any(map(measures_angle, equations.system.forces)) else ()
+    expansion, refused = Expansion(series, *rates), np.zeros(time.shape, int)
+    return IntegratorState(time, expansion, refused, opening, nothing, time, *known, none, angles)
+
+
+@compiled(narrow=True)
+def _measured(equations: Equations, state: State) -> AnglesOfForces:
+    return measured(equations, state)
 
 
 @compiled("order")

@@ -39,6 +39,7 @@ from jounce.shapes import ArrayLike, Numbers
 
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite
+GOING = frozenset(MOVING.tolist())
 STEPS = 64  # tried between two looks at progress and events
 ROBOT_OPTIONS = tuple(RobotOptions.__annotations__)
 
@@ -225,7 +226,7 @@ def _detector_of(event: Event, mechanism: Mechanism, start: ConsistentStart) -> 
 
 def _check_forces(start: ConsistentStart, instant: float) -> None:
     """Raise SolveError where an applied force has no finite value at the start."""
-    names = _unfit(start, jax.tree.map(np.asarray, start.state), instant)
+    names = _unsound(start, start.sound)
     if names:
         status = Status.INADMISSIBLE
         message = f"t = {instant:g} s, {names}: the force is not finite: check its law and its parameters"
@@ -237,8 +238,11 @@ def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
     system = start.equations.system
     if not system.forces:
         return ""
-    fit = np.asarray(_finite_forces(start.equations, state, np.array([[instant]])))[:, 0]
-    return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), fit, strict=True) if not good)
+    return _unsound(start, np.asarray(_finite_forces(start.equations, state, np.array([[instant]])))[:, 0])
+
+
+def _unsound(start: ConsistentStart, sound: Bool[np.ndarray, " force"]) -> str:
+    return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), sound, strict=True) if not good)
 
 
 @compiled(narrow=True)
@@ -307,9 +311,9 @@ class _Run:
         order = self.method.expansion_order(self.tolerance)
         current = unexpanded(equations, self.start.state, instants[:1], order=order)
         how, options = (stop, self.tolerance, self.longest), {"method": self.method, "count": STEPS}
-        new = first_time("march", (equations, current), self.method)
+        new = first_time("march", equations, order, self.method)
         with rehearsed(lambda: evaluate(self._standing(current, stop)), wanted=new):
-            while current.outcome.item() in MOVING and self.events.stopped_at is None:
+            while current.outcome.item() in GOING and self.events.stopped_at is None:
                 current, steps, tried = march(equations, current, *how, **options)
                 found, taken = steps
                 taken = np.asarray(taken)[: int(tried), 0]

@@ -22,10 +22,11 @@ from jounce.jet import Jet, dot
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.motion import output_series
 from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle, with_turns
 from jounce.mechanism.system import Group
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, Numbers
 
 MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
@@ -71,19 +72,19 @@ class Simulation(Motion):
         self._ending = ending
         lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
         reached, chosen = _steps_of(dense, instants)
-        state, self._angles = _at(start.equations, dense, instants, chosen, order + max(lost, 1))
-        pose_type = start.model.pose_type
+        outputs = start.model.system.outputs
+        state, self._angles, found = _at(start.equations, outputs, dense, instants, chosen, order + max(lost, 1))
         coordinates = pose_coordinates(state)
-        groups = tuple(self._series(group, coordinates, pose_type, instants) for group in start.model.system.outputs)
+        found = zip(outputs, found, strict=True)
+        groups = tuple(self._counted(group, series, instants) for group, series in found)
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         faults = {}
-        lost = reached & ~np.all([np.isfinite(p).all(axis=tuple(range(p.ndim - 1))) for p in state], axis=0)
+        lost = reached & ~np.isfinite(np.concatenate([p.reshape(-1, len(instants)) for p in state])).all(axis=0)
         for names, series in zip(start.model.outputs, groups, strict=True):
             bad = ~np.isfinite(series[: order + 1]).all(axis=(0, 1)) & reached & ~lost  # (outputs, time)
-            status[bad.any(axis=0)] = int(Status.UNDEFINED)
-            faults |= {
-                int(lane): f"output {names[int(np.argmax(bad[:, lane]))]}" for lane in np.flatnonzero(bad.any(0))
-            }
+            undefined = np.flatnonzero(bad.any(axis=0))
+            status[undefined] = int(Status.UNDEFINED)
+            faults |= {int(lane): f"output {names[int(np.argmax(bad[:, lane]))]}" for lane in undefined}
         if lost.any():  # the state is known there, but not its derivatives
             status[lost], faults[int(np.argmax(lost))] = int(Status.INADMISSIBLE), ending[1]
         beyond = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
@@ -188,13 +189,14 @@ class Simulation(Motion):
 
     def _coefficients(self, group: Group) -> np.ndarray:
         pose_type, coordinates = self.poses
-        return self._series(group, coordinates, pose_type, self.time)
+        (series,) = series_of((group,), coordinates, pose_type)
+        return self._counted(group, series, self.time)
 
-    def _series(
-        self, group: Group, coordinates: Coordinates, pose_type: type, instants: np.ndarray
+    def _counted(
+        self, group: Group, series: Float[np.ndarray, "order component instance time"], instants: np.ndarray
     ) -> Float[np.ndarray, "order component instance time"]:
         """Return the series of outputs at instants; angles known up to whole turns go on from step to step."""
-        series, dense = series_of(group, coordinates, pose_type), self.dense_output
+        dense = self.dense_output
         if not group.element.turning or not dense.length.any():  # no steps: states that another solver gave
             return continuous(group, series, instants)
         if measures_angle(group):
@@ -229,31 +231,40 @@ def _steps_of(dense: DenseOutput, instants: np.ndarray) -> tuple[np.ndarray, np.
     return reached, np.clip(chosen, 0, len(dense.start) - 1)
 
 
-def _at(equations: Equations, dense: DenseOutput, instants: np.ndarray, chosen: np.ndarray, order: int) -> Any:
-    """Return the Taylor coefficients of the motion at instants, order first and the instants last, and its angles."""
+def _at(
+    equations: Equations,
+    outputs: tuple[Group, ...],
+    dense: DenseOutput,
+    instants: np.ndarray,
+    chosen: np.ndarray,
+    order: int,
+) -> Any:
+    """Return what `expanded` does at instants in chosen steps, all of them."""
 
     def chunk(lanes: np.ndarray) -> Any:
         steps, now = chosen[lanes], instants[lanes]
-        polynomial = dense.polynomial.map(lambda part: np.moveaxis(part[steps], 0, -1))
+        polynomial = dense.polynomial.map(lambda part: part[steps].transpose(1, 2, 3, 0))
         begun = equations.near(tuple(part[steps].T for part in dense.angles))
-        return expanded(begun, polynomial, now - dense.start[steps], now, order=order)
+        return expanded(begun, outputs, polynomial, now - dense.start[steps], now, order=order)
 
     return in_chunks(chunk, len(instants), (FEW_INSTANTS, *WIDTHS))
 
 
 @compiled("order", narrow=True)
 def expanded(
-    equations: Equations, polynomial: State, step: Lanes, instants: Lanes, *, order: int
-) -> tuple[State, AnglesOfForces]:
+    equations: Equations, outputs: tuple[Group, ...], polynomial: State, step: Lanes, instants: Lanes, *, order: int
+) -> tuple[State, AnglesOfForces, tuple[Float[Numbers, "_ _ _ batch"], ...]]:
     """Return the Taylor coefficients of the motion at instants a time `step` into steps, from the equations there.
 
     Angles about axes that forces measure are, in the equations, those at the beginnings of the steps; those at the
-    instants are returned too.
+    instants are returned too, and then the series of outputs, as `output_series` gives them.
     """
     begun = measured(equations, polynomial.map(lambda part: part[0]))
     there = equations.near(followed(equations, begun, polynomial, step).at(step))
     state, _, inverse = projected(there, evaluated(polynomial, step), instants[None])
-    return expand(there, state, instants[None], order, inverse).state, measured(there, state)
+    series = expand(there, state, instants[None], order, inverse).state
+    found = output_series(outputs, pose_coordinates(series), equations.pose_type)
+    return series, measured(there, state), found
 
 
 def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:

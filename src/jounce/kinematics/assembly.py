@@ -73,7 +73,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     warn_of_parts_turned_over(model, found)
     model, told = redundancy_of(model, found, instant)
     check_mobility(model, found.jacobian, told, free=free)
-    return dataclasses.replace(model, system=resident(model.system)), found.coordinates
+    return model, found.coordinates
 
 
 def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
@@ -187,9 +187,8 @@ def check_assembled(model: Model, found: Trial, instant: float, *, free: bool = 
     What is missing for every motion to be prescribed is told too, unless degrees of freedom may be left (`free`).
     """
     gaps = found.gaps
-    unknown = list(dict.fromkeys(name for name, gap in zip(model.rows, gaps, strict=True) if not np.isfinite(gap)))
-    if unknown:
-        named = ", ".join(unknown)
+    if not (known := np.isfinite(gaps)).all():
+        named = ", ".join(dict.fromkeys(name for name, told in zip(model.rows, known, strict=True) if not told))
         message = f"no finite value at t = {instant:g} s: {named}; check motion laws and the starting guess"
         raise AssemblyError(message, status=Status.INADMISSIBLE)
     if found.closed:
@@ -268,10 +267,12 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
 
 def redundancy_of(model: Model, found: Trial, instant: float) -> tuple[Model, Redundancy]:
     """Return a model that was put together with its rows scaled, and which of them follow from others."""
-    model = dataclasses.replace(model, system=with_fields(model.system, row_scale=found.scale[:, None]))
+    system = resident(with_fields(model.system, row_scale=found.scale[:, None], rank=None))
+    model = dataclasses.replace(model, system=system)
     told = redundancy(model, found.coordinates, found.jacobian, Displacements(model, instant))
-    rank = told.rank if told.count else None
-    return dataclasses.replace(model, system=with_fields(model.system, rank=rank)), told
+    if told.count:
+        model = dataclasses.replace(model, system=with_fields(system, rank=told.rank))
+    return model, told
 
 
 def check_mobility(model: Model, jacobian: HostJacobian, found: Redundancy, *, free: bool = False) -> None:

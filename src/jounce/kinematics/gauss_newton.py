@@ -81,8 +81,7 @@ def _moved(
         return _Going(moved, step, begun, residual, entries, row_scale, size, closed, left)
 
     if system.pattern is None:
-        moved, residual, entries = there(coordinates, increment)
-        return moved, residual, entries, residual, np.zeros((), bool)
+        return there(coordinates, increment)
     rows, entries = np.zeros(system.shape[0]), np.zeros(system.pattern.entry_count)
     start = _Going(coordinates, increment, rows, rows, entries, rows, np.zeros(()), np.zeros((), bool), steps)
     end = jax.lax.while_loop(lambda going: ~going.closed & (going.left >= 0), stepped, jax.tree.map(jnp.asarray, start))
@@ -148,7 +147,8 @@ class Displacements:
     ) -> tuple[Place, Float[np.ndarray, " row"], bool]:
         settings = self._instant, np.int64(steps), np.float64(tolerance)
         found = _moved(self._system, coordinates, increment, *settings, self._model.pose_type)
-        to, residual, entries, begun, closed = jax.tree.map(np.asarray, found)
+        to, residual, entries, *ending = jax.tree.map(np.asarray, found)
+        begun, closed = ending or (residual, False)
         system = self._model.system
         jacobian = HostJacobian.of(system.pattern, entries).scaled(np.asarray(system.row_scale)[:, 0])
         return (to, residual, jacobian), begun, bool(closed)

@@ -47,11 +47,11 @@ _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
 
 @compiled("pose_type")
 def output_series(
-    group: Group, coordinates: dict[str, Any], pose_type: type
-) -> Float[Numbers, "order component instance batch"]:
-    """Return the Taylor coefficients of outputs, (order + 1, components, instances, batch)."""
+    groups: tuple[Group, ...], coordinates: dict[str, Any], pose_type: type
+) -> tuple[Float[Numbers, "_ _ _ batch"], ...]:
+    """Return the Taylor coefficients of outputs, (order + 1, components, instances, batch) for each group."""
     pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    return stacked(group.evaluate(pose))
+    return tuple(stacked(group.evaluate(pose)) for group in groups)
 
 
 def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
@@ -342,8 +342,8 @@ class Motion(Displayed):
 
     def _coefficients(self, group: Group) -> Float[np.ndarray, "order component instance time"]:
         """Return the Taylor coefficients of outputs, (order + 1, components, instances, time)."""
-        (group,) = self._counting((group,))
-        return np.asarray(output_series(group, self._coordinates, self.model.pose_type))
+        (series,) = output_series(self._counting((group,)), self._coordinates, self.model.pose_type)
+        return np.asarray(series)
 
     def _counting(self, groups: tuple[Group, ...]) -> tuple[Group, ...]:
         return groups if self.history is None else self.history.counting(groups, self.time)

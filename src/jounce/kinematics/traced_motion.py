@@ -34,7 +34,7 @@ class TracedMotion(Motion):
 
     def __init__(self, mechanism: Mechanism, models: tuple[Model, Model], time: np.ndarray, order: int, solved: Solved):
         held, model = models
-        outputs = [output_series(group, solved.coordinates, model.pose_type) for group in model.system.outputs]
+        outputs = list(output_series(model.system.outputs, solved.coordinates, model.pose_type))
         wrapping = iter(solved.continued)
         for k, group in enumerate(model.system.outputs):
             if getattr(group.element, "wraps", ()):
@@ -101,7 +101,7 @@ class TracedMotion(Motion):
         """Nothing can be said of values that are traced."""
 
     def _coefficients(self, group: Group) -> Float[Numbers, "order component instance time"]:
-        return output_series(group, self.poses[1], self.model.pose_type)
+        return output_series((group,), self.poses[1], self.model.pose_type)[0]
 
     def _derivatives(
         self, coefficients: Float[Numbers, "order component time"]

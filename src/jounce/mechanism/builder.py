@@ -382,12 +382,13 @@ def _with_found_of(group: Group, known: Group) -> Group:
 
 def _size(groups: tuple[Group, ...], guess: dict[str, Any]) -> float:
     """Return the largest distance among the points of the joints and the bodies of the guess, 1 if there is none."""
-    sizes = [np.max(np.linalg.norm(guess["position"], axis=0))]
+    points, sizes = [guess["position"][..., 0]], []
     for group in groups:
         for name, kind in field_kinds(type(group.element)).items():
             value = getattr(group.element, name)
             if kind == "vector" and name.startswith("point") and not isinstance(value, Tracer):
-                sizes.append(np.max(np.linalg.norm(value, axis=0)))
+                points.append(value[..., 0])
             elif name in ("length", "radius") and not isinstance(value, Tracer):
                 sizes.append(np.max(value))
-    return float(max(sizes)) or 1.0
+    farthest = np.linalg.norm(np.concatenate(points, axis=1), axis=0).max()
+    return float(max([farthest, *sizes])) or 1.0

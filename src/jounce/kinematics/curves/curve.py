@@ -318,7 +318,7 @@ class Curve(Displayed):
         coordinates = with_angular_velocity({name: c[:levels] for name, c in self._points[0].items()})
         model, instants, history = self._walker.model, self.arc_lengths, self._history
         groups = model.system.outputs if history is None else history.counting(model.system.outputs, instants)
-        series = tuple(np.asarray(output_series(group, coordinates, model.pose_type)) for group in groups)
+        series = tuple(map(np.asarray, output_series(groups, coordinates, model.pose_type)))
         status = np.full(len(instants), int(Status.OK))
         return Motion(mechanism, model, instants, self._order, (coordinates, series), status, {}, (), history)
 
