@@ -50,7 +50,7 @@ def in_memory(code: Code, values: Sequence[Value]) -> tuple[Region, int]:
         places = range(first, first + len(values))
         if all(v.home is not None and v.home == (region, k) for k, v in zip(places, values, strict=True)):
             return region, first
-    region = code.room(len(values), values[0].kind, lanes=any(value.lanes for value in values))
+    region = code.taken_room(len(values), values[0].kind, lanes=any(value.lanes for value in values))
     for k, value in enumerate(values):
         code.store(region, k, value)
     return region, 0

@@ -31,6 +31,10 @@ class Code(Scalars):
         Text of arrays of constants in memory.
     changeable : set of Region
         Memory of one array alone, which may be changed where nobody reads it any more.
+    held : list of Region
+        Memory of what loops carry that are being written, which is not given back.
+    taken : list of Region
+        All memory that was taken, in that order.
     """
 
     entry: list[str] = field(default_factory=list)
@@ -40,6 +44,8 @@ class Code(Scalars):
     alone: bool = False
     constants: list[str] = field(default_factory=list)
     changeable: set[Region] = field(default_factory=set)
+    held: list[Region] = field(default_factory=list)
+    taken: list[Region] = field(default_factory=list)
     _rooms: dict[tuple[int, str, bool], list[Region]] = field(default_factory=dict)  # that nobody uses any more
     _taken: dict[Region, tuple[int, str, bool]] = field(default_factory=dict)  # that somebody may, by what they hold
     _tables: dict[tuple[str, bytes], Region] = field(default_factory=dict)
@@ -65,11 +71,12 @@ class Code(Scalars):
         region = free.pop() if free else self.room(size, kind, lanes=lanes)
         self._taken[region] = key
         self.changeable.add(region)
+        self.taken.append(region)
         return region
 
     def give_back(self, region: Region) -> None:
         """Let memory be used again, if it can be given back."""
-        if (key := self._taken.pop(region, None)) is not None:
+        if region not in self.held and (key := self._taken.pop(region, None)) is not None:
             self._rooms.setdefault(key, []).append(region)
 
     @contextmanager
@@ -212,13 +219,13 @@ class Code(Scalars):
     def mark(self) -> tuple[Any, ...]:
         """Return how far the text has come, for `back_to`."""
         rooms = {key: list(regions) for key, regions in self._rooms.items()}
-        return len(self.lines), len(self.entry), len(self._known[-1]), self.memory, self.heap, rooms, dict(self._taken)
+        return len(self.lines), len(self.entry), len(self._known[-1]), self.memory, self.heap, rooms, dict(self._taken), len(self.taken)
 
     def back_to(self, mark: tuple[Any, ...]) -> None:
         """Take back what was written since a mark in the same scope."""
-        lines, entry, known, self.memory, self.heap, rooms, taken = mark
+        lines, entry, known, self.memory, self.heap, rooms, taken, count = mark
         self._rooms, self._taken = {key: list(regions) for key, regions in rooms.items()}, dict(taken)
-        del self.lines[lines:], self.entry[entry:]
+        del self.lines[lines:], self.entry[entry:], self.taken[count:]
         while len(self._known[-1]) > known:
             self._known[-1].popitem()
 

@@ -223,7 +223,8 @@ def _extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
     best = new(code, found.shape, array.kind, lanes=array.lanes)
     first = between(code, rows, rows.ndim - 1, 0, 1)
     put(code, best, replace(first, shape=first.shape[:-1], strides=first.strides[:-1]))
-    put(code, found, stored(code, np.broadcast_to(filled((), [code.constant(0, found.kind)]), found.shape)))
+    start = stored(code, filled((), [code.constant(0, found.kind)]))
+    put(code, found, spread(start, found.shape, ()))
 
     def look(k: int | Value) -> None:
         index = code.converted(k, found.kind) if isinstance(k, Value) else code.constant(k, found.kind)

@@ -198,7 +198,7 @@ def stored(code: Code, array: Array) -> Stored:
     if all(value.constant is not None for value in values):
         table = np.array([value.constant for value in values])
         if len(values) > 1 and len({number.tobytes() for number in table}) == 1:
-            one = contiguous(code.constants_region(table[:1], values[0].kind), ())
+            one = contiguous(code.constants_region([table[0]], values[0].kind), ())
             return spread(one, array.shape, ())
         region, first = code.constants_region([v.constant for v in values], values[0].kind), 0
     else:

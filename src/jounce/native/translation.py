@@ -5,7 +5,8 @@ last lane that is in it has left. So the results of a lane depend on no other.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -72,10 +73,14 @@ def translate(code: Code, program: Any, constants_: Sequence[Array], given: Sequ
     with code.used(wanted):
         for now, equation in enumerate(program.eqns):
             inputs = [read(variable) for variable in equation.invars]
+            before = len(code.taken)
             found = _found(code, equation, inputs)
             for variable, values in zip(equation.outvars, found, strict=True):
                 known[variable] = _checked(values, variable.aval)
             if last:
+                kept = {array.region for array in found if isinstance(array, Stored)}
+                for region in set(code.taken[before:]) - kept:
+                    code.give_back(region)
                 used = [v for v in (*equation.invars, *equation.outvars) if not isinstance(v, Literal)]
                 _let_go(code, known, [v for v in dict.fromkeys(used) if last.get(v, now) <= now])
     return [read(variable) for variable in program.outvars]
@@ -144,12 +149,11 @@ class _Carried:
 
     def __init__(self, code: Code, avals: Sequence[Any], lanes: Sequence[bool]):
         self.code, self.shapes = code, [aval.shape for aval in avals]
-        self.regions = [
-            code.room(int(np.prod(aval.shape)), kind_of(aval.dtype), lanes=vector)
-            for aval, vector in zip(avals, lanes, strict=True)
-        ]
         self.large = [is_large(code, aval) for aval in avals]
-        code.changeable.update(region for region, large in zip(self.regions, self.large, strict=True) if large)
+        self.regions = [
+            (code.taken_room if large else code.room)(math.prod(aval.shape), kind_of(aval.dtype), lanes=vector)
+            for aval, vector, large in zip(avals, lanes, self.large, strict=True)
+        ]
 
     def load(self) -> list[Array]:
         """Return the arrays as they are; large ones stay where they are."""
@@ -159,6 +163,16 @@ class _Carried:
             else filled(shape, [self.code.load(region, k) for k in range(math.prod(shape))])
             for region, shape, large in zip(self.regions, self.shapes, self.large, strict=True)
         ]
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Keep the memory while the loop is written."""
+        before = len(self.code.held)
+        self.code.held += self.regions
+        try:
+            yield
+        finally:
+            del self.code.held[before:]
 
     def store(self, arrays: Sequence[Array]) -> None:
         """Change the arrays: where a number is what was there when it was loaded, there is nothing to do."""
@@ -244,7 +258,7 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
         head, body, end = code.label(), code.label(), code.label()
         code.jump(head)
         code.begin(head)
-        with code.scope():
+        with code.scope(), carried.held():
             before = carried.load()
             with code.used(_among([*asked, *needed, *before])):
                 goes = code.among_here(_closed(code, p["cond_jaxpr"], asked, before)[0].item())
@@ -318,7 +332,7 @@ def _rolled(
         body, end = code.label(), code.label()
         code.jump(body)
         code.begin(body)
-        with code.scope(), code.used(_among([*needed, *homes])):
+        with code.scope(), code.used(_among([*needed, *homes])), carried.held(), written.held():
             count = code.load(counter, 0)
             at = code.arithmetic("sub", last, count) if p["reverse"] else count
             taken = [row_at(code, array, at) if array.size else np.empty(array.shape[1:], object) for array in homes]
