@@ -21,8 +21,9 @@ from jounce.integrate.turns import PLACES, AnglesOfForces, attitudes_at, followe
 from jounce.jet import Jet, dot
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.compilation import compiled
+from jounce.kinematics.compilation import Compiled, compiled
 from jounce.kinematics.motion import output_series
+from jounce.kinematics.side_by_side import SideBySide
 from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle, with_turns
 from jounce.mechanism.system import Group
@@ -31,6 +32,7 @@ from jounce.shapes import ArrayLike, Numbers
 MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
 )
+LARGE = 64  # numbers of an array that stays in memory in machine code of an instant
 FEW_INSTANTS = 8  # evaluated together, where there are no more: the end of a long run, say
 APPROACH = 4  # steps to such a place, each much shorter than the one before
 
@@ -240,31 +242,58 @@ def _at(
     order: int,
 ) -> Any:
     """Return what `expanded` does at instants in chosen steps, all of them."""
+    shared = equations, outputs
 
-    def chunk(lanes: np.ndarray) -> Any:
-        steps, now = chosen[lanes], instants[lanes]
+    def lanes_of(places: np.ndarray) -> Any:
+        steps, now = chosen[places], instants[places]
         polynomial = dense.polynomial.map(lambda part: part[steps].transpose(1, 2, 3, 0))
-        begun = equations.near(tuple(part[steps].T for part in dense.angles))
-        return expanded(begun, outputs, polynomial, now - dense.start[steps], now, order=order)
+        return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
+
+    code = expanded_instant.program(shared, lanes_of(np.zeros(1, int)), large=LARGE, order=order)
+
+    def chunk(places: np.ndarray) -> Any:
+        lanes = lanes_of(places)
+        return expanded(shared, lanes, order=order) if code is None else code(lanes)
 
     return in_chunks(chunk, len(instants), (FEW_INSTANTS, *WIDTHS))
 
 
-@compiled("order", narrow=True)
-def expanded(
-    equations: Equations, outputs: tuple[Group, ...], polynomial: State, step: Lanes, instants: Lanes, *, order: int
+def _expanded(
+    shared: tuple[Equations, tuple[Group, ...]], lanes: tuple[AnglesOfForces, State, Lanes, Lanes], order: int
 ) -> tuple[State, AnglesOfForces, tuple[Float[Numbers, "_ _ _ batch"], ...]]:
-    """Return the Taylor coefficients of the motion at instants a time `step` into steps, from the equations there.
+    """Return the Taylor coefficients of the motion at instants, from the equations there.
 
-    Angles about axes that forces measure are, in the equations, those at the beginnings of the steps; those at the
-    instants are returned too, and then the series of outputs, as `output_series` gives them.
+    Parameters
+    ----------
+    shared : tuple
+        Equations, and outputs.
+    lanes : tuple
+        Of each instant: angles about axes that forces measure at the beginning of the step it is in, the polynomial of
+        the step, the time since then, s, and the instant itself.
+    order : int
+        Highest coefficient.
+
+    Returns
+    -------
+    state : State
+        Coefficients, (order + 1, components, bodies, instants).
+    angles : tuple of array
+        About axes that forces measure, at the instants.
+    outputs : tuple of array
+        Their series, as `output_series` gives them.
     """
+    (equations, outputs), (angles, polynomial, step, instants) = shared, lanes
+    equations = equations.near(angles)
     begun = measured(equations, polynomial.map(lambda part: part[0]))
     there = equations.near(followed(equations, begun, polynomial, step).at(step))
     state, _, inverse = projected(there, evaluated(polynomial, step), instants[None])
     series = expand(there, state, instants[None], order, inverse).state
     found = output_series(outputs, pose_coordinates(series), equations.pose_type)
     return series, measured(there, state), found
+
+
+expanded = Compiled(_expanded, ("order",), narrow=True)
+expanded_instant = SideBySide(_expanded)
 
 
 def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:
