@@ -47,10 +47,10 @@ def compiled(function, lanes, shared=(), known=(), width=8, most_lines=MOST_LINE
         patch.setattr(modules, "vector_width", lambda: width)
         patch.setattr(programs, "vector_width", lambda: width)
         patch.setattr(modules, "compiled", verified)
-        binary = modules.object_file(
+        binary, results = modules.object_file(
             whole_function, kinds, one, {k: shared[k] for k in known}, most_lines=most_lines, large=large
         )
-        return programs.Program(binary, (kinds, one), jax.eval_shape(whole_function, kinds, one))
+        return programs.Program(binary, (kinds, one), results)
 
 
 def one_by_one(function, lanes, shared=()):
@@ -99,8 +99,8 @@ def assert_agree_alone(function, lanes, shared, expected, width, rtol, signs):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(modules, "vector_width", lambda: width)
         patch.setattr(modules, "compiled", verified)
-        binary = modules.object_file(of_one, kinds, (), {}, large=FEW, alone=True)
-    program = programs.Single(binary, kinds, jax.eval_shape(of_one, kinds, ()))
+        binary, results = modules.object_file(of_one, kinds, (), {}, large=FEW, alone=True)
+    program = programs.Single(binary, kinds, results)
     for k, given in zip(places, each, strict=True):
         actual = program([np.asarray(x) for x in jax.tree.leaves(given)])
         assert_same(actual, jax.tree.map(lambda x, k=k: x[..., k : k + 1], expected), rtol, f"lane {k}: ", signs)

@@ -21,6 +21,7 @@ from jounce.integrate.turns import PLACES, AnglesOfForces, attitudes_at, followe
 from jounce.jet import Jet, dot
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
+from jounce.kinematics.alone import is_short_lived
 from jounce.kinematics.compilation import Compiled, compiled
 from jounce.kinematics.motion import output_series
 from jounce.kinematics.side_by_side import SideBySide
@@ -249,7 +250,9 @@ def _at(
         polynomial = dense.polynomial.map(lambda part: part[steps].transpose(1, 2, 3, 0))
         return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
 
-    code = expanded_instant.program(shared, lanes_of(np.zeros(1, int)), large=LARGE, order=order)
+    code = expanded_instant.program(
+        shared, lanes_of(np.zeros(1, int)), large=LARGE, hasty=is_short_lived(), order=order
+    )
 
     def chunk(places: np.ndarray) -> Any:
         lanes = lanes_of(places)

@@ -33,6 +33,11 @@ def is_wanted() -> bool:
     return os.environ.get(VARIABLE, "") != "0" and machine.is_usable() and on_processor() and not being_debugged()
 
 
+def is_short_lived() -> bool:
+    """Tell whether code is compiled for one command, whose user waits for it: where programs are kept."""
+    return current_store() is not None
+
+
 def is_traced_alone() -> bool:
     """Tell whether what this thread traces becomes machine code, which needs no help to be in one piece."""
     return getattr(_thread, "tracing", False)
@@ -84,13 +89,13 @@ class Alone:
 
         def make() -> tuple[Any, ...]:
             try:
-                binary = object_file(function, given, (), {}, large=LARGE, alone=True)
+                binary, results = object_file(function, given, (), {}, large=LARGE, alone=True, hasty=is_short_lived())
             except UnsupportedOperationError:  # which is kept, too
                 return b"", None, None
-            return binary, jax.tree.leaves(given), jax.eval_shape(function, given, ())
+            return binary, jax.tree.leaves(given), results
 
         name = None
         if current_store() is not None:
             with suppress(UndescribedError):
-                name = program_key(self.made_of, tree, [kinds, "alone", machine.processor()], static)
+                name = program_key(self.made_of, tree, [kinds, "alone", is_short_lived(), machine.processor()], static)
         return made_or_kept(name, make, lambda binary, *rest: Single(binary, *rest) if binary else None)

@@ -100,7 +100,9 @@ class SideBySide:
         """How many programs were wanted, those that there is no code for included."""
         return len(self._programs)
 
-    def program(self, shared: Any, lanes: Any, *, large: int | None = None, **static: Any) -> Prepared | None:
+    def program(
+        self, shared: Any, lanes: Any, *, large: int | None = None, hasty: bool = False, **static: Any
+    ) -> Prepared | None:
         """Return its machine code; None where there is none: no compiler, or no code for what it does.
 
         Whole numbers among what is shared, which say what is joined to what, are part of the program.
@@ -111,6 +113,8 @@ class SideBySide:
             Of arrays, as the function has them.
         large : int, optional
             Arrays of more numbers are in memory, as `object_file` has it.
+        hasty : bool, default False
+            Whether it is to be there soon rather than fast.
         **static
             Further arguments of the function.
         """
@@ -123,10 +127,10 @@ class SideBySide:
         places = {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
         kinds = tuple((x.shape, x.dtype.str) for x in (*arrays, *jax.tree.leaves(one)))
         known = tuple(x.tobytes() for x in places.values())
-        key = structure, jax.tree.structure(one), kinds, known, large, tuple(static.items()), settings()
+        key = structure, jax.tree.structure(one), kinds, known, large, hasty, tuple(static.items()), settings()
         with self._lock:
             if key not in self._programs:
-                self._programs[key] = self._made((shapes, one), places, large, static)
+                self._programs[key] = self._made((shapes, one), places, {"large": large, "hasty": hasty}, static)
             program = self._programs[key]
         return None if program is None else Prepared(program, arrays)
 
@@ -135,19 +139,23 @@ class SideBySide:
         return (*(shape[1:] if self.rows else shape[:-1]), 1)
 
     def _made(
-        self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], large: int | None, static: dict[str, Any]
+        self,
+        given: tuple[Any, Any],
+        places: Mapping[int, np.ndarray],
+        how: dict[str, Any],
+        static: dict[str, Any],
     ) -> Program | None:
         """Return a program from the store of programs, or one that is made."""
-        function, options = partial(self.function, **static), {"most_lines": self.most_lines, "large": large}
+        function, options = partial(self.function, **static), how | {"most_lines": self.most_lines}
 
         def make() -> tuple[Any, ...]:
             try:
-                binary = object_file(function, *given, places, rows=self.rows, **options)
+                binary, results = object_file(function, *given, places, rows=self.rows, **options)
             except UnsupportedOperationError:  # which is kept, too: to find it out takes long
                 return b"", None, None
-            return binary, tuple(map(jax.tree.leaves, given)), jax.eval_shape(function, *given)
+            return binary, tuple(map(jax.tree.leaves, given)), results
 
-        key = self._key(given, places, static | {"large": large}) if current_store() is not None else None
+        key = self._key(given, places, static | how) if current_store() is not None else None
         return made_or_kept(key, make, self._loaded)
 
     def _loaded(self, binary: bytes, given: Any, results: Any) -> Program | None:

@@ -12,6 +12,7 @@ from jax.errors import ConcretizationTypeError
 
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
 from jounce.kinematics.actuation import actuated
+from jounce.kinematics.alone import is_short_lived
 from jounce.kinematics.advance import SolvedState
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.curves.choice import chosen
@@ -47,6 +48,7 @@ LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the us
 HIGHEST_ORDER = 30  # of derivatives of outputs
 HIGHEST_OF_MOTION = HIGHEST_ORDER + 2  # forces are two derivatives shorter than the motion
 LARGEST_TOLERANCE = 1e-2
+FEW_FOR_CODE = 100_000  # instants of one command: for fewer, faster code takes longer to compile than it saves
 REHEARSED = 2  # instants: forces are computed for many at a time, however few there are
 
 
@@ -228,7 +230,8 @@ def _followed(
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
     check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
     guessed = build(chosen(with_outputs_held(mechanism), first))
-    solver = Solver(guessed, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order)
+    hasty = is_short_lived() and len(instants) <= FEW_FOR_CODE
+    solver = Solver(guessed, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order, hasty)
     new = first_time("leg", guessed.system, solver.order, len(instants) > LONG_GRID)
     beside = new and thread_count() > 1
     with rehearsed(partial(_prepare, solver, first), wanted=beside):

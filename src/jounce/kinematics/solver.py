@@ -22,7 +22,8 @@ SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one
 LONGEST_LEG = 32  # batches
 LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
 FEWEST_SIDE_BY_SIDE, MOST_SIDE_BY_SIDE = 64, 1024  # instants of a long grid in a call of machine code
-MOST_COLUMNS = 120  # of a Jacobian: of more, machine code of single values is too long
+FEW_COLUMNS = 120  # of a Jacobian: of more, machine code of single values is too long
+MOST_COLUMNS = 1500  # of more, what a vector of instants has is in no cache: XLA takes fewer at a time
 LARGE = 64  # numbers of an array that stays in memory there
 NO_GRID = np.empty(0)
 
@@ -36,6 +37,7 @@ class Solver:
     tolerance: float
     refine: bool = True
     wanted: int = 0  # highest derivative that must be finite
+    hasty: bool = False  # whether machine code is to be there soon rather than fast
 
     def __call__(
         self,
@@ -148,9 +150,12 @@ class Solver:
         outputs = tuple(np.zeros((self.order + 1, 1, group.instances, 1)) for group in system.outputs)
         instants = self.needed((still, outputs, nothing)), nothing, nothing, np.zeros(1, bool)
         kind = self.model.pose_type
-        large = None if system.shape[1] <= MOST_COLUMNS else LARGE
+        size = system.shape[1]
+        if size > MOST_COLUMNS:
+            return None
+        how = {"large": None if size <= FEW_COLUMNS else LARGE, "hasty": self.hasty}
         shared = system, tolerance, refine, wanted
-        return advance_instant.program(shared, instants, large=large, pose_type=kind, order=self.order)
+        return advance_instant.program(shared, instants, **how, pose_type=kind, order=self.order)
 
     @cached_property
     def _batches(self) -> int:

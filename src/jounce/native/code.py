@@ -219,7 +219,16 @@ class Code(Scalars):
     def mark(self) -> tuple[Any, ...]:
         """Return how far the text has come, for `back_to`."""
         rooms = {key: list(regions) for key, regions in self._rooms.items()}
-        return len(self.lines), len(self.entry), len(self._known[-1]), self.memory, self.heap, rooms, dict(self._taken), len(self.taken)
+        return (
+            len(self.lines),
+            len(self.entry),
+            len(self._known[-1]),
+            self.memory,
+            self.heap,
+            rooms,
+            dict(self._taken),
+            len(self.taken),
+        )
 
     def back_to(self, mark: tuple[Any, ...]) -> None:
         """Take back what was written since a mark in the same scope."""

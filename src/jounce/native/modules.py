@@ -35,8 +35,9 @@ def object_file(
     most_lines: int = MOST_LINES,
     large: int | None = None,
     alone: bool = False,
-) -> bytes:
-    """Return the machine code of a function of one instant, as an object file.
+    hasty: bool = False,
+) -> tuple[bytes, Any]:
+    """Return the machine code of a function of one instant, as an object file, and the form of its results.
 
     Parameters
     ----------
@@ -56,16 +57,17 @@ def object_file(
         unless given.
     alone : bool, default False
         Whether there is one instant only, all of whose arrays are in `shared`.
+    hasty : bool, default False
+        As `compiled` has it.
 
     Raises
     ------
     UnsupportedOperationError
         Where there is no code for it, or too much.
     """
-    closed, count = jax.make_jaxpr(function)(shared, lanes), len(jax.tree.leaves(shared))
-    return compiled(
-        _text(closed, count, known, vector_width(), rows=rows, most_lines=most_lines, large=large, alone=alone)
-    )
+    closed, results = jax.make_jaxpr(function, return_shape=True)(shared, lanes)
+    count, options = len(jax.tree.leaves(shared)), {"most_lines": most_lines, "large": large, "alone": alone}
+    return compiled(_text(closed, count, known, vector_width(), rows=rows, **options), hasty=hasty), results
 
 
 def _text(
