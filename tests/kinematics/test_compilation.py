@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.kinematics import compilation
+from jounce.kinematics import compilation, store as store_
 from jounce.kinematics.compilation import Compiled, compiles_anew
 
 
@@ -38,9 +38,9 @@ def example(x, y=(), *, times=1):
 def shelf():
     traced.clear()
     store = Shelf()
-    compilation.keep_programs(store)
+    store_.keep_programs(store)
     yield store
-    compilation.keep_programs(None)
+    store_.keep_programs(None)
 
 
 def anew():

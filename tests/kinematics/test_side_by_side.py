@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.kinematics import Status, compilation, side_by_side
+from jounce.kinematics import Status, side_by_side, store as store_
 from jounce.kinematics.instant_program import advance_instant
 from jounce.kinematics.side_by_side import SideBySide
 from jounce.native import handler, machine
-from jounce.native.programs import Program, object_file
+from jounce.native.modules import object_file
+from jounce.native.programs import Program
 from tests.kinematics.test_compilation import Shelf
 from tests.problems.small import four_bar, slider_crank
 
@@ -110,7 +111,7 @@ def results(function):
 
 def test_what_is_kept_is_not_made_again(monkeypatch):
     store, made = Shelf(), []
-    monkeypatch.setattr(compilation, "_store", store)
+    monkeypatch.setattr(store_, "_store", store)
     function = example.function
     monkeypatch.setattr(side_by_side, "program_key", lambda *given: repr(given[2]))  # it has no name in the package
     monkeypatch.setattr(side_by_side, "object_file", lambda *a, **k: made.append(1) or object_file(*a, **k))
@@ -125,7 +126,7 @@ def test_what_is_kept_is_not_made_again(monkeypatch):
 
 def test_a_function_of_a_user_is_not_kept(monkeypatch):
     store = Shelf()
-    monkeypatch.setattr(compilation, "_store", store)
+    monkeypatch.setattr(store_, "_store", store)
     results(fresh())
     assert not store
 

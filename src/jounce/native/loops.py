@@ -161,7 +161,7 @@ def _pad(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     found = _made(code, equation, given)
     put(code, found, spread(nothing_, found.shape, ()))
     target = found
-    for axis, (low, _, between_) in enumerate(equation.params["padding_config"]):
+    for axis, (low, _, between_) in enumerate(tuple(map(int, sizes)) for sizes in equation.params["padding_config"]):
         step = between_ + 1
         before = max(0, -(low // step)) if low < 0 else 0  # of the array, beyond the beginning
         start = low + before * step
