@@ -49,6 +49,15 @@ def test_sums_of_every_size_are_those_of_numpy(size):
     np.testing.assert_allclose(found(start)[0], np.linalg.matrix_power(matrix[..., 0], 5) @ start, atol=1e-16)
 
 
+def test_operations_on_many_numbers_are_not_shared_among_threads():
+    @compiled(without=kernels.LIBRARIES)
+    def found(x):
+        return kernels.in_one_piece(lambda x: jnp.sin(x) * jnp.exp(x), x)
+
+    x = np.linspace(-1.0, 1.0, 500_000)  # XLA would share them among the cores, by a function that is out of reach
+    np.testing.assert_allclose(found(x), np.sin(x) * np.exp(x), rtol=1e-14)
+
+
 def test_small_loops_are_marked(tried):
     assert marked(halved(lambda x: 0.5 * jnp.sin(x)), jnp.ones(3))
 
