@@ -69,7 +69,7 @@ def _part(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
 
 def _broadcast(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     p = equation.params
-    return [spread(stored(code, given[0]), p["shape"], p["broadcast_dimensions"])]
+    return [spread(stored(code, given[0]), p["shape"], tuple(map(int, p["broadcast_dimensions"])))]
 
 
 def _reshape(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
