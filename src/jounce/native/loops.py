@@ -172,27 +172,27 @@ def _pad(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     return [found]
 
 
-def _dynamic_update_slice(code: Code, _: Any, given: Sequence[Array]) -> Sequence[Array]:
+def _dynamic_update_slice(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Change a part of an array: in its place where nobody else sees it."""
     array, part, *starts = given
     places = _starts(code, array, part.shape, starts)
     lanes = _lanes([part, *starts])
     if is_own(code, array) and (array.lanes or not lanes):
         found = array
-    elif lanes and not _lanes([array]):
-        found = new(code, array.shape, _kind(array), lanes=True)
-        put(code, found, stored(code, array))
     else:
-        found = copied(code, array)
+        found = _made(code, equation, [array, part, *starts])
+        put(code, found, stored(code, array))
     target = found
     for axis, (start, size) in enumerate(zip(places, part.shape, strict=True)):
         target = between(code, target, axis, start, size)
-    put(code, target, copied(code, part) if isinstance(part, Stored) and part.region is found.region else part)
+    put(code, target, _apart(code, part, found))
     return [found]
 
 
-def _kind(array: Array) -> str:
-    return array.kind if isinstance(array, Stored) else array.item(0).kind
+def _apart(code: Code, array: Array, changed: Array) -> Array:
+    """Return an array that stays as it is while another one is changed: copied if it may be a part of that."""
+    same = isinstance(array, Stored) and isinstance(changed, Stored) and array.region is changed.region
+    return copied(code, array) if same else array
 
 
 # -- along axes -------------------------------------------------------------------------------------------------------
@@ -333,15 +333,14 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
 
 def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Put numbers at indices, or add them to what is there."""
-    array, indices, updates = given[0], stored(code, given[1]), stored(code, given[2])
-    if isinstance(array, Stored) and updates.region is array.region:
-        updates = copied(code, updates)
+    array, *others = given
+    indices, updates = (_apart(code, stored(code, other), array) for other in others)
     p, add = equation.params, equation.primitive.name == "scatter-add"
     numbers = p["dimension_numbers"]
     if is_own(code, array) and (array.lanes or not (updates.lanes or indices.lanes)):
         found = array
     else:
-        found = new(code, array.shape, _kind(array), lanes=_lanes([array, updates, indices]))
+        found = _made(code, equation, [array, updates, indices])
         put(code, found, stored(code, array))
     if not updates.size or not found.size:
         return [found]

@@ -144,7 +144,7 @@ def spread(array: Stored, shape: Sequence[int], axes: Sequence[int]) -> Stored:
 
 def reshaped(code: Code, array: Stored, shape: Sequence[int]) -> Stored:
     """Return the same numbers in another shape, copied where no strides tell it."""
-    strides = _split(*_merged(array.shape, [array.strides]), shape)
+    strides = _split(*_merged(array.shape, [array.strides]), shape) if array.size else None
     if strides is None:
         return contiguous(copied(code, array).region, shape)
     return replace(array, shape=tuple(shape), strides=strides)

@@ -4,6 +4,7 @@ Where lanes part, all ways that some lane takes are run, and each keeps what its
 last lane that is in it has left. So the results of a lane depend on no other.
 """
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -323,10 +324,10 @@ def _rolled(
             at = code.arithmetic("sub", last, count) if p["reverse"] else count
             taken = [row_at(code, array, at) if array.size else np.empty(array.shape[1:], object) for array in homes]
             results = _closed(code, p["jaxpr"], needed, carried.load(), taken)
-            carried.store(results[:size])
             for region, array in zip(written.regions, results[size:], strict=True):
                 if array.size:
                     put(code, contiguous(region, array.shape, further(code, 0, at, array.size)), array)
+            carried.store(results[:size])  # after what may be a part of what was carried
             code.store(counter, 0, code.arithmetic("add", count, code.constant(1, "l")))
             code.branch(code.operand(code.compare("lt", count, last), lanes=False), body, end)
         code.begin(end)
@@ -346,7 +347,8 @@ def _unrolled(
     p, mark, before = equation.params, code.mark(), len(code.lines)
     size, found = len(start), {}
     for k in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
-        results = _closed(code, p["jaxpr"], needed, start, [row_at(code, array, k) for array in rows])
+        with code.used(_among([*needed, *rows, *itertools.chain(*found.values())])):
+            results = _closed(code, p["jaxpr"], needed, start, [row_at(code, array, k) for array in rows])
         start, found[k] = results[:size], results[size:]
         lines, left = len(code.lines) - before, p["length"] - len(found)
         if p["length"] > 1 and lines + lines / len(found) / HOPE * left > most:
