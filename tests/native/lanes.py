@@ -74,7 +74,9 @@ def assert_same(actual, expected, rtol=1e-13, names="", signs=True):
         np.testing.assert_array_equal(np.signbit(mine[nothing]), np.signbit(theirs[nothing]), err_msg=f"{name} (sign)")
 
 
-def assert_agree(function, *lanes, shared=(), known=(), width=8, counts=(COUNT,), rtol=1e-13, signs=True, larges=(None, FEW)):
+def assert_agree(
+    function, *lanes, shared=(), known=(), width=8, counts=(COUNT,), rtol=1e-13, signs=True, larges=(None, FEW)
+):
     """Compare machine code with JAX for the first lanes of some numbers of them: arrays as values, and in memory."""
     expected = one_by_one(function, lanes, shared)
     for large in larges:

@@ -122,10 +122,14 @@ def updated(pool, i, j, k, parts):
 
 def put(pool, i, j, k, parts):
     mode, where = ("clip", "drop")[k % 2], jnp.concatenate([pool.number(k + n) for n in range(2)])
-    where = (pool.number(k)[0], where, lax.rem(pool.array(k), jnp.full((SIZE, 1), 10.0)).astype(int)[: 1 + i % 4, 0])[j % 3]
+    where = (pool.number(k)[0], where, lax.rem(pool.array(k), jnp.full((SIZE, 1), 10.0)).astype(int)[: 1 + i % 4, 0])[
+        j % 3
+    ]
     new = pool.double(j) if where.ndim == 0 else pool.array(j)[: len(where)]
     at = pool.array(i).at[where]
-    pool.arrays.append(lax.rem(at.add(new, mode=mode), jnp.full((SIZE, 1), 1009.0)) if k % 3 else at.set(new, mode=mode))
+    pool.arrays.append(
+        lax.rem(at.add(new, mode=mode), jnp.full((SIZE, 1), 1009.0)) if k % 3 else at.set(new, mode=mode)
+    )
 
 
 def taken(pool, i, j, k, parts):
@@ -220,7 +224,9 @@ def programs_of(lines, loops):
 
 NUMBER_NAMES, ARRAY_NAMES = ([f.__name__ for f in functions] for functions in (OF_NUMBERS, OF_ARRAYS))
 PROGRAMS = programs_of(NUMBER_NAMES, ["loop", "scan"])
-PROGRAMS_OF_ARRAYS = programs_of([*ARRAY_NAMES, *ARRAY_NAMES, *NUMBER_NAMES], ["loop", "scan", "scan_of_arrays", "called"])
+PROGRAMS_OF_ARRAYS = programs_of(
+    [*ARRAY_NAMES, *ARRAY_NAMES, *NUMBER_NAMES], ["loop", "scan", "scan_of_arrays", "called"]
+)
 
 
 def assert_exact(program, seed, unrolled, width=8, arrays=False):

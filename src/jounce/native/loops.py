@@ -11,24 +11,24 @@ from jounce.native.arrays import Values, filled
 from jounce.native.axes import combination, nothing
 from jounce.native.code import Code, flat
 from jounce.native.operations import ELEMENTWISE, RULES
-from jounce.native.places import filler, within
+from jounce.native.places import filler, kept_inside, within
 from jounce.native.stored import (
     Array,
     Stored,
-    at,
     between,
     copied,
     counted,
     further,
     is_own,
     nest,
-    new,
     put,
-    replace_home,
     reshaped,
+    room_for,
+    row,
     spread,
     stored,
     transposed,
+    without_home,
 )
 from jounce.native.values import Value, kind_of
 
@@ -43,7 +43,7 @@ def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     rule, aval = RULES[equation.primitive.name], equation.outvars[0].aval
     arrays = [stored(code, array) for array in given]
     arrays = [spread(x, aval.shape, range(x.ndim)) if x.ndim else spread(x, aval.shape, ()) for x in arrays]
-    found = new(code, aval.shape, kind_of(aval.dtype), lanes=any(x.lanes for x in arrays))
+    found = room_for(code, aval.shape, kind_of(aval.dtype), lanes=any(x.lanes for x in arrays))
 
     def body(values: Sequence[Value]) -> Sequence[Value]:
         return [result.item() for result in rule(code, equation, [filled((), [value]) for value in values])]
@@ -90,7 +90,7 @@ def _reverse(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
 def _unstack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     array, axis = stored(code, given[0]), int(equation.params["axis"])
     rows = transposed(array, [axis, *(k for k in range(array.ndim) if k != axis)])
-    return [at(code, rows, k) for k in range(rows.shape[0])]
+    return [row(code, rows, k) for k in range(rows.shape[0])]
 
 
 def _split(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -112,11 +112,8 @@ def _window(code: Code, array: Stored, starts: Sequence[int | Value], equation: 
 
 def _starts(code: Code, array: Array, sizes: Sequence[int], starts: Sequence[Values]) -> list[int | Value]:
     """Return where a part begins, moved so that all of it is in bounds."""
-    found = []
-    for whole, size, start in zip(array.shape, sizes, starts, strict=True):
-        index = within(code, start.item(), 0, whole - size)
-        found.append(index if index.constant is None else int(index.constant))
-    return found
+    found = kept_inside(code, array.shape, sizes, starts)
+    return [index if index.constant is None else int(index.constant) for index in found]
 
 
 # -- arrays made of others --------------------------------------------------------------------------------------------
@@ -129,7 +126,7 @@ def _lanes(arrays: Sequence[Array]) -> bool:
 def _made(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
     """Return room for the result of an operation."""
     aval = equation.outvars[0].aval
-    return new(code, aval.shape, kind_of(aval.dtype), lanes=_lanes(given))
+    return room_for(code, aval.shape, kind_of(aval.dtype), lanes=_lanes(given))
 
 
 def _concatenate(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -144,8 +141,8 @@ def _stack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]
     found, axis = _made(code, equation, given), int(equation.params["axis"])
     rows = transposed(found, [axis, *(k for k in range(found.ndim) if k != axis)])
     for k, array in enumerate(given):
-        row = between(code, rows, 0, k, 1)
-        put(code, replace(row, shape=row.shape[1:], strides=row.strides[1:]), array)
+        target = between(code, rows, 0, k, 1)
+        put(code, replace(target, shape=target.shape[1:], strides=target.strides[1:]), array)
     return [found]
 
 
@@ -277,7 +274,7 @@ def _placed(
         where = rows.first
         for k, stride in zip((*batch, numbers[axis]), rows.strides, strict=True):
             where = further(code, where, k, stride)
-        index = code.converted(replace_home(code.load(rows.region, where)), "l")
+        index = code.converted(without_home(code.load(rows.region, where)), "l")
         kept = within(code, index, 0, size - sizes[axis])
         inside = code.logic("and", inside, code.compare("eq", kept, index))
         place = further(code, place, kept, array.strides[axis])
@@ -298,7 +295,7 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
     """Return parts of an array at indices."""
     p, array, indices = equation.params, stored(code, given[0]), stored(code, given[1])
     numbers, aval = p["dimension_numbers"], equation.outvars[0].aval
-    found = new(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
+    found = room_for(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
     offsets = list(numbers.offset_dims)
     batch = [axis for axis in range(found.ndim) if axis not in offsets]
     taken = [
