@@ -27,7 +27,7 @@ def ordinary(*shape, seed=0, low=-2.0, high=2.0):
     return np.random.default_rng(seed).uniform(low, high, (*shape, COUNT))
 
 
-def whole(*shape, seed=0, low=-9, high=10, dtype=np.int64):
+def whole(*shape, seed=0, low=-9, high=10, dtype: type = np.int64):
     """Return random whole numbers, with the lanes along the last axis."""
     return np.random.default_rng(seed).integers(low, high, (*shape, COUNT), dtype=dtype)
 

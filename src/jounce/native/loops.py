@@ -7,7 +7,7 @@ from typing import Any
 
 from jax.lax import GatherScatterMode
 
-from jounce.native.arrays import Values, filled
+from jounce.native.arrays import filled
 from jounce.native.axes import combination, nothing
 from jounce.native.code import Code, flat
 from jounce.native.operations import ELEMENTWISE, RULES
@@ -28,6 +28,7 @@ from jounce.native.stored import (
     spread,
     stored,
     transposed,
+    values_of,
     without_home,
 )
 from jounce.native.values import Value, kind_of
@@ -101,19 +102,15 @@ def _split(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]
 
 def _dynamic_slice(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     array, *starts = given
-    return [_window(code, stored(code, array), _starts(code, array, equation.params["slice_sizes"], starts), equation)]
+    return [_window(code, stored(code, array), equation.params["slice_sizes"], starts)]
 
 
-def _window(code: Code, array: Stored, starts: Sequence[int | Value], equation: Any) -> Stored:
-    for axis, (start, size) in enumerate(zip(starts, equation.params["slice_sizes"], strict=True)):
-        array = between(code, array, axis, start, size)
+def _window(code: Code, array: Stored, sizes: Sequence[int], starts: Sequence[Array]) -> Stored:
+    """Return a part of an array, moved so that all of it is in bounds."""
+    places = kept_inside(code, array.shape, sizes, [values_of(code, start) for start in starts])
+    for axis, (place, size) in enumerate(zip(places, sizes, strict=True)):
+        array = between(code, array, axis, place if place.constant is None else int(place.constant), size)
     return array
-
-
-def _starts(code: Code, array: Array, sizes: Sequence[int], starts: Sequence[Values]) -> list[int | Value]:
-    """Return where a part begins, moved so that all of it is in bounds."""
-    found = kept_inside(code, array.shape, sizes, starts)
-    return [index if index.constant is None else int(index.constant) for index in found]
 
 
 # -- arrays made of others --------------------------------------------------------------------------------------------
@@ -170,26 +167,27 @@ def _pad(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
 
 
 def _dynamic_update_slice(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    """Change a part of an array: in its place where nobody else sees it."""
-    array, part, *starts = given
-    places = _starts(code, array, part.shape, starts)
-    lanes = _lanes([part, *starts])
-    if is_own(code, array) and (array.lanes or not lanes):
-        found = array
-    else:
-        found = _made(code, equation, [array, part, *starts])
-        put(code, found, stored(code, array))
-    target = found
-    for axis, (start, size) in enumerate(zip(places, part.shape, strict=True)):
-        target = between(code, target, axis, start, size)
-    put(code, target, _apart(code, part, found))
+    """Change a part of an array."""
+    _, part, *starts = given
+    found = _to_change(code, equation, given)
+    target = _window(code, found, part.shape, starts)
+    put(code, target, _apart(code, part, found) if isinstance(part, Stored) else part)
     return [found]
 
 
-def _apart(code: Code, array: Array, changed: Array) -> Array:
+def _to_change(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
+    """Return the first of some arrays, for the others to change it: in its place where nobody else reads it."""
+    array, *others = given
+    if isinstance(array, Stored) and is_own(code, array) and (array.lanes or not _lanes(others)):
+        return array
+    found = _made(code, equation, given)
+    put(code, found, stored(code, array))
+    return found
+
+
+def _apart(code: Code, array: Stored, changed: Stored) -> Stored:
     """Return an array that stays as it is while another one is changed: copied if it may be a part of that."""
-    same = isinstance(array, Stored) and isinstance(changed, Stored) and array.region is changed.region
-    return copied(code, array) if same else array
+    return copied(code, array) if array.region is changed.region else array
 
 
 # -- along axes -------------------------------------------------------------------------------------------------------
@@ -330,15 +328,10 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
 
 def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Put numbers at indices, or add them to what is there."""
-    array, *others = given
-    indices, updates = (_apart(code, stored(code, other), array) for other in others)
+    found = _to_change(code, equation, given)
+    indices, updates = (_apart(code, stored(code, array), found) for array in given[1:])
     p, add = equation.params, equation.primitive.name == "scatter-add"
     numbers = p["dimension_numbers"]
-    if is_own(code, array) and (array.lanes or not (updates.lanes or indices.lanes)):
-        found = array
-    else:
-        found = _made(code, equation, [array, updates, indices])
-        put(code, found, stored(code, array))
     if not updates.size or not found.size:
         return [found]
     windows = list(numbers.update_window_dims)

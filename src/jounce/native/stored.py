@@ -78,11 +78,10 @@ def room_for(code: Code, shape: Sequence[int], kind: str, *, lanes: bool) -> Sto
     return contiguous(code.taken_room(math.prod(shape), kind, lanes=lanes), shape)
 
 
-def is_own(code: Code, array: Any) -> bool:
+def is_own(code: Code, array: Stored) -> bool:
     """Tell whether an array may be changed in its place: it is all that is there, and nobody else reads it."""
     return (
-        isinstance(array, Stored)
-        and array.region in code.changeable
+        array.region in code.changeable
         and array.is_same(contiguous(array.region, array.shape))
         and code.is_unshared(array.region)
     )

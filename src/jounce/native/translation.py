@@ -134,6 +134,10 @@ def _called(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     return _closed(code, closed, given) if hasattr(closed, "jaxpr") else translate(code, closed, (), given)
 
 
+def _number(code: Code, array: Array) -> Value:
+    return values_of(code, array).item()
+
+
 def _closed(code: Code, closed: Any, *given: Sequence[Array]) -> list[Array]:
     numbers = [constants(code, number) for number in closed.consts]
     return translate(code, closed.jaxpr, numbers, [array for some in given for array in some])
@@ -206,7 +210,7 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
         with code.scope():
             before = carried.load()
             with code.used(_among([*asked, *needed, *before])):
-                goes = code.among_here(_closed(code, p["cond_jaxpr"], asked, before)[0].item())
+                goes = code.among_here(_number(code, _closed(code, p["cond_jaxpr"], asked, before)[0]))
             if goes.lanes and not all(lanes):  # what a lane keeps that has left differs
                 return [True] * len(lanes), []
             code.branch(code.anywhere(goes), body, end)
@@ -317,8 +321,9 @@ def _unrolled(
 
 
 def _stacked(code: Code, parts: Sequence[Array]) -> Array:
-    if not any(map(_is_stored, parts)) and not (code.large and len(parts) * parts[0].size > code.large):
-        return np.stack(parts)
+    single = [part for part in parts if not isinstance(part, Stored)]
+    if len(single) == len(parts) and (code.large is None or len(parts) * parts[0].size <= code.large):
+        return np.stack(single)
     lanes = _in_lanes(parts)
     kind = next(p.kind if isinstance(p, Stored) else p.item(0).kind for p in parts)
     found = room_for(code, (len(parts), *parts[0].shape), kind, lanes=any(lanes))
@@ -329,7 +334,7 @@ def _stacked(code: Code, parts: Sequence[Array]) -> Array:
 
 def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     """Write ways of which each lane takes one: all that some lane takes are run."""
-    ways, which, inputs = equation.params["branches"], given[0].item(), given[1:]
+    ways, which, inputs = equation.params["branches"], _number(code, given[0]), given[1:]
     which = code.converted(which, "i") if which.kind == "b" else which
     if len(ways) == 1 or which.constant is not None:
         return _closed(code, ways[min(max(int(which.constant or 0), 0), len(ways) - 1)], inputs)
