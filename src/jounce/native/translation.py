@@ -4,7 +4,6 @@ Where lanes part, all ways that some lane takes are run, and each keeps what its
 last lane that is in it has left. So the results of a lane depend on no other.
 """
 
-import itertools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -90,7 +89,7 @@ def _last_uses(program: Any) -> dict[Any, int]:
 def _let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
     """Forget variables that nobody reads any more, and give back what memory only they had."""
     gone = [known.pop(variable, None) for variable in variables]
-    for region in {array.region for array in gone if isinstance(array, Stored)}:
+    for region in _regions([array for array in gone if array is not None]):
         if code.is_unshared(region):
             code.give_back(region)
 
@@ -230,8 +229,11 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
 
 def _among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
     """Return what tells the memory of some arrays."""
-    regions = {array.region for array in arrays if isinstance(array, Stored)}
-    return regions.__contains__
+    return _regions(arrays).__contains__
+
+
+def _regions(arrays: Sequence[Array]) -> set[Region]:
+    return {array.region for array in arrays if isinstance(array, Stored)}
 
 
 def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -307,11 +309,12 @@ def _unrolled(
     It is given up early where the turns so far, of which the first are longer than the others, leave no hope.
     """
     p, mark, before = equation.params, code.mark(), len(code.lines)
-    size, found = len(start), {}
+    size, found, kept = len(start), {}, _regions([*needed, *rows])
     for k in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
-        with code.used(_among([*needed, *rows, *itertools.chain(*found.values())])):
+        with code.used(kept.__contains__):
             results = _closed(code, p["jaxpr"], needed, start, [row(code, array, k) for array in rows])
         start, found[k] = results[:size], results[size:]
+        kept |= _regions(found[k])
         lines, left = len(code.lines) - before, p["length"] - len(found)
         if p["length"] > 1 and lines + lines / len(found) / HOPE * left > most:
             code.back_to(mark)
