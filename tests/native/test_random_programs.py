@@ -260,7 +260,7 @@ def test_random_programs(program, seed, unrolled):
     assert_exact(program, seed, unrolled)
 
 
-@hypothesis.settings(max_examples=3)
+@hypothesis.settings(max_examples=2)
 @hypothesis.given(PROGRAMS_OF_ARRAYS, st.integers(0, 99), st.booleans())
 def test_random_programs_of_arrays(program, seed, unrolled):
     assert_exact(program, seed, unrolled, arrays=True)
