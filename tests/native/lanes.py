@@ -27,7 +27,7 @@ def ordinary(*shape, seed=0, low=-2.0, high=2.0):
     return np.random.default_rng(seed).uniform(low, high, (*shape, COUNT))
 
 
-def whole(*shape, seed=0, low=-9, high=10, dtype=np.int64):
+def whole(*shape, seed=0, low=-9, high=10, dtype: type = np.int64):
     """Return random whole numbers, with the lanes along the last axis."""
     return np.random.default_rng(seed).integers(low, high, (*shape, COUNT), dtype=dtype)
 
@@ -74,10 +74,12 @@ def assert_same(actual, expected, rtol=1e-13, names="", signs=True):
         np.testing.assert_array_equal(np.signbit(mine[nothing]), np.signbit(theirs[nothing]), err_msg=f"{name} (sign)")
 
 
-def assert_agree(function, *lanes, shared=(), known=(), width=8, counts=(COUNT,), rtol=1e-13, signs=True):
+def assert_agree(
+    function, *lanes, shared=(), known=(), width=8, counts=(COUNT,), rtol=1e-13, signs=True, larges=(None, FEW)
+):
     """Compare machine code with JAX for the first lanes of some numbers of them: arrays as values, and in memory."""
     expected = one_by_one(function, lanes, shared)
-    for large in (None, FEW):
+    for large in larges:
         program = compiled(function, lanes, shared, known, width, large=large)
         for count in counts:
             first = (..., slice(count))

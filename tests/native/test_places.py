@@ -167,9 +167,11 @@ def test_batches_of_indices():
 def test_elements_of_many_at_an_index():
     x = ordinary(100)
     assert_agree(lambda k, x: x[k[0]], x, shared=(np.array([99]),))
-    with pytest.raises(UnsupportedOperationError):
-        compiled(lambda n, x: x[n[0]], (BEYOND, x))
-    with pytest.raises(UnsupportedOperationError):
+    assert_agree(lambda n, x: (x[n[0]], (x > 0.0)[n[0]], x.at[n].get(mode="fill")), 20 * BEYOND, x)
+
+
+def test_elements_at_two_indices_that_are_not_known_want_memory():
+    with pytest.raises(UnsupportedOperationError, match="more than one"):
         compiled(lambda n, x: x.at[n, n].get(mode="clip"), (BEYOND, ordinary(3, 3)))
 
 

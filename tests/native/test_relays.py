@@ -34,6 +34,7 @@ def relay(position, label, time, sources, found=None, late=None):
     """Return what solves all instants, straight into the arrays unless others are given."""
     lanes = (position, label), time, np.array([True])
     program = STEP.program(np.float64(0.5), ((np.zeros((3, 2, 1)), np.zeros(1, np.int64)), np.zeros(1), lanes[2]))
+    assert program is not None
     results = {"label": label, "late": late, "position": position if found is None else found, "rest": None}
     return program.relay(lanes, results, sources)
 
@@ -122,5 +123,6 @@ def test_truth_values_have_no_place_of_their_own():
 def test_programs_with_instants_along_the_first_axis_have_no_rounds():
     lanes = np.ones((3, 2))
     program = SideBySide(lambda shared, x: x + shared, rows=True).program(np.float64(1.0), lanes)
+    assert program is not None
     with pytest.raises(ValueError, match="first axis"):
         program.relay((lanes, (), ()), lanes, np.arange(3))

@@ -162,9 +162,9 @@ class Compiled:
         keywords |= zip(self._names[self._traced :], arguments[self._traced :], strict=False)
         arguments = arguments[: self._traced]
         static = {name: keywords.pop(name) for name in self.static if name in keywords}
-        if self._suits_alone is not None and self._suits_alone(*arguments, **keywords):
-            if (code := self._alone.program(arguments, keywords, static)) is not None:
-                return code()
+        suits = self._suits_alone is not None and self._suits_alone(*arguments, **keywords)
+        if suits and (code := self._alone.program(arguments, keywords, static)) is not None:
+            return code()
         if store is None:
             return self.jitted(*arguments, **keywords, **static)
         leaves, tree = jax.tree.flatten((arguments, keywords))

@@ -12,8 +12,8 @@ from jax.errors import ConcretizationTypeError
 
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
 from jounce.kinematics.actuation import actuated
-from jounce.kinematics.alone import is_short_lived
 from jounce.kinematics.advance import SolvedState
+from jounce.kinematics.alone import is_short_lived
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.dead_ends import dead_end_words

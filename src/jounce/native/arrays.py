@@ -54,14 +54,3 @@ def in_memory(code: Code, values: Sequence[Value]) -> tuple[Region, int]:
     for k, value in enumerate(values):
         code.store(region, k, value)
     return region, 0
-
-
-def row(code: Code, home: tuple[Region, int], index: Value, shape: Sequence[int], more: int = 0) -> Values:
-    """Return an array of some in memory, `more` after that at an index in bounds, which is one for all lanes."""
-    region, first = home
-    size = int(np.prod(shape))
-    start = code.arithmetic("mul", code.converted(index, "l"), code.constant(size, "l"))
-    offsets = range(first + more * size, first + (more + 1) * size)
-    return filled(
-        shape, [code.load(region, code.arithmetic("add", start, code.constant(offset, "l"))) for offset in offsets]
-    )

@@ -7,28 +7,29 @@ from typing import Any
 
 from jax.lax import GatherScatterMode
 
-from jounce.native.arrays import Values, filled
+from jounce.native.arrays import filled
 from jounce.native.axes import combination, is_better, nothing
 from jounce.native.code import Code, flat
 from jounce.native.operations import ELEMENTWISE, RULES
-from jounce.native.places import filler, within
+from jounce.native.places import filler, kept_inside, within
 from jounce.native.stored import (
     Array,
     Stored,
-    at,
     between,
     copied,
     counted,
     further,
     is_own,
     nest,
-    new,
     put,
-    replace_home,
     reshaped,
+    room_for,
+    row,
     spread,
     stored,
     transposed,
+    values_of,
+    without_home,
 )
 from jounce.native.values import Value, kind_of
 
@@ -43,7 +44,7 @@ def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     rule, aval = RULES[equation.primitive.name], equation.outvars[0].aval
     arrays = [stored(code, array) for array in given]
     arrays = [spread(x, aval.shape, range(x.ndim)) if x.ndim else spread(x, aval.shape, ()) for x in arrays]
-    found = new(code, aval.shape, kind_of(aval.dtype), lanes=any(x.lanes for x in arrays))
+    found = room_for(code, aval.shape, kind_of(aval.dtype), lanes=any(x.lanes for x in arrays))
 
     def body(values: Sequence[Value]) -> Sequence[Value]:
         return [result.item() for result in rule(code, equation, [filled((), [value]) for value in values])]
@@ -90,7 +91,7 @@ def _reverse(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
 def _unstack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     array, axis = stored(code, given[0]), int(equation.params["axis"])
     rows = transposed(array, [axis, *(k for k in range(array.ndim) if k != axis)])
-    return [at(code, rows, k) for k in range(rows.shape[0])]
+    return [row(code, rows, k) for k in range(rows.shape[0])]
 
 
 def _split(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -101,22 +102,15 @@ def _split(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]
 
 def _dynamic_slice(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     array, *starts = given
-    return [_window(code, stored(code, array), _starts(code, array, equation.params["slice_sizes"], starts), equation)]
+    return [_window(code, stored(code, array), equation.params["slice_sizes"], starts)]
 
 
-def _window(code: Code, array: Stored, starts: Sequence[int | Value], equation: Any) -> Stored:
-    for axis, (start, size) in enumerate(zip(starts, equation.params["slice_sizes"], strict=True)):
-        array = between(code, array, axis, start, size)
+def _window(code: Code, array: Stored, sizes: Sequence[int], starts: Sequence[Array]) -> Stored:
+    """Return a part of an array, moved so that all of it is in bounds."""
+    places = kept_inside(code, array.shape, sizes, [values_of(code, start) for start in starts])
+    for axis, (place, size) in enumerate(zip(places, sizes, strict=True)):
+        array = between(code, array, axis, place if place.constant is None else int(place.constant), size)
     return array
-
-
-def _starts(code: Code, array: Array, sizes: Sequence[int], starts: Sequence[Values]) -> list[int | Value]:
-    """Return where a part begins, moved so that all of it is in bounds."""
-    found = []
-    for whole, size, start in zip(array.shape, sizes, starts, strict=True):
-        index = within(code, start.item(), 0, whole - size)
-        found.append(index if index.constant is None else int(index.constant))
-    return found
 
 
 # -- arrays made of others --------------------------------------------------------------------------------------------
@@ -129,7 +123,7 @@ def _lanes(arrays: Sequence[Array]) -> bool:
 def _made(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
     """Return room for the result of an operation."""
     aval = equation.outvars[0].aval
-    return new(code, aval.shape, kind_of(aval.dtype), lanes=_lanes(given))
+    return room_for(code, aval.shape, kind_of(aval.dtype), lanes=_lanes(given))
 
 
 def _concatenate(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -144,8 +138,8 @@ def _stack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]
     found, axis = _made(code, equation, given), int(equation.params["axis"])
     rows = transposed(found, [axis, *(k for k in range(found.ndim) if k != axis)])
     for k, array in enumerate(given):
-        row = between(code, rows, 0, k, 1)
-        put(code, replace(row, shape=row.shape[1:], strides=row.strides[1:]), array)
+        target = between(code, rows, 0, k, 1)
+        put(code, replace(target, shape=target.shape[1:], strides=target.strides[1:]), array)
     return [found]
 
 
@@ -172,27 +166,28 @@ def _pad(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     return [found]
 
 
-def _dynamic_update_slice(code: Code, _: Any, given: Sequence[Array]) -> Sequence[Array]:
-    """Change a part of an array: in its place where nobody else sees it."""
-    array, part, *starts = given
-    places = _starts(code, array, part.shape, starts)
-    lanes = _lanes([part, *starts])
-    if is_own(code, array) and (array.lanes or not lanes):
-        found = array
-    elif lanes and not _lanes([array]):
-        found = new(code, array.shape, _kind(array), lanes=True)
-        put(code, found, stored(code, array))
-    else:
-        found = copied(code, array)
-    target = found
-    for axis, (start, size) in enumerate(zip(places, part.shape, strict=True)):
-        target = between(code, target, axis, start, size)
-    put(code, target, copied(code, part) if isinstance(part, Stored) and part.region is found.region else part)
+def _dynamic_update_slice(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Change a part of an array."""
+    _, part, *starts = given
+    found = _to_change(code, equation, given)
+    target = _window(code, found, part.shape, starts)
+    put(code, target, _apart(code, part, found) if isinstance(part, Stored) else part)
     return [found]
 
 
-def _kind(array: Array) -> str:
-    return array.kind if isinstance(array, Stored) else array.item(0).kind
+def _to_change(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
+    """Return the first of some arrays, for the others to change it: in its place where nobody else reads it."""
+    array, *others = given
+    if isinstance(array, Stored) and is_own(code, array) and (array.lanes or not _lanes(others)):
+        return array
+    found = _made(code, equation, given)
+    put(code, found, stored(code, array))
+    return found
+
+
+def _apart(code: Code, array: Stored, changed: Stored) -> Stored:
+    """Return an array that stays as it is while another one is changed: copied if it may be a part of that."""
+    return copied(code, array) if array.region is changed.region else array
 
 
 # -- along axes -------------------------------------------------------------------------------------------------------
@@ -304,7 +299,7 @@ def _placed(
         where = rows.first
         for k, stride in zip((*batch, numbers[axis]), rows.strides, strict=True):
             where = further(code, where, k, stride)
-        index = code.converted(replace_home(code.load(rows.region, where)), "l")
+        index = code.converted(without_home(code.load(rows.region, where)), "l")
         kept = within(code, index, 0, size - sizes[axis])
         inside = code.logic("and", inside, code.compare("eq", kept, index))
         place = further(code, place, kept, array.strides[axis])
@@ -325,7 +320,7 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
     """Return parts of an array at indices."""
     p, array, indices = equation.params, stored(code, given[0]), stored(code, given[1])
     numbers, aval = p["dimension_numbers"], equation.outvars[0].aval
-    found = new(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
+    found = room_for(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
     offsets = list(numbers.offset_dims)
     batch = [axis for axis in range(found.ndim) if axis not in offsets]
     taken = [
@@ -360,16 +355,10 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
 
 def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Put numbers at indices, or add them to what is there."""
-    array, indices, updates = given[0], stored(code, given[1]), stored(code, given[2])
-    if isinstance(array, Stored) and updates.region is array.region:
-        updates = copied(code, updates)
+    found = _to_change(code, equation, given)
+    indices, updates = (_apart(code, stored(code, array), found) for array in given[1:])
     p, add = equation.params, equation.primitive.name == "scatter-add"
     numbers = p["dimension_numbers"]
-    if is_own(code, array) and (array.lanes or not (updates.lanes or indices.lanes)):
-        found = array
-    else:
-        found = new(code, array.shape, _kind(array), lanes=_lanes([array, updates, indices]))
-        put(code, found, stored(code, array))
     if not updates.size or not found.size:
         return [found]
     windows = list(numbers.update_window_dims)

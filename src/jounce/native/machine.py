@@ -66,10 +66,9 @@ def compiled(text: str, *, hasty: bool = False) -> bytes:
     hasty : bool, default False
         Whether a third of the time is worth more than code that is twice as fast. Its results are the same.
     """
-    if hasty or (text.count("\n") > LONG and len(os.sched_getaffinity(0)) > 1):
-        if (found := _compiled_elsewhere(text, hasty)) is not None:
-            return found
-    return _compiled_here(text)
+    elsewhere = hasty or (text.count("\n") > LONG and len(os.sched_getaffinity(0)) > 1)
+    found = _compiled_elsewhere(text, hasty) if elsewhere else None
+    return _compiled_here(text) if found is None else found
 
 
 def _compiled_here(text: str) -> bytes:

@@ -8,9 +8,9 @@ import jax
 import numpy as np
 from jax.lax import GatherScatterMode
 
-from jounce.native.arrays import Values, constants, each, filled, in_memory, row
+from jounce.native.arrays import Values, constants, each, filled, in_memory
 from jounce.native.code import Code, flat
-from jounce.native.values import DTYPES, UnsupportedOperationError, Value, kind_of
+from jounce.native.values import DTYPES, Region, UnsupportedOperationError, Value, kind_of
 
 MOST_CANDIDATES = 64  # places of an array among which a number is picked by comparing, and not from memory
 
@@ -105,9 +105,7 @@ def _element(code: Code, values: Sequence[Value], index: Value) -> Value:
     """Return the number at an index, which is in bounds: from memory, or picked by comparing."""
     if index.constant is not None:
         return values[int(index.constant)]
-    if not index.lanes and len(values) > 2:
-        return row(code, in_memory(code, values), index, ()).item()
-    if len(values) > MOST_CANDIDATES:
+    if len(values) > (MOST_CANDIDATES if index.lanes else 2):
         region, first = in_memory(code, values)
         place = code.arithmetic("add", code.converted(index, "l"), code.constant(first, "l"))
         return code.load(region, place)
@@ -117,10 +115,28 @@ def _element(code: Code, values: Sequence[Value], index: Value) -> Value:
     return found
 
 
+def _row(code: Code, home: tuple[Region, int], index: Value, shape: Sequence[int], more: int = 0) -> Values:
+    """Return an array of some in memory, `more` after that at an index in bounds, which is one for all lanes."""
+    region, first = home
+    size = int(np.prod(shape))
+    start = code.arithmetic("mul", code.converted(index, "l"), code.constant(size, "l"))
+    offsets = range(first + more * size, first + (more + 1) * size)
+    return filled(
+        shape, [code.load(region, code.arithmetic("add", start, code.constant(offset, "l"))) for offset in offsets]
+    )
+
+
 def within(code: Code, index: Value, least: int, most: int) -> Value:
     """Return an index within bounds."""
     below = code.arithmetic("min", index, code.constant(most, index.kind))
     return code.arithmetic("max", below, code.constant(least, index.kind))
+
+
+def kept_inside(code: Code, shape: Sequence[int], sizes: Sequence[int], starts: Sequence[Values]) -> list[Value]:
+    """Return where a part of an array begins along each axis, moved so that all of it is in bounds."""
+    return [
+        within(code, start.item(), 0, whole - size) for whole, size, start in zip(shape, sizes, starts, strict=True)
+    ]
 
 
 def dynamic_slice(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
@@ -135,7 +151,7 @@ def dynamic_slice(code: Code, equation: Any, given: Sequence[Values]) -> Sequenc
             found = np.empty(shape, object)
         elif not index.lanes:
             home = in_memory(code, flat(rows))
-            found = np.stack([row(code, home, index, shape[1:], k) for k in range(size)])
+            found = np.stack([_row(code, home, index, shape[1:], k) for k in range(size)])
         else:
             pick = _picked(code, index)
             windows = [rows[k : len(rows) - size + 1 + k] for k in range(size)]
@@ -152,7 +168,7 @@ def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequenc
     """Return an array with a part of it changed that starts at indices, moved so that all of it is in bounds."""
     array, new, *starts = given
     rooms = [whole - size for whole, size in zip(array.shape, new.shape, strict=True)]
-    indices = [within(code, start.item(), 0, most) for start, most in zip(starts, rooms, strict=True)]
+    indices = kept_inside(code, array.shape, new.shape, starts)
     moving = [axis for axis, index in enumerate(indices) if index.constant is None]
     firsts = [
         range(most + 1) if index.constant is None else (int(index.constant),)

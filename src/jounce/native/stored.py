@@ -73,16 +73,15 @@ def contiguous(region: Region, shape: Sequence[int], first: int | Value = 0) -> 
     return Stored(region, tuple(shape), tuple(int(x) for x in ends[::-1]), first)
 
 
-def new(code: Code, shape: Sequence[int], kind: str, *, lanes: bool) -> Stored:
+def room_for(code: Code, shape: Sequence[int], kind: str, *, lanes: bool) -> Stored:
     """Return an array of which nothing is known yet."""
     return contiguous(code.taken_room(math.prod(shape), kind, lanes=lanes), shape)
 
 
-def is_own(code: Code, array: Any) -> bool:
+def is_own(code: Code, array: Stored) -> bool:
     """Tell whether an array may be changed in its place: it is all that is there, and nobody else reads it."""
     return (
-        isinstance(array, Stored)
-        and array.region in code.changeable
+        array.region in code.changeable
         and array.is_same(contiguous(array.region, array.shape))
         and code.is_unshared(array.region)
     )
@@ -120,7 +119,7 @@ def between(code: Code, array: Stored, axis: int, start: int | Value, size: int,
     return Stored(array.region, tuple(shape), tuple(strides), first)
 
 
-def at(code: Code, array: Array, index: int | Value) -> Array:
+def row(code: Code, array: Array, index: int | Value) -> Array:
     """Return the part of an array at an index of its first axis: an index that is not known wants a stored one."""
     if not isinstance(array, Stored):
         assert isinstance(index, int)
@@ -144,7 +143,7 @@ def spread(array: Stored, shape: Sequence[int], axes: Sequence[int]) -> Stored:
 
 def reshaped(code: Code, array: Stored, shape: Sequence[int]) -> Stored:
     """Return the same numbers in another shape, copied where no strides tell it."""
-    strides = _split(*_merged(array.shape, [array.strides]), shape)
+    strides = _split(*_merged(array.shape, [array.strides]), shape) if array.size else None
     if strides is None:
         return contiguous(copied(code, array).region, shape)
     return replace(array, shape=tuple(shape), strides=strides)
@@ -177,10 +176,10 @@ def values_of(code: Code, array: Array) -> Values:
         further(code, array.first, int(np.dot(index, array.strides)), 1) if array.ndim else array.first
         for index in np.ndindex(*array.shape)
     ]
-    return filled(array.shape, [replace_home(code.load(array.region, place)) for place in places])
+    return filled(array.shape, [without_home(code.load(array.region, place)) for place in places])
 
 
-def replace_home(value: Value) -> Value:
+def without_home(value: Value) -> Value:
     """Return a value that is not taken to be where it came from: that may change."""
     value.home = None
     return value
@@ -214,10 +213,10 @@ def settled(code: Code, array: Stored) -> Array:
 def copied(code: Code, array: Array) -> Stored:
     """Return an array with a place of its own, its numbers one after another."""
     if isinstance(array, Stored):
-        found = new(code, array.shape, array.kind, lanes=array.lanes)
+        found = room_for(code, array.shape, array.kind, lanes=array.lanes)
     else:
         values = flat(array)
-        found = new(code, array.shape, values[0].kind, lanes=any(value.lanes for value in values))
+        found = room_for(code, array.shape, values[0].kind, lanes=any(value.lanes for value in values))
     put(code, found, array)
     return found
 
@@ -239,6 +238,7 @@ def put(code: Code, target: Stored, array: Array) -> None:
 # -- loops ------------------------------------------------------------------------------------------------------------
 
 Body = Callable[[list[Value]], Sequence[Value]]
+Visit = Callable[[int | Value], None]  # of the number from which on something is done
 
 
 def counted(code: Code, count: int, body: Callable[[int | Value], None]) -> None:
@@ -282,64 +282,75 @@ def nest(code: Code, given: Sequence[Stored], found: Sequence[Stored], body: Bod
     shape, strides = _merged(arrays[0].shape, [array.strides for array in arrays])
     if 0 in shape:
         return
-    inner = _inner(shape, strides, len(given))
-    order = [k for k in range(len(shape)) if k != inner]
-    firsts = [array.first for array in arrays]
 
     def run(axes: Sequence[int], places: Sequence[int | Value]) -> None:
-        if axes:
-            axis, *rest = axes
-            counted(
-                code,
-                shape[axis],
-                lambda k: run(rest, [further(code, p, k, s[axis]) for p, s in zip(places, strides, strict=True)]),
-            )
-        elif inner is None:
-            one(places, along=False)
-        else:
-            innermost(places)
-
-    def innermost(places: Sequence[int | Value]) -> None:
-        size, steps = shape[inner], [s[inner] for s in strides]
-        width = code.width
-        vectors = code.alone and size >= width and set(steps) <= {0, 1} and 0 not in steps[len(given) :]
-
-        def visit(start: int | Value, along: bool) -> None:
-            one([further(code, p, start, s) for p, s in zip(places, steps, strict=True)], along, steps)
-
-        if not vectors:
-            counted(code, size, lambda k: visit(k, False))
+        if not axes:
+            _visit(code, given, found, body, places)
             return
-        whole, left = divmod(size, width)
-        if left and not adds:  # the last vectors share numbers
+        axis, *rest = axes
+        size, steps = shape[axis], [s[axis] for s in strides]
 
-            def last(k: int | Value) -> None:
-                start = further(code, 0, k, width)
-                most = size - width
-                start = (
-                    min(start, most)
-                    if isinstance(start, int)
-                    else code.arithmetic("min", start, code.constant(most, "l"))
-                )
-                visit(start, True)
+        def moved(k: int | Value) -> list[int | Value]:
+            return [further(code, place, k, step) for place, step in zip(places, steps, strict=True)]
 
-            counted(code, whole + 1, last)
+        if rest or not code.alone or size < code.width or not _is_along(steps, len(given)):
+            counted(code, size, lambda k: run(rest, moved(k)))
             return
-        counted(code, whole, lambda k: visit(further(code, 0, k, width), True))
-        counted(code, left, lambda k: visit(further(code, whole * width, k, 1), False))
+        along = [step == 1 for step in steps]
+        single = (lambda k: _visit(code, given, found, body, moved(k))) if adds else None
+        _in_vectors(code, size, lambda k: _visit(code, given, found, body, moved(k), along), single)
 
-    def one(places: Sequence[int | Value], along: bool, steps: Sequence[int] = ()) -> None:
-        read = [
-            code.load_along(array.region, place) if along and steps[k] else replace_home(code.load(array.region, place))
-            for k, (array, place) in enumerate(zip(given, places, strict=False))
-        ]
-        for array, place, value in zip(found, places[len(given) :], body(read), strict=True):
-            if along:
-                code.store_along(array.region, place, value)
+    run(_order(shape, strides, len(given)), [array.first for array in arrays])
+
+
+def _visit(
+    code: Code,
+    given: Sequence[Stored],
+    found: Sequence[Stored],
+    body: Body,
+    places: Sequence[int | Value],
+    along: Sequence[bool] | None = None,
+) -> None:
+    """Write what is done at one place of each array, or for a vector of numbers from there on of some."""
+    along = [False] * len(places) if along is None else along
+    read = [
+        code.load_along(array.region, place) if vector else without_home(code.load(array.region, place))
+        for array, place, vector in zip(given, places, along, strict=False)
+    ]
+    first = len(given)
+    for array, place, vector, value in zip(found, places[first:], along[first:], body(read), strict=True):
+        (code.store_along if vector else code.store)(array.region, place, value)
+
+
+def _in_vectors(code: Code, size: int, vector: Visit, single: Visit | None) -> None:
+    """Write a loop of vectors over at least as many numbers as one has.
+
+    Parameters
+    ----------
+    code : Code
+    size : int
+        Of the numbers.
+    vector : callable
+        Writes what is done for a vector of numbers, from one on.
+    single : callable or None
+        Writes what is done for each number that is left after whole vectors; None if the last vector may have some in
+        common with the one before.
+    """
+    whole, left = divmod(size, code.width)
+    if left and single is None:
+
+        def last(k: int | Value) -> None:
+            start, most = further(code, 0, k, code.width), size - code.width
+            if isinstance(start, Value):
+                vector(code.arithmetic("min", start, code.constant(most, "l")))
             else:
-                code.store(array.region, place, value)
+                vector(min(start, most))
 
-    run(order, firsts)
+        counted(code, whole + 1, last)
+        return
+    counted(code, whole, lambda k: vector(further(code, 0, k, code.width)))
+    if single is not None:
+        counted(code, left, lambda k: single(further(code, whole * code.width, k, 1)))
 
 
 def _merged(shape: Sequence[int], strides: Sequence[Sequence[int]]) -> tuple[list[int], list[list[int]]]:
@@ -361,13 +372,19 @@ def _merged(shape: Sequence[int], strides: Sequence[Sequence[int]]) -> tuple[lis
     return sizes, steps
 
 
-def _inner(shape: Sequence[int], strides: Sequence[Sequence[int]], given: int) -> int | None:
-    """Return the axis of the innermost loop: where numbers lie one after another, and what is written as well."""
+def _is_along(steps: Sequence[int], given: int) -> bool:
+    """Tell whether the numbers along an axis, or one of an array that is only read, make a vector."""
+    return set(steps) <= {0, 1} and 0 not in steps[given:]
+
+
+def _order(shape: Sequence[int], strides: Sequence[Sequence[int]], given: int) -> list[int]:
+    """Return the axes, the one of the innermost loop last: where numbers make vectors, and what is written moves on."""
     if not shape:
-        return None
+        return []
 
     def rank(axis: int) -> tuple[bool, bool, int]:
         steps = [s[axis] for s in strides]
-        return set(steps) <= {0, 1} and 0 not in steps[given:], 0 not in steps[given:], axis
+        return _is_along(steps, given), 0 not in steps[given:], axis
 
-    return max(range(len(shape)), key=rank)
+    inner = max(range(len(shape)), key=rank)
+    return [*(axis for axis in range(len(shape)) if axis != inner), inner]

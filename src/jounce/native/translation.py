@@ -4,29 +4,27 @@ Where lanes part, all ways that some lane takes are run, and each keeps what its
 last lane that is in it has left. So the results of a lane depend on no other.
 """
 
-import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from jax.extend.core import Literal, jaxprs_in_params
 
 from jounce.native.arrays import constants, each, filled
+from jounce.native.carried import Carried
 from jounce.native.code import Code, flat
 from jounce.native.loops import STORED
 from jounce.native.operations import RULES
 from jounce.native.stored import (
     Array,
     Stored,
-    at as row_at,
     contiguous,
-    copied,
     further,
     is_large,
     nest,
-    new as new_array,
     put,
+    room_for,
+    row,
     settled,
     stored,
     values_of,
@@ -74,7 +72,7 @@ def translate(code: Code, program: Any, constants_: Sequence[Array], given: Sequ
         for now, equation in enumerate(program.eqns):
             inputs = [read(variable) for variable in equation.invars]
             before = len(code.taken)
-            found = _found(code, equation, inputs)
+            found = _results(code, equation, inputs)
             for variable, values in zip(equation.outvars, found, strict=True):
                 known[variable] = _checked(values, variable.aval)
             if last:
@@ -95,19 +93,19 @@ def _last_uses(program: Any) -> dict[Any, int]:
 def _let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
     """Forget variables that nobody reads any more, and give back what memory only they had."""
     gone = [known.pop(variable, None) for variable in variables]
-    for region in {array.region for array in gone if isinstance(array, Stored)}:
+    for region in _regions([array for array in gone if array is not None]):
         if code.is_unshared(region):
             code.give_back(region)
 
 
-def _found(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+def _results(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Return the results of an operation: by single values, or by loops where an array is large."""
     name = equation.primitive.name
     if (control := _CONTROL.get(name)) is not None:
         return control(code, equation, given)
-    if name in RULES and (any(map(_is_stored, given)) or any(is_large(code, v.aval) for v in equation.outvars)):
-        if (rule := STORED.get(name)) is not None:
-            return [settled(code, x) if isinstance(x, Stored) else x for x in rule(code, equation, given)]
+    in_memory = any(map(_is_stored, given)) or any(is_large(code, variable.aval) for variable in equation.outvars)
+    if in_memory and (rule := STORED.get(name)) is not None:
+        return [settled(code, x) if isinstance(x, Stored) else x for x in rule(code, equation, given)]
     if (rule := RULES.get(name)) is None:
         raise UnsupportedOperationError(name)
     return rule(code, equation, [values_of(code, array) for array in given])
@@ -139,59 +137,13 @@ def _called(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     return _closed(code, closed, given) if hasattr(closed, "jaxpr") else translate(code, closed, (), given)
 
 
+def _number(code: Code, array: Array) -> Value:
+    return values_of(code, array).item()
+
+
 def _closed(code: Code, closed: Any, *given: Sequence[Array]) -> list[Array]:
     numbers = [constants(code, number) for number in closed.consts]
     return translate(code, closed.jaxpr, numbers, [array for some in given for array in some])
-
-
-class _Carried:
-    """Arrays that a loop or a branch changes, in memory."""
-
-    def __init__(self, code: Code, avals: Sequence[Any], lanes: Sequence[bool]):
-        self.code, self.shapes = code, [aval.shape for aval in avals]
-        self.large = [is_large(code, aval) for aval in avals]
-        self.regions = [
-            (code.taken_room if large else code.room)(math.prod(aval.shape), kind_of(aval.dtype), lanes=vector)
-            for aval, vector, large in zip(avals, lanes, self.large, strict=True)
-        ]
-
-    def load(self) -> list[Array]:
-        """Return the arrays as they are; large ones stay where they are."""
-        return [
-            contiguous(region, shape)
-            if large
-            else filled(shape, [self.code.load(region, k) for k in range(math.prod(shape))])
-            for region, shape, large in zip(self.regions, self.shapes, self.large, strict=True)
-        ]
-
-    @contextmanager
-    def held(self) -> Iterator[None]:
-        """Keep the memory while the loop is written."""
-        before = len(self.code.held)
-        self.code.held += self.regions
-        try:
-            yield
-        finally:
-            del self.code.held[before:]
-
-    def store(self, arrays: Sequence[Array]) -> None:
-        """Change the arrays: where a number is what was there when it was loaded, there is nothing to do."""
-        targets = [contiguous(region, shape) for region, shape in zip(self.regions, self.shapes, strict=True)]
-        changing = {target.region for target, array in zip(targets, arrays, strict=True) if not target.is_same(array)}
-        apart = [  # what is a part of an array that changes is read before
-            copied(self.code, array)
-            if isinstance(array, Stored) and array.region in changing and not target.is_same(array)
-            else array
-            for target, array in zip(targets, arrays, strict=True)
-        ]
-        for target, array in zip(targets, apart, strict=True):
-            if isinstance(array, Stored) or is_large(self.code, array):
-                if not target.is_same(array):
-                    put(self.code, target, array)
-                continue
-            for k, value in enumerate(flat(array)):
-                if value.home != (target.region, k):
-                    self.code.store(target.region, k, value)
 
 
 def _until_settled(code: Code, lanes: list[bool], attempt: Callable[[list[bool]], tuple[list[bool], Any]]) -> Any:
@@ -239,7 +191,7 @@ def _chosen(code: Code, choice: Value, new: Sequence[Array], old: Sequence[Array
         a, b = stored(code, x), stored(code, y)
         if a.is_same(b):
             return a
-        found = new_array(code, a.shape, a.kind, lanes=choice.lanes or a.lanes or b.lanes)
+        found = room_for(code, a.shape, a.kind, lanes=choice.lanes or a.lanes or b.lanes)
         nest(code, [a, b], [found], lambda values: [code.select(choice, *values)])
         return found
 
@@ -253,7 +205,7 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     asked, needed, start = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
 
     def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
-        carried = _Carried(code, [variable.aval for variable in equation.outvars], lanes)
+        carried = Carried(code, [variable.aval for variable in equation.outvars], lanes)
         carried.store(start)
         head, body, end = code.label(), code.label(), code.label()
         code.jump(head)
@@ -261,7 +213,7 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
         with code.scope(), carried.held():
             before = carried.load()
             with code.used(_among([*asked, *needed, *before])):
-                goes = code.among_here(_closed(code, p["cond_jaxpr"], asked, before)[0].item())
+                goes = code.among_here(_number(code, _closed(code, p["cond_jaxpr"], asked, before)[0]))
             if goes.lanes and not all(lanes):  # what a lane keeps that has left differs
                 return [True] * len(lanes), []
             code.branch(code.anywhere(goes), body, end)
@@ -281,8 +233,11 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
 
 def _among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
     """Return what tells the memory of some arrays."""
-    regions = {array.region for array in arrays if isinstance(array, Stored)}
-    return regions.__contains__
+    return _regions(arrays).__contains__
+
+
+def _regions(arrays: Sequence[Array]) -> set[Region]:
+    return {array.region for array in arrays if isinstance(array, Stored)}
 
 
 def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -324,8 +279,8 @@ def _rolled(
     last = code.constant(p["length"] - 1, "l")
 
     def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
-        carried = _Carried(code, [variable.aval for variable in equation.outvars[:size]], lanes[:size])
-        written, counter = _Carried(code, made, lanes[size:]), code.room(1, "l", lanes=False)
+        carried = Carried(code, [variable.aval for variable in equation.outvars[:size]], lanes[:size])
+        written, counter = Carried(code, made, lanes[size:]), code.room(1, "l", lanes=False)
         carried.store(start)
         code.store(counter, 0, code.constant(0, "l"))
         homes = [stored(code, array) if array.size else array for array in rows]
@@ -335,12 +290,12 @@ def _rolled(
         with code.scope(), code.used(_among([*needed, *homes])), carried.held(), written.held():
             count = code.load(counter, 0)
             at = code.arithmetic("sub", last, count) if p["reverse"] else count
-            taken = [row_at(code, array, at) if array.size else np.empty(array.shape[1:], object) for array in homes]
+            taken = [row(code, array, at) if array.size else np.empty(array.shape[1:], object) for array in homes]
             results = _closed(code, p["jaxpr"], needed, carried.load(), taken)
-            carried.store(results[:size])
             for region, array in zip(written.regions, results[size:], strict=True):
                 if array.size:
                     put(code, contiguous(region, array.shape, further(code, 0, at, array.size)), array)
+            carried.store(results[:size])  # after what may be a part of what was carried
             code.store(counter, 0, code.arithmetic("add", count, code.constant(1, "l")))
             code.branch(code.operand(code.compare("lt", count, last), lanes=False), body, end)
         code.begin(end)
@@ -358,10 +313,12 @@ def _unrolled(
     It is given up early where the turns so far, of which the first are longer than the others, leave no hope.
     """
     p, mark, before = equation.params, code.mark(), len(code.lines)
-    size, found = len(start), {}
+    size, found, kept = len(start), {}, _regions([*needed, *rows])
     for k in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
-        results = _closed(code, p["jaxpr"], needed, start, [row_at(code, array, k) for array in rows])
+        with code.used(kept.__contains__):
+            results = _closed(code, p["jaxpr"], needed, start, [row(code, array, k) for array in rows])
         start, found[k] = results[:size], results[size:]
+        kept |= _regions(found[k])
         lines, left = len(code.lines) - before, p["length"] - len(found)
         if p["length"] > 1 and lines + lines / len(found) / HOPE * left > most:
             code.back_to(mark)
@@ -371,11 +328,12 @@ def _unrolled(
 
 
 def _stacked(code: Code, parts: Sequence[Array]) -> Array:
-    if not any(map(_is_stored, parts)) and not (code.large and len(parts) * parts[0].size > code.large):
-        return np.stack(parts)
+    single = [part for part in parts if not isinstance(part, Stored)]
+    if len(single) == len(parts) and (code.large is None or len(parts) * parts[0].size <= code.large):
+        return np.stack(single)
     lanes = _in_lanes(parts)
     kind = next(p.kind if isinstance(p, Stored) else p.item(0).kind for p in parts)
-    found = new_array(code, (len(parts), *parts[0].shape), kind, lanes=any(lanes))
+    found = room_for(code, (len(parts), *parts[0].shape), kind, lanes=any(lanes))
     for k, part in enumerate(parts):
         put(code, contiguous(found.region, part.shape, k * part.size), part)
     return found
@@ -383,13 +341,13 @@ def _stacked(code: Code, parts: Sequence[Array]) -> Array:
 
 def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     """Write ways of which each lane takes one: all that some lane takes are run."""
-    ways, which, inputs = equation.params["branches"], given[0].item(), given[1:]
+    ways, which, inputs = equation.params["branches"], _number(code, given[0]), given[1:]
     which = code.converted(which, "i") if which.kind == "b" else which
     if len(ways) == 1 or which.constant is not None:
         return _closed(code, ways[min(max(int(which.constant or 0), 0), len(ways) - 1)], inputs)
 
     def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
-        results, found = _Carried(code, [variable.aval for variable in equation.outvars], lanes), lanes
+        results, found = Carried(code, [variable.aval for variable in equation.outvars], lanes), lanes
         for k, way in enumerate(ways):
             word = "le" if k == 0 else "ge" if k == len(ways) - 1 else "eq"
             here = code.among_here(code.compare(word, which, code.constant(k, which.kind)))
