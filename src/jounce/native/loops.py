@@ -215,7 +215,7 @@ def _extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
     array, found, word = stored(code, given[0]), _made(code, equation, given), equation.primitive.name
     (axis,) = map(int, equation.params["axes"])
     rows = transposed(array, [k for k in range(array.ndim) if k != axis] + [axis])
-    best = new(code, found.shape, array.kind, lanes=array.lanes)
+    best = room_for(code, found.shape, array.kind, lanes=array.lanes)
     first = between(code, rows, rows.ndim - 1, 0, 1)
     put(code, best, replace(first, shape=first.shape[:-1], strides=first.strides[:-1]))
     start = stored(code, filled((), [code.constant(0, found.kind)]))
