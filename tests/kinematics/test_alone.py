@@ -91,6 +91,7 @@ def test_what_is_kept_is_loaded_or_made_again(damage, monkeypatch):
     monkeypatch.setattr(store_, "_store", shelf)
     for _ in range(2):
         run = alone.Alone(logistic, (Compiled.__call__,)).program((x, 4), {}, {"power": 2})
+        assert run is not None
         check(run(), expected(x, 4, power=2))
         if damage is not None:
             shelf |= dict.fromkeys(shelf, damage)

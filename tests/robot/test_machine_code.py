@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.kinematics.side_by_side import VARIABLE
+from jounce.kinematics.alone import VARIABLE
 from jounce.native.machine import is_usable
 from jounce.robot.batches import LEAST_THREADED
 from jounce.robot.forward_dynamics import _moved

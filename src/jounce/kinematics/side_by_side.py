@@ -146,7 +146,8 @@ class SideBySide:
         static: dict[str, Any],
     ) -> Program | None:
         """Return a program from the store of programs, or one that is made."""
-        function, options = partial(self.function, **static), how | {"most_lines": self.most_lines}
+        function = partial(self.function, **static)
+        options: Any = how | {"most_lines": self.most_lines}
 
         def make() -> tuple[Any, ...]:
             try:

@@ -22,7 +22,7 @@ SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one
 LONGEST_LEG = 32  # batches
 LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
 FEWEST_SIDE_BY_SIDE, MOST_SIDE_BY_SIDE = 64, 1024  # instants of a long grid in a call of machine code
-FEW_COLUMNS = 120  # of a Jacobian: of more, machine code of single values is too long
+FEW_COLUMNS = 24  # of a Jacobian: of more, machine code of single values alone is too long to be fast
 MOST_COLUMNS = 1500  # of more, what a vector of instants has is in no cache: XLA takes fewer at a time
 LARGE = 64  # numbers of an array that stays in memory there
 NO_GRID = np.empty(0)
@@ -153,7 +153,8 @@ class Solver:
         size = system.shape[1]
         if size > MOST_COLUMNS:
             return None
-        how = {"large": None if size <= FEW_COLUMNS else LARGE, "hasty": self.hasty}
+        small = size <= FEW_COLUMNS and not self.hasty
+        how = {"large": None if small else LARGE, "hasty": self.hasty}
         shared = system, tolerance, refine, wanted
         return advance_instant.program(shared, instants, **how, pose_type=kind, order=self.order)
 

@@ -8,13 +8,14 @@ from typing import Any
 from jax.lax import GatherScatterMode
 
 from jounce.native.arrays import filled
-from jounce.native.axes import combination, is_better, nothing
-from jounce.native.code import Code, flat
+from jounce.native.code import Code
+from jounce.native.loops_along_axes import dot, extreme, reduction
 from jounce.native.operations import ELEMENTWISE, RULES
 from jounce.native.places import filler, kept_inside, within
 from jounce.native.stored import (
     Array,
     Stored,
+    any_lanes,
     between,
     copied,
     counted,
@@ -24,6 +25,7 @@ from jounce.native.stored import (
     put,
     reshaped,
     room_for,
+    room_of,
     row,
     spread,
     stored,
@@ -116,18 +118,8 @@ def _window(code: Code, array: Stored, sizes: Sequence[int], starts: Sequence[Ar
 # -- arrays made of others --------------------------------------------------------------------------------------------
 
 
-def _lanes(arrays: Sequence[Array]) -> bool:
-    return any(x.lanes if isinstance(x, Stored) else any(v.lanes for v in flat(x)) for x in arrays)
-
-
-def _made(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
-    """Return room for the result of an operation."""
-    aval = equation.outvars[0].aval
-    return room_for(code, aval.shape, kind_of(aval.dtype), lanes=_lanes(given))
-
-
 def _concatenate(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    found, axis, start = _made(code, equation, given), int(equation.params["dimension"]), 0
+    found, axis, start = room_of(code, equation, given), int(equation.params["dimension"]), 0
     for array in given:
         put(code, between(code, found, axis, start, array.shape[axis]), array)
         start += array.shape[axis]
@@ -135,7 +127,7 @@ def _concatenate(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[
 
 
 def _stack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    found, axis = _made(code, equation, given), int(equation.params["axis"])
+    found, axis = room_of(code, equation, given), int(equation.params["axis"])
     rows = transposed(found, [axis, *(k for k in range(found.ndim) if k != axis)])
     for k, array in enumerate(given):
         target = between(code, rows, 0, k, 1)
@@ -152,7 +144,7 @@ def _tile(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
 
 def _pad(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     array, nothing_ = stored(code, given[0]), stored(code, given[1])
-    found = _made(code, equation, given)
+    found = room_of(code, equation, given)
     put(code, found, spread(nothing_, found.shape, ()))
     target = found
     for axis, (low, _, between_) in enumerate(tuple(map(int, sizes)) for sizes in equation.params["padding_config"]):
@@ -178,9 +170,9 @@ def _dynamic_update_slice(code: Code, equation: Any, given: Sequence[Array]) -> 
 def _to_change(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
     """Return the first of some arrays, for the others to change it: in its place where nobody else reads it."""
     array, *others = given
-    if isinstance(array, Stored) and is_own(code, array) and (array.lanes or not _lanes(others)):
+    if isinstance(array, Stored) and is_own(code, array) and (array.lanes or not any_lanes(others)):
         return array
-    found = _made(code, equation, given)
+    found = room_of(code, equation, given)
     put(code, found, stored(code, array))
     return found
 
@@ -188,83 +180,6 @@ def _to_change(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
 def _apart(code: Code, array: Stored, changed: Stored) -> Stored:
     """Return an array that stays as it is while another one is changed: copied if it may be a part of that."""
     return copied(code, array) if array.region is changed.region else array
-
-
-# -- along axes -------------------------------------------------------------------------------------------------------
-
-
-def _reduction(operation: str) -> StoredRule:
-    """Return the rule for sums, products and the like along some axes."""
-
-    def rule(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-        array, axes = stored(code, given[0]), equation.params["axes"]
-        kept = [axis for axis in range(array.ndim) if axis not in axes]
-        found = _made(code, equation, [array])
-        start = stored(code, filled((), [code.constant(nothing(operation, found.kind), found.kind)]))
-        put(code, found, spread(start, found.shape, ()))
-        combine = combination(code, operation)
-        total = spread(found, array.shape, kept)
-        nest(code, [total, array], [total], lambda values: [combine(*values)], adds=True)
-        return [found]
-
-    return rule
-
-
-def _extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    """Return where the largest or smallest number along an axis is, the first of equals; NaN before all."""
-    array, found, word = stored(code, given[0]), _made(code, equation, given), equation.primitive.name
-    (axis,) = map(int, equation.params["axes"])
-    rows = transposed(array, [k for k in range(array.ndim) if k != axis] + [axis])
-    best = room_for(code, found.shape, array.kind, lanes=array.lanes)
-    first = between(code, rows, rows.ndim - 1, 0, 1)
-    put(code, best, replace(first, shape=first.shape[:-1], strides=first.strides[:-1]))
-    start = stored(code, filled((), [code.constant(0, found.kind)]))
-    put(code, found, spread(start, found.shape, ()))
-
-    def look(k: int | Value) -> None:
-        index = code.converted(k, found.kind) if isinstance(k, Value) else code.constant(k, found.kind)
-        part = between(code, rows, rows.ndim - 1, k, 1)
-        part = replace(part, shape=part.shape[:-1], strides=part.strides[:-1])
-
-        def body(values: Sequence[Value]) -> Sequence[Value]:
-            value, largest, place = values
-            better = is_better(code, word, value, largest)
-            return code.select(better, value, largest), code.select(better, index, place)
-
-        nest(code, [part, best, found], [best, found], body, adds=True)
-
-    counted(code, rows.shape[-1], look)
-    return [found]
-
-
-def _dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    """Return products of matrices: sums of products over some axes, for each place along those that are joined."""
-    (left_sum, right_sum), (left_batch, right_batch) = equation.params["dimension_numbers"]
-    found = _made(code, equation, given)
-    start = stored(code, filled((), [code.constant(0, found.kind)]))
-    put(code, found, spread(start, found.shape, ()))
-    left, right = (stored(code, array) for array in given)
-    left_free, right_free = (
-        [axis for axis in range(x.ndim) if axis not in (*batch, *summed)]
-        for x, batch, summed in ((left, left_batch, left_sum), (right, right_batch, right_sum))
-    )
-    left, right = (
-        transposed(left, (*left_batch, *left_free, *left_sum)),
-        transposed(right, (*right_batch, *right_free, *right_sum)),
-    )
-    batch, summed = len(left_batch), len(left_sum)
-    shape = (*found.shape, *left.shape[left.ndim - summed :])
-    after, end = batch + len(left_free), len(shape) - summed
-    a = spread(left, shape, [*range(after), *range(end, len(shape))])
-    b = spread(right, shape, [*range(batch), *range(after, len(shape))])
-    total = spread(found, shape, range(end))
-
-    def body(values: Sequence[Value]) -> Sequence[Value]:
-        known, p, q = (code.converted(value, found.kind) for value in values)
-        return [code.arithmetic("add", known, code.arithmetic("mul", p, q))]
-
-    nest(code, [total, a, b], [total], body, adds=True)
-    return [found]
 
 
 # -- at indices -------------------------------------------------------------------------------------------------------
@@ -397,15 +312,15 @@ def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
 STORED: Mapping[str, StoredRule] = {
     **dict.fromkeys(ELEMENTWISE, _each),
     **dict.fromkeys(("copy", "stop_gradient", "optimization_barrier"), _same),
-    "reduce_sum": _reduction("add"),
-    "reduce_prod": _reduction("mul"),
-    "reduce_max": _reduction("max"),
-    "reduce_min": _reduction("min"),
-    "reduce_and": _reduction("and"),
-    "reduce_or": _reduction("or"),
-    "argmax": _extreme,
-    "argmin": _extreme,
-    "dot_general": _dot,
+    "reduce_sum": reduction("add"),
+    "reduce_prod": reduction("mul"),
+    "reduce_max": reduction("max"),
+    "reduce_min": reduction("min"),
+    "reduce_and": reduction("and"),
+    "reduce_or": reduction("or"),
+    "argmax": extreme,
+    "argmin": extreme,
+    "dot_general": dot,
     "slice": _part,
     "broadcast_in_dim": _broadcast,
     "tile": _tile,

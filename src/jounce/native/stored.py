@@ -13,7 +13,7 @@ import numpy as np
 
 from jounce.native.arrays import Values, filled, in_memory
 from jounce.native.code import Code, flat
-from jounce.native.values import Region, Value
+from jounce.native.values import Region, Value, kind_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +90,17 @@ def is_own(code: Code, array: Stored) -> bool:
 def is_large(code: Code, array: Any) -> bool:
     """Tell whether an array belongs in memory."""
     return code.large is not None and math.prod(array.shape) > code.large
+
+
+def any_lanes(arrays: Sequence[Array]) -> bool:
+    """Tell whether numbers of some array differ from lane to lane."""
+    return any(x.lanes if isinstance(x, Stored) else any(v.lanes for v in flat(x)) for x in arrays)
+
+
+def room_of(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
+    """Return room for the result of an operation."""
+    aval = equation.outvars[0].aval
+    return room_for(code, aval.shape, kind_of(aval.dtype), lanes=any_lanes(given))
 
 
 # -- views ------------------------------------------------------------------------------------------------------------

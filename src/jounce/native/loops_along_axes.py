@@ -1,0 +1,98 @@
+"""Loops along axes of arrays that stay in memory: sums, products, extremes, and products of matrices."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from jounce.native.arrays import filled
+from jounce.native.axes import combination, is_better, nothing
+from jounce.native.code import Code
+from jounce.native.stored import (
+    Array,
+    between,
+    counted,
+    nest,
+    put,
+    room_for,
+    room_of,
+    spread,
+    stored,
+    transposed,
+)
+from jounce.native.values import Value
+
+StoredRule = Callable[[Code, Any, Sequence[Array]], Sequence[Array]]
+
+
+def reduction(operation: str) -> StoredRule:
+    """Return the rule for sums, products and the like along some axes."""
+
+    def rule(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+        array, axes = stored(code, given[0]), equation.params["axes"]
+        kept = [axis for axis in range(array.ndim) if axis not in axes]
+        found = room_of(code, equation, [array])
+        start = stored(code, filled((), [code.constant(nothing(operation, found.kind), found.kind)]))
+        put(code, found, spread(start, found.shape, ()))
+        combine = combination(code, operation)
+        total = spread(found, array.shape, kept)
+        nest(code, [total, array], [total], lambda values: [combine(*values)], adds=True)
+        return [found]
+
+    return rule
+
+
+def extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Return where the largest or smallest number along an axis is, the first of equals; NaN before all."""
+    array, found, word = stored(code, given[0]), room_of(code, equation, given), equation.primitive.name
+    (axis,) = map(int, equation.params["axes"])
+    rows = transposed(array, [k for k in range(array.ndim) if k != axis] + [axis])
+    best = room_for(code, found.shape, array.kind, lanes=array.lanes)
+    first = between(code, rows, rows.ndim - 1, 0, 1)
+    put(code, best, replace(first, shape=first.shape[:-1], strides=first.strides[:-1]))
+    start = stored(code, filled((), [code.constant(0, found.kind)]))
+    put(code, found, spread(start, found.shape, ()))
+
+    def look(k: int | Value) -> None:
+        index = code.converted(k, found.kind) if isinstance(k, Value) else code.constant(k, found.kind)
+        part = between(code, rows, rows.ndim - 1, k, 1)
+        part = replace(part, shape=part.shape[:-1], strides=part.strides[:-1])
+
+        def body(values: Sequence[Value]) -> Sequence[Value]:
+            value, largest, place = values
+            better = is_better(code, word, value, largest)
+            return code.select(better, value, largest), code.select(better, index, place)
+
+        nest(code, [part, best, found], [best, found], body, adds=True)
+
+    counted(code, rows.shape[-1], look)
+    return [found]
+
+
+def dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Return products of matrices: sums of products over some axes, for each place along those that are joined."""
+    (left_sum, right_sum), (left_batch, right_batch) = equation.params["dimension_numbers"]
+    found = room_of(code, equation, given)
+    start = stored(code, filled((), [code.constant(0, found.kind)]))
+    put(code, found, spread(start, found.shape, ()))
+    left, right = (stored(code, array) for array in given)
+    left_free, right_free = (
+        [axis for axis in range(x.ndim) if axis not in (*batch, *summed)]
+        for x, batch, summed in ((left, left_batch, left_sum), (right, right_batch, right_sum))
+    )
+    left, right = (
+        transposed(left, (*left_batch, *left_free, *left_sum)),
+        transposed(right, (*right_batch, *right_free, *right_sum)),
+    )
+    batch, summed = len(left_batch), len(left_sum)
+    shape = (*found.shape, *left.shape[left.ndim - summed :])
+    after, end = batch + len(left_free), len(shape) - summed
+    a = spread(left, shape, [*range(after), *range(end, len(shape))])
+    b = spread(right, shape, [*range(batch), *range(after, len(shape))])
+    total = spread(found, shape, range(end))
+
+    def body(values: Sequence[Value]) -> Sequence[Value]:
+        known, p, q = (code.converted(value, found.kind) for value in values)
+        return [code.arithmetic("add", known, code.arithmetic("mul", p, q))]
+
+    nest(code, [total, a, b], [total], body, adds=True)
+    return [found]
