@@ -37,7 +37,8 @@ def agree(found, wanted, tolerance):
     for one, other in zip(found.events, wanted.events, strict=True):
         np.testing.assert_allclose(one, other, rtol=tolerance)
     for name, values in wanted.outputs.items():
-        scale = 1e-12 + np.nanmax(np.abs(values), axis=0)
+        others = tuple(axis for axis in range(values.ndim) if axis != 1)  # the peak of each derivative
+        scale = 1e-12 + np.nanmax(np.abs(values), axis=others, keepdims=True)
         np.testing.assert_allclose(found.outputs[name] / scale, values / scale, rtol=0, atol=tolerance)
     np.testing.assert_allclose(found.energy, wanted.energy, rtol=tolerance, atol=tolerance)
 
@@ -56,8 +57,9 @@ def agree(found, wanted, tolerance):
 )
 def test_motions_are_those_of_xla(name, end, monkeypatch):
     mechanism = jn.load(f"examples/{name}.yaml")
-    event = jn.Event(next(iter(mechanism.outputs.values())))
-    agree(*both_ways(mechanism, np.linspace(0.0, end, 30), monkeypatch, events=[event]), 1e-8)
+    swinging = name in ("simple_pendulum", "double_pendulum")  # others may begin where the event is
+    events = [jn.Event(next(iter(mechanism.outputs.values())))] if swinging else []
+    agree(*both_ways(mechanism, np.linspace(0.0, end, 30), monkeypatch, events=events), 1e-8)
 
 
 def test_machine_code_goes_backward_and_takes_fixed_steps(monkeypatch):
