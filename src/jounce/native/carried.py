@@ -7,8 +7,9 @@ from typing import Any
 
 from jounce.native.arrays import filled
 from jounce.native.code import Code, flat
-from jounce.native.stored import Array, Stored, contiguous, copied, is_large, put
+from jounce.native.stored import copied, is_large, put
 from jounce.native.values import kind_of
+from jounce.native.views import Array, Stored, contiguous
 
 
 class Carried:

@@ -9,17 +9,14 @@ from jax.lax import GatherScatterMode
 
 from jounce.native.arrays import filled
 from jounce.native.code import Code
-from jounce.native.loops_along_axes import dot, extreme, reduction
+from jounce.native.loops_along_axes import StoredRule, dot, extreme, reduction
 from jounce.native.operations import ELEMENTWISE, RULES
 from jounce.native.places import filler, kept_inside, within
 from jounce.native.stored import (
-    Array,
-    Stored,
     any_lanes,
-    between,
     copied,
     counted,
-    further,
+    fill,
     is_own,
     nest,
     put,
@@ -27,16 +24,12 @@ from jounce.native.stored import (
     room_for,
     room_of,
     row,
-    spread,
     stored,
-    transposed,
     values_of,
     without_home,
 )
 from jounce.native.values import Value, kind_of
-
-StoredRule = Callable[[Code, Any, Sequence[Array]], Sequence[Array]]
-
+from jounce.native.views import Array, Stored, between, further, spread, transposed
 
 # -- number by number -------------------------------------------------------------------------------------------------
 
@@ -143,9 +136,8 @@ def _tile(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
 
 
 def _pad(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    array, nothing_ = stored(code, given[0]), stored(code, given[1])
-    found = room_of(code, equation, given)
-    put(code, found, spread(nothing_, found.shape, ()))
+    array, found = stored(code, given[0]), room_of(code, equation, given)
+    fill(code, found, values_of(code, given[1]).item())
     target = found
     for axis, (low, _, between_) in enumerate(tuple(map(int, sizes)) for sizes in equation.params["padding_config"]):
         step = between_ + 1
@@ -211,14 +203,21 @@ def _placed(
     for axis, size in enumerate(array.shape):
         if axis not in numbers:
             continue
-        where = rows.first
-        for k, stride in zip((*batch, numbers[axis]), rows.strides, strict=True):
-            where = further(code, where, k, stride)
+        where = _at(code, rows, range(rows.ndim), (*batch, numbers[axis]), rows.first)
         index = code.converted(without_home(code.load(rows.region, where)), "l")
         kept = within(code, index, 0, size - sizes[axis])
         inside = code.logic("and", inside, code.compare("eq", kept, index))
         place = further(code, place, kept, array.strides[axis])
     return place, inside if p["mode"] == GatherScatterMode.FILL_OR_DROP else code.constant(True)
+
+
+def _at(
+    code: Code, array: Stored, axes: Sequence[int], which: Sequence[int | Value], first: int | Value
+) -> int | Value:
+    """Return the place from `first` on to the indices of some axes of an array."""
+    for axis, index in zip(axes, which, strict=True):
+        first = further(code, first, index, array.strides[axis])
+    return first
 
 
 def _windows(
@@ -248,12 +247,10 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
 
     def window(which: list[int | Value]) -> None:
         first, inside = _placed(code, p, array, indices, named, sizes, which)
-        for axis, of in zip(numbers.operand_batching_dims, numbers.start_indices_batching_dims, strict=True):
-            first = further(code, first, which[of], array.strides[axis])
+        beside = [which[k] for k in numbers.start_indices_batching_dims]
+        first = _at(code, array, numbers.operand_batching_dims, beside, first)
         source = Stored(array.region, tuple(sizes[a] for a in taken), tuple(array.strides[a] for a in taken), first)
-        start = found.first
-        for axis, k in zip(batch, which, strict=True):
-            start = further(code, start, k, found.strides[axis])
+        start = _at(code, found, batch, which, found.first)
         target = Stored(found.region, source.shape, tuple(found.strides[a] for a in offsets), start)
         if inside.constant is not None:
             put(code, target, source)
@@ -290,12 +287,10 @@ def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
 
     def window(which: list[int | Value]) -> None:
         first, inside = _placed(code, p, found, indices, named, sizes, which)
-        for axis, of in zip(numbers.operand_batching_dims, numbers.scatter_indices_batching_dims, strict=True):
-            first = further(code, first, which[of], found.strides[axis])
+        beside = [which[k] for k in numbers.scatter_indices_batching_dims]
+        first = _at(code, found, numbers.operand_batching_dims, beside, first)
         target = Stored(found.region, tuple(sizes[a] for a in kept), tuple(found.strides[a] for a in kept), first)
-        start = updates.first
-        for axis, k in zip(batch, which, strict=True):
-            start = further(code, start, k, updates.strides[axis])
+        start = _at(code, updates, batch, which, updates.first)
         source = Stored(updates.region, target.shape, tuple(updates.strides[a] for a in windows), start)
 
         def body(values: Sequence[Value]) -> Sequence[Value]:

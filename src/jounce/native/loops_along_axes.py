@@ -4,22 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from jounce.native.arrays import filled
 from jounce.native.axes import combination, is_better, nothing
 from jounce.native.code import Code
-from jounce.native.stored import (
-    Array,
-    between,
-    counted,
-    nest,
-    put,
-    room_for,
-    room_of,
-    spread,
-    stored,
-    transposed,
-)
+from jounce.native.stored import counted, fill, nest, put, room_for, room_of, stored
 from jounce.native.values import Value
+from jounce.native.views import Array, between, spread, transposed
 
 StoredRule = Callable[[Code, Any, Sequence[Array]], Sequence[Array]]
 
@@ -31,8 +20,7 @@ def reduction(operation: str) -> StoredRule:
         array, axes = stored(code, given[0]), equation.params["axes"]
         kept = [axis for axis in range(array.ndim) if axis not in axes]
         found = room_of(code, equation, [array])
-        start = stored(code, filled((), [code.constant(nothing(operation, found.kind), found.kind)]))
-        put(code, found, spread(start, found.shape, ()))
+        fill(code, found, code.constant(nothing(operation, found.kind), found.kind))
         combine = combination(code, operation)
         total = spread(found, array.shape, kept)
         nest(code, [total, array], [total], lambda values: [combine(*values)], adds=True)
@@ -49,8 +37,7 @@ def extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
     best = room_for(code, found.shape, array.kind, lanes=array.lanes)
     first = between(code, rows, rows.ndim - 1, 0, 1)
     put(code, best, replace(first, shape=first.shape[:-1], strides=first.strides[:-1]))
-    start = stored(code, filled((), [code.constant(0, found.kind)]))
-    put(code, found, spread(start, found.shape, ()))
+    fill(code, found, code.constant(0, found.kind))
 
     def look(k: int | Value) -> None:
         index = code.converted(k, found.kind) if isinstance(k, Value) else code.constant(k, found.kind)
@@ -72,8 +59,7 @@ def dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Return products of matrices: sums of products over some axes, for each place along those that are joined."""
     (left_sum, right_sum), (left_batch, right_batch) = equation.params["dimension_numbers"]
     found = room_of(code, equation, given)
-    start = stored(code, filled((), [code.constant(0, found.kind)]))
-    put(code, found, spread(start, found.shape, ()))
+    fill(code, found, code.constant(0, found.kind))
     left, right = (stored(code, array) for array in given)
     left_free, right_free = (
         [axis for axis in range(x.ndim) if axis not in (*batch, *summed)]

@@ -13,9 +13,10 @@ from jounce.native.handler import handler_text
 from jounce.native.machine import compiled, vector_width
 from jounce.native.relays import relay_text
 from jounce.native.scalars import MOST_LINES
-from jounce.native.stored import Array, Stored, contiguous, is_large, put, values_of
+from jounce.native.stored import is_large, put, values_of
 from jounce.native.translation import translate
 from jounce.native.values import Region, UnsupportedOperationError, kind_of
+from jounce.native.views import Array, Stored, contiguous
 
 MOST_MEMORY = 2**20  # bytes of the stack: threads have little
 MOST_HEAP = 2**28  # bytes elsewhere

@@ -1,12 +1,11 @@
-"""Arrays that stay in memory, where they are too large to be single values, and loops over them.
+"""How numbers go to arrays in memory and come from there, and loops over such arrays.
 
-Parts, transposes and repetitions of such an array are views, as in NumPy: where numbers begin, and how far apart they
-lie. A loop takes a number of each array, or as many as a vector has where they lie one after another.
+A loop takes a number of each array, or as many as a vector has where they lie one after another.
 """
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,63 +13,16 @@ import numpy as np
 from jounce.native.arrays import Values, filled, in_memory
 from jounce.native.code import Code, flat
 from jounce.native.values import Region, Value, kind_of
-
-
-@dataclass(frozen=True, eq=False)
-class Stored:
-    """An array in memory.
-
-    Attributes
-    ----------
-    region : Region
-        Where its numbers are.
-    shape, strides : tuple of int
-        As those of an array of NumPy; strides count numbers.
-    first : int or Value
-        Place of the first number, which may differ from lane to lane.
-    """
-
-    region: Region
-    shape: tuple[int, ...]
-    strides: tuple[int, ...]
-    first: int | Value = 0
-
-    @property
-    def ndim(self) -> int:
-        """Number of axes."""
-        return len(self.shape)
-
-    @property
-    def size(self) -> int:
-        """Number of numbers."""
-        return math.prod(self.shape)
-
-    @property
-    def kind(self) -> str:
-        """Kind of the numbers."""
-        return self.region.kind
-
-    @property
-    def lanes(self) -> bool:
-        """Whether numbers differ from lane to lane."""
-        return self.region.lanes or (isinstance(self.first, Value) and self.first.lanes)
-
-    def is_same(self, other: Any) -> bool:
-        """Tell whether another array is this one."""
-        return (
-            isinstance(other, Stored)
-            and (other.region is self.region and other.shape == self.shape and other.strides == self.strides)
-            and (other.first is self.first or (isinstance(self.first, int) and other.first == self.first))
-        )
-
-
-Array = Values | Stored
-
-
-def contiguous(region: Region, shape: Sequence[int], first: int | Value = 0) -> Stored:
-    """Return an array whose numbers lie one after another, the last axis fastest."""
-    ends = np.cumprod([1, *shape[:0:-1]]) if len(shape) else []
-    return Stored(region, tuple(shape), tuple(int(x) for x in ends[::-1]), first)
+from jounce.native.views import (
+    Array,
+    Stored,
+    between,
+    contiguous,
+    divided,
+    further,
+    merged,
+    spread,
+)
 
 
 def room_for(code: Code, shape: Sequence[int], kind: str, *, lanes: bool) -> Stored:
@@ -97,6 +49,11 @@ def any_lanes(arrays: Sequence[Array]) -> bool:
     return any(x.lanes if isinstance(x, Stored) else any(v.lanes for v in flat(x)) for x in arrays)
 
 
+def kind_in(array: Array) -> str:
+    """Return the kind of the numbers of an array that has some."""
+    return array.kind if isinstance(array, Stored) else flat(array)[0].kind
+
+
 def room_of(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
     """Return room for the result of an operation."""
     aval = equation.outvars[0].aval
@@ -104,30 +61,6 @@ def room_of(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
 
 
 # -- views ------------------------------------------------------------------------------------------------------------
-
-
-def further(code: Code, first: int | Value, steps: int | Value, stride: int) -> int | Value:
-    """Return a place so many strides further."""
-    if not isinstance(steps, Value) and not isinstance(first, Value):
-        return first + int(steps) * stride
-    more = code.arithmetic("mul", _whole(code, steps), code.constant(stride, "l"))
-    return _plain(code.arithmetic("add", _whole(code, first), more))
-
-
-def _whole(code: Code, number: int | Value) -> Value:
-    return code.converted(number, "l") if isinstance(number, Value) else code.constant(number, "l")
-
-
-def _plain(value: Value) -> int | Value:
-    return value if value.constant is None else int(value.constant)
-
-
-def between(code: Code, array: Stored, axis: int, start: int | Value, size: int, step: int = 1) -> Stored:
-    """Return so many numbers along an axis from an index on."""
-    shape, strides = list(array.shape), list(array.strides)
-    first = further(code, array.first, start, strides[axis])
-    shape[axis], strides[axis] = size, strides[axis] * step
-    return Stored(array.region, tuple(shape), tuple(strides), first)
 
 
 def row(code: Code, array: Array, index: int | Value) -> Array:
@@ -139,41 +72,12 @@ def row(code: Code, array: Array, index: int | Value) -> Array:
     return settled(code, replace(part, shape=part.shape[1:], strides=part.strides[1:]))
 
 
-def transposed(array: Stored, axes: Sequence[int]) -> Stored:
-    """Return an array with its axes in another order."""
-    return replace(array, shape=tuple(array.shape[k] for k in axes), strides=tuple(array.strides[k] for k in axes))
-
-
-def spread(array: Stored, shape: Sequence[int], axes: Sequence[int]) -> Stored:
-    """Return an array repeated along new axes and those of length one; `axes` are where its own belong."""
-    strides = [0] * len(shape)
-    for axis, size, stride in zip(axes, array.shape, array.strides, strict=True):
-        strides[axis] = stride if size == shape[axis] else 0
-    return replace(array, shape=tuple(shape), strides=tuple(strides))
-
-
 def reshaped(code: Code, array: Stored, shape: Sequence[int]) -> Stored:
     """Return the same numbers in another shape, copied where no strides tell it."""
-    strides = _split(*_merged(array.shape, [array.strides]), shape) if array.size else None
+    strides = divided(*merged(array.shape, [array.strides]), shape) if array.size else None
     if strides is None:
         return contiguous(copied(code, array).region, shape)
     return replace(array, shape=tuple(shape), strides=strides)
-
-
-def _split(sizes: Sequence[int], strides: Sequence[Sequence[int]], shape: Sequence[int]) -> tuple[int, ...] | None:
-    """Return the strides of axes of other lengths, None where there are none: of axes as `_merged` returns them."""
-    found, waiting, left, stride = [], list(zip(sizes, strides[0], strict=True)), 1, 0
-    for size in reversed(shape):
-        if size == 1:
-            found.append(0)
-            continue
-        if left == 1:
-            left, stride = waiting.pop()
-        if left % size:
-            return None
-        found.append(stride)
-        left, stride = left // size, stride * size
-    return tuple(reversed(found))
 
 
 # -- numbers and memory -----------------------------------------------------------------------------------------------
@@ -223,11 +127,7 @@ def settled(code: Code, array: Stored) -> Array:
 
 def copied(code: Code, array: Array) -> Stored:
     """Return an array with a place of its own, its numbers one after another."""
-    if isinstance(array, Stored):
-        found = room_for(code, array.shape, array.kind, lanes=array.lanes)
-    else:
-        values = flat(array)
-        found = room_for(code, array.shape, values[0].kind, lanes=any(value.lanes for value in values))
+    found = room_for(code, array.shape, kind_in(array), lanes=any_lanes([array]))
     put(code, found, array)
     return found
 
@@ -244,6 +144,11 @@ def put(code: Code, target: Stored, array: Array) -> None:
     for index, value in zip(np.ndindex(*target.shape), flat(array), strict=True):
         place = further(code, target.first, int(np.dot(index, target.strides)), 1) if target.ndim else target.first
         code.store(target.region, place, value)
+
+
+def fill(code: Code, target: Stored, number: Value) -> None:
+    """Write a number wherever an array is."""
+    put(code, target, spread(stored(code, filled((), [number])), target.shape, ()))
 
 
 # -- loops ------------------------------------------------------------------------------------------------------------
@@ -290,7 +195,7 @@ def nest(code: Code, given: Sequence[Stored], found: Sequence[Stored], body: Bod
         Whether what is written depends on what was there, so that no place may be visited twice.
     """
     arrays = [*given, *found]
-    shape, strides = _merged(arrays[0].shape, [array.strides for array in arrays])
+    shape, strides = merged(arrays[0].shape, [array.strides for array in arrays])
     if 0 in shape:
         return
 
@@ -362,25 +267,6 @@ def _in_vectors(code: Code, size: int, vector: Visit, single: Visit | None) -> N
     counted(code, whole, lambda k: vector(further(code, 0, k, code.width)))
     if single is not None:
         counted(code, left, lambda k: single(further(code, whole * code.width, k, 1)))
-
-
-def _merged(shape: Sequence[int], strides: Sequence[Sequence[int]]) -> tuple[list[int], list[list[int]]]:
-    """Return axes without those of length one, neighbours as one where the numbers of all arrays go on."""
-    sizes: list[int] = []
-    steps: list[list[int]] = [[] for _ in strides]
-    for k, size in enumerate(shape):
-        if size == 1:
-            continue
-        own = [s[k] for s in strides]
-        if sizes and all(step[-1] == size * stride for step, stride in zip(steps, own, strict=True)):
-            sizes[-1] *= size
-            for step, stride in zip(steps, own, strict=True):
-                step[-1] = stride
-            continue
-        sizes.append(size)
-        for step, stride in zip(steps, own, strict=True):
-            step.append(stride)
-    return sizes, steps
 
 
 def _is_along(steps: Sequence[int], given: int) -> bool:

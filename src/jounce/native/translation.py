@@ -12,24 +12,12 @@ from jax.extend.core import Literal, jaxprs_in_params
 
 from jounce.native.arrays import constants, each, filled
 from jounce.native.carried import Carried
-from jounce.native.code import Code, flat
+from jounce.native.code import Code
 from jounce.native.loops import STORED
 from jounce.native.operations import RULES
-from jounce.native.stored import (
-    Array,
-    Stored,
-    contiguous,
-    further,
-    is_large,
-    nest,
-    put,
-    room_for,
-    row,
-    settled,
-    stored,
-    values_of,
-)
+from jounce.native.stored import any_lanes, is_large, kind_in, nest, put, room_for, row, settled, stored, values_of
 from jounce.native.values import Region, UnsupportedOperationError, Value, kind_of
+from jounce.native.views import Array, Stored, contiguous, further
 
 MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn after turn
 HOPE = 8  # times as many lines as in a later turn may be in one of the first, which later ones have in common with it
@@ -168,10 +156,7 @@ def _until_settled(code: Code, lanes: list[bool], attempt: Callable[[list[bool]]
 def _in_lanes(arrays: Sequence[Array], already: Sequence[bool] | None = None) -> list[bool]:
     """Tell which arrays have numbers that differ from lane to lane, or did already."""
     already = [False] * len(arrays) if already is None else already
-    return [
-        before or (array.lanes if isinstance(array, Stored) else any(v.lanes for v in flat(array)))
-        for before, array in zip(already, arrays, strict=True)
-    ]
+    return [before or any_lanes([array]) for before, array in zip(already, arrays, strict=True)]
 
 
 def _likely(code: Code, arrays: Sequence[Array], avals: Sequence[Any]) -> list[bool]:
@@ -331,9 +316,7 @@ def _stacked(code: Code, parts: Sequence[Array]) -> Array:
     single = [part for part in parts if not isinstance(part, Stored)]
     if len(single) == len(parts) and (code.large is None or len(parts) * parts[0].size <= code.large):
         return np.stack(single)
-    lanes = _in_lanes(parts)
-    kind = next(p.kind if isinstance(p, Stored) else p.item(0).kind for p in parts)
-    found = room_for(code, (len(parts), *parts[0].shape), kind, lanes=any(lanes))
+    found = room_for(code, (len(parts), *parts[0].shape), kind_in(parts[0]), lanes=any_lanes(parts))
     for k, part in enumerate(parts):
         put(code, contiguous(found.region, part.shape, k * part.size), part)
     return found
