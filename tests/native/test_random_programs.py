@@ -21,12 +21,17 @@ def bounded(product):
     return lambda a, b: lax.rem(product(a, b), jnp.full_like(a, MODULUS))
 
 
+def divided(operation):
+    """An operation that divides: JAX ends the process where whole numbers that it knows are divided by zero."""
+    return lambda a, b: operation(a, b if b.dtype.kind == "f" else jnp.where(b == 0, 1, b).astype(b.dtype))
+
+
 PAIRS = [
-    bounded(operator.add), bounded(operator.sub), bounded(operator.mul), lax.rem, lax.max, lax.min,
+    bounded(operator.add), bounded(operator.sub), bounded(operator.mul), divided(lax.rem), lax.max, lax.min,
     lambda a, b: jnp.where(a < b, a, b + b), lambda a, b: -a, lambda a, b: jnp.sign(a), lambda a, b: abs(b),
 ]  # fmt: skip
 OF_WHOLE = [
-    lax.div,
+    divided(lax.div),
     lax.bitwise_and,
     lax.bitwise_or,
     lax.bitwise_xor,
