@@ -271,7 +271,7 @@ def _check_known(motion: Motion, order: int, known: int) -> None:
         raise MechanismError(message, name="order", value=motion.order)
 
 
-@compiled("pose_type", "order", "function")
+@compiled("pose_type", "order", "function", brief=True)
 def _of_bodies(
     coordinates: Coordinates, masses: Masses, pose_type: type[Pose], order: int, function: EnergyFunction
 ) -> tuple[Energies, ...]:
@@ -321,7 +321,7 @@ def potential_coefficients(motion: Motion) -> Energies:
     return 0.0 - heights * masses.mass[None]  # no -0
 
 
-@compiled("pose_type")
+@compiled("pose_type", brief=True)
 def _heights(
     coordinates: Coordinates, center: Float[Numbers, "component body 1"], gravity: Gravity, pose_type: type[Pose]
 ) -> Energies:
@@ -360,7 +360,7 @@ def stored_energy(motion: Motion) -> Any:
     return labelled(motion, held(motion, stored)[None], "J")[:, 0].drop_vars("derivative")
 
 
-@compiled("pose_type")
+@compiled("pose_type", brief=True)
 def _stored(groups: tuple[Group, ...], coordinates: Coordinates, time: Any, pose_type: type[Pose]) -> Any:
     return energy_of_forces(groups, pose_of(coordinates, pose_type), Jet.variable(time, 1))
 

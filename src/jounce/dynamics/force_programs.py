@@ -28,7 +28,7 @@ from jounce.shapes import Numbers
 LOT = 16  # instants whose dense matrices are factored together
 
 
-@compiled("pose_type", "slot", "levels")
+@compiled("pose_type", "slot", "levels", brief=True)
 def element_slopes(
     element: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
 ) -> Any:
@@ -37,7 +37,7 @@ def element_slopes(
     return slopes(element, [pose_of(pose, pose_type, levels - 1) for pose in poses], time, slot)
 
 
-@compiled("pose_type")
+@compiled("pose_type", brief=True)
 def body_loads(
     system: System, bodies: Coordinates, instants: Lanes, masses: Masses, gravity: Gravity, pose_type: type[Pose]
 ) -> tuple[Any, Any]:
@@ -48,7 +48,7 @@ def body_loads(
     return loads(system, pose, time, masses, gravity), system.finite_forces(pose, time)
 
 
-@compiled("pose_type")
+@compiled("pose_type", brief=True)
 def multipliers(
     system: System,
     blocks: Slopes,
@@ -64,7 +64,7 @@ def multipliers(
     return in_lots(of_lot, LOT, blocks, load, mass) if dense else of_lot(blocks, load, mass)
 
 
-@compiled()
+@compiled(brief=True)
 def least_multipliers(
     system: System,
     blocks: Slopes,
@@ -84,13 +84,13 @@ def least_multipliers(
     return in_lots(of_lot, LOT, blocks, load)
 
 
-@compiled()
+@compiled(brief=True)
 def scaled_jacobian(system: System, blocks: Slopes) -> Any:
     """Return the Jacobian of scaled rows and columns."""
     return constraint_forces.jacobian_of(system, blocks)
 
 
-@compiled("pose_type")
+@compiled("pose_type", brief=True)
 def exerted(
     driver: Any, poses: Sequence[Coordinates], instants: Lanes, forces: Multipliers, pose_type: type[Pose]
 ) -> Any:
@@ -100,7 +100,7 @@ def exerted(
     return constraint_forces.exerted(driver, built, Jet.variable(instants[None], order), forces)
 
 
-@compiled("pose_type", "levels")
+@compiled("pose_type", "levels", brief=True)
 def applied(force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], levels: int) -> Any:
     """Return what applied forces exert, Taylor coefficients."""
     built = [pose_of(pose, pose_type, levels) for pose in poses]
@@ -109,13 +109,13 @@ def applied(force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type
     return stacked(with_rows(found))
 
 
-@compiled()
+@compiled(brief=True)
 def wrenches(slope: Slope, forces: Multipliers) -> Any:
     """Return what joints do to the body in a slot: force, global, and moment about its origin, in its axes."""
     return constraint_forces.wrench(slope, forces)
 
 
-@compiled("pose_type")
+@compiled("pose_type", brief=True)
 def expressed(
     work: Float[Numbers, "levels coordinate batch"],
     bodies: Sequence[Coordinates],

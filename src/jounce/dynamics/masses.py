@@ -50,7 +50,7 @@ def masses_of(mechanism: Mechanism) -> Masses:
         columns.append((mass, center, inertia * np.eye(3) if tensor and np.ndim(inertia) < 2 else inertia))
     masses, centers, inertias = (along_instances(*part) for part in zip(*columns, strict=True))
     # those of a plane body about its axes are not known apart; only their sum counts
-    moments = second_moments(inertias) if tensor else np.eye(2)[..., None, None] * 0.5 * inertias
+    moments = second_moments(inertias) if tensor else np.eye(2)[..., None, None] * (0.5 * inertias)[None, None]
     return Masses(masses, centers, moments)
 
 

@@ -95,7 +95,7 @@ def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarr
     return np.stack(power.dense().coefficients), np.stack(size.dense().coefficients)
 
 
-@compiled("levels")
+@compiled("levels", brief=True)
 def _law(driver: Any, instants: Lanes, levels: int) -> Float[Numbers, "_ instance batch"]:
     law = stacked(driver.motion(Jet.variable(instants[None], levels)))
     return law.reshape(levels + 1, -1, len(instants))
@@ -107,7 +107,7 @@ def _of_chunk(forces: MotionForces, lanes: np.ndarray) -> tuple[Any, ...]:
     return applied, bodies, instants, forces.masses, forces.gravity, forces.model.length
 
 
-@compiled("pose_type", "levels")
+@compiled("pose_type", "levels", brief=True)
 def _powers(
     groups: tuple[Group, ...],
     bodies: Coordinates,

@@ -1,6 +1,7 @@
 """The state a simulation starts from: consistent positions and velocities from partial ones, and what can move."""
 
 import dataclasses
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -65,7 +66,9 @@ class ConsistentStart:
         return f"{free} {noun}: {freely_moving(self.model, self.jacobian.free_directions)}"
 
 
-def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
+def consistent_start(
+    mechanism: Mechanism, instant: float, built: Callable[[Model], None] | None = None
+) -> ConsistentStart:
     """Return a consistent state at an instant, from the starting guess and the initial conditions.
 
     Initial conditions are drivers: each fixes one coordinate and its rate, as its law gives them at the instant. What
@@ -77,6 +80,8 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
         Its bodies need masses; joints and drivers may leave degrees of freedom.
     instant : float
         s.
+    built : callable, optional
+        Called with the model before it is assembled, initial conditions among its drivers.
 
     Raises
     ------
@@ -91,6 +96,8 @@ def consistent_start(mechanism: Mechanism, instant: float) -> ConsistentStart:
     mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
     model, gravity, state = build(mechanism, initial=True), gravity_of(mechanism), None
+    if built is not None:
+        built(model)
     if mechanism.initial:
         whole, coordinates = _assembled(model, instant)
         model = released(model)
@@ -158,13 +165,13 @@ def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
     return State(position, attitude, np.zeros_like(position), spin)
 
 
-@compiled(narrow=True)
+@compiled(narrow=True, brief=True)
 def with_rates(equations: Equations, state: State, time: Instants) -> State:
     """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
     return _moving(equations, state, time)
 
 
-@compiled(narrow=True)
+@compiled(narrow=True, brief=True)
 def _with_rates_told(equations: Equations, state: State, time: Instants) -> tuple[State, Any, Any]:
     """Return the state of bodies at rest with velocities, what rates they fulfil, and how the attitude moves."""
     moving = _moving(equations, state, time)
@@ -180,7 +187,7 @@ class _Facts(NamedTuple):
     sound: Bool[Any, "force 1"]  # which applied forces are finite
 
 
-@compiled(narrow=True)
+@compiled(narrow=True, brief=True)
 def _judged(equations: Equations, state: State, time: Instants) -> _Facts:
     """Return these facts from a program of their own: in that of the velocities they would change its last digits."""
     still = equations.still(state.position, state.attitude)

@@ -327,12 +327,13 @@ class _Runs:
         about axes near the instants, but at the start.
         """
         for lanes in self.lots(np.arange(len(runs))):
-            known = Turns(tuple(angle[:, lanes] for angle in angles), self._begun_with(runs[lanes]))
-            equations, outputs = self._picked(runs[lanes], known)
+            turned_by = tuple(angle[:, lanes] for angle in angles)
+            shared = self._picked(runs[lanes], Turns(turned_by, self._begun_with(runs[lanes])))
+            _, outputs = shared
             time = self.instants[at[lanes]]
             since = time - begin[lanes]
             started = polynomial.map(lambda part, lanes=lanes: part[..., lanes])
-            *_, found = expanded(equations, outputs, started, since, time, order=self._expansion)
+            *_, found = expanded(shared, (turned_by, started, since, time), order=self._expansion)
             for which, (group, series) in enumerate(zip(outputs, map(np.array, found), strict=True)):
                 if which in before and measures_angle(group):
                     series[0, 0] = brought_near(series[0, 0], before[which][:, lanes])

@@ -16,6 +16,7 @@ from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
 from jounce.integrate.events import Event, EventDetector, EventLog, pose_coordinates
 from jounce.integrate.lookahead import watched_names
+from jounce.integrate.march_ahead import STEPS, MarchAhead
 from jounce.integrate.marching import MOVING, DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.methods import AbstractMethod, evaluated
 from jounce.integrate.options import checked_options, instants_of
@@ -27,7 +28,8 @@ from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.motion import check_output, output_group
-from jounce.kinematics.rehearsal import first_time, rehearsed
+from jounce.kinematics.rehearsal import tried
+from jounce.kinematics.store import expect
 from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete_or
@@ -40,7 +42,6 @@ from jounce.shapes import ArrayLike, Numbers
 AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
 FEW = 4  # derivatives that are looked at for one that is not finite
 GOING = frozenset(MOVING.tolist())
-STEPS = 64  # tried between two looks at progress and events
 ROBOT_OPTIONS = tuple(RobotOptions.__annotations__)
 
 
@@ -180,13 +181,20 @@ def simulate(
         mechanism = dataclasses.replace(mechanism, initial=dict(initial))
     instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
     check_laws(mechanism, instants, order, forces=True)
+    expect(len(instants))
     for event in events:
         _check_event(event, mechanism)
-    start = consistent_start(mechanism, float(instants[0]))
-    _check_forces(start, float(instants[0]))
-    detectors = [_detector_of(event, mechanism, start) for event in events]
+    first, last = float(instants[0]), float(instants[-1])
+    with MarchAhead(mechanism, (first, last), method, float(tolerance), float(longest_step)) as ahead:
+        start = consistent_start(mechanism, first, ahead.begin)
+        _check_forces(start, first)
+        detectors = [_detector_of(event, mechanism, start) for event in events]
+        if ahead.new:
+            ahead.follow_up(start)
+            with tried():  # for the programs that evaluate the steps
+                Simulation(mechanism, start, ahead.one_step(start), instants[: FEW_INSTANTS + 1], order)
     run = _Run(start, method, float(tolerance), float(longest_step), detectors)
-    run.go(instants, progress, lambda dense: Simulation(mechanism, start, dense, instants[: FEW_INSTANTS + 1], order))
+    run.go(instants, progress)
     simulation = Simulation(mechanism, start, run.dense_output, instants, order, run.ending, run.events.happened)
     if strict and run.events.stopped_at is None:
         raise_for_status(simulation)
@@ -245,7 +253,7 @@ def _unsound(start: ConsistentStart, sound: Bool[np.ndarray, " force"]) -> str:
     return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), sound, strict=True) if not good)
 
 
-@compiled(narrow=True)
+@compiled(narrow=True, brief=True)
 def _finite_forces(equations: Equations, state: State, time: Instants) -> Bool[Numbers, "force 1"]:
     return equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
 
@@ -299,45 +307,28 @@ class _Run:
         """All steps taken."""
         return jax.tree.map(lambda *parts: np.concatenate(parts), *self.parts)
 
-    def go(
-        self,
-        instants: np.ndarray,
-        progress: Callable[[int, int], None] | None,
-        evaluate: Callable[[DenseOutput], Any],
-    ) -> None:
-        """March from the first to the last instant; steps are to be evaluated afterwards, which is rehearsed."""
+    def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
+        """March from the first to the last instant."""
         equations, stop = self.start.equations, instants[-1]
         self.sense = sense = np.sign(instants[-1] - instants[0])
         order = self.method.expansion_order(self.tolerance)
         current = unexpanded(equations, self.start.state, instants[:1], order=order)
         how, options = (stop, self.tolerance, self.longest), {"method": self.method, "count": STEPS}
-        new = first_time("march", equations, order, self.method)
-        with rehearsed(lambda: evaluate(self._standing(current, stop)), wanted=new):
-            while current.outcome.item() in GOING and self.events.stopped_at is None:
-                current, steps, tried = march(equations, current, *how, **options)
-                found, taken = steps
-                taken = np.asarray(taken)[: int(tried), 0]
-                if taken.any():
-                    # a view, unless some were refused: they are joined, and so copied, at the end
-                    chosen = slice(len(taken)) if taken.all() else np.flatnonzero(taken)
-                    part = jax.tree.map(lambda x, k=chosen: np.asarray(x)[k, ..., 0], found)
-                    self.parts.append(self.events.noted(part))
-                if progress is not None:
-                    progress(int(np.sum(sense * instants <= sense * current.time.item())), len(instants))
+        while current.outcome.item() in GOING and self.events.stopped_at is None:
+            current, steps, attempts = march(equations, current, *how, **options)
+            found, taken = steps
+            taken = np.asarray(taken)[: int(attempts), 0]
+            if taken.any():
+                # a view, unless some were refused: they are joined, and so copied, at the end
+                chosen = slice(len(taken)) if taken.all() else np.flatnonzero(taken)
+                part = jax.tree.map(lambda x, k=chosen: np.asarray(x)[k, ..., 0], found)
+                self.parts.append(self.events.noted(part))
+            if progress is not None:
+                progress(int(np.sum(sense * instants <= sense * current.time.item())), len(instants))
         if not self.parts:
             self._stand(current)
         if current.outcome.item() in (Outcome.COLLAPSED, Outcome.LOST):
             self.ending = self._explained(current)
-
-    def _standing(self, current: IntegratorState, stop: float) -> DenseOutput:
-        """Return one step of the whole length, at rest, in the form of those that will be taken."""
-        expansion, time = current.expansion, np.asarray(current.time)
-        form = jax.eval_shape(self.method.polynomial, expansion, expansion, current.time)
-        still = jax.tree.map(lambda x: np.zeros((1, *x.shape[:-1])), form)
-        for part, known in zip(still, expansion.state, strict=True):
-            part[0, 0] = np.asarray(known)[0, ..., 0]
-        angles = tuple(np.asarray(part).T for part in current.angles)
-        return DenseOutput(time, stop - time, still, np.full(1, -1), angles)
 
     def _stand(self, current: IntegratorState) -> None:
         """Keep the start as a step of no length."""

@@ -21,10 +21,10 @@ from jounce.integrate.turns import PLACES, AnglesOfForces, attitudes_at, followe
 from jounce.jet import Jet, dot
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.alone import is_short_lived
 from jounce.kinematics.compilation import Compiled, compiled
 from jounce.kinematics.motion import output_series
 from jounce.kinematics.side_by_side import SideBySide
+from jounce.kinematics.store import is_wanted_soon
 from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle, with_turns
 from jounce.mechanism.system import Group
@@ -251,7 +251,7 @@ def _at(
         return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
 
     code = expanded_instant.program(
-        shared, lanes_of(np.zeros(1, int)), large=LARGE, hasty=is_short_lived(), order=order
+        shared, lanes_of(np.zeros(1, int)), large=LARGE, hasty=is_wanted_soon(), order=order
     )
 
     def chunk(places: np.ndarray) -> Any:
@@ -306,7 +306,7 @@ def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarr
     return series
 
 
-@compiled("pose_type")
+@compiled("pose_type", brief=True)
 def _checks(
     equations: Equations, coordinates: Coordinates, time: Instants, pose_type: type
 ) -> tuple[Lanes, Lanes, Lanes]:

@@ -16,7 +16,7 @@ import jax
 import numpy as np
 
 from jounce.kinematics.device import on_processor
-from jounce.kinematics.store import current_store, made_or_kept
+from jounce.kinematics.store import current_store, is_wanted_soon, made_or_kept
 from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
 from jounce.native import machine
 from jounce.native.modules import object_file
@@ -31,11 +31,6 @@ _thread = threading.local()
 def is_wanted() -> bool:
     """Tell whether there is to be machine code: there is a compiler, and nothing forbids it."""
     return os.environ.get(VARIABLE, "") != "0" and machine.is_usable() and on_processor() and not being_debugged()
-
-
-def is_short_lived() -> bool:
-    """Tell whether code is compiled for one command, whose user waits for it: where programs are kept."""
-    return current_store() is not None
 
 
 def is_traced_alone() -> bool:
@@ -89,7 +84,7 @@ class Alone:
 
         def make() -> tuple[Any, ...]:
             try:
-                binary, results = object_file(function, given, (), {}, large=LARGE, alone=True, hasty=is_short_lived())
+                binary, results = object_file(function, given, (), {}, large=LARGE, alone=True, hasty=is_wanted_soon())
             except UnsupportedOperationError:  # which is kept, too
                 return b"", None, None
             return binary, jax.tree.leaves(given), results
@@ -97,5 +92,5 @@ class Alone:
         name = None
         if current_store() is not None:
             with suppress(UndescribedError):
-                name = program_key(self.made_of, tree, [kinds, "alone", is_short_lived(), machine.processor()], static)
+                name = program_key(self.made_of, tree, [kinds, "alone", is_wanted_soon(), machine.processor()], static)
         return made_or_kept(name, make, lambda binary, *rest: Single(binary, *rest) if binary else None)

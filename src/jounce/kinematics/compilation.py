@@ -22,7 +22,7 @@ from jax.experimental import serialize_executable
 
 from jounce.kinematics.alone import Alone
 from jounce.kinematics.device import on_processor
-from jounce.kinematics.store import Store, current_store
+from jounce.kinematics.store import Store, current_store, is_wanted_soon
 from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
 from jounce.mechanism.preconditions import check_process
 
@@ -115,6 +115,9 @@ class Compiled:
         Passes of XLA to leave out.
     narrow : bool, optional
         Whether its arrays are short, as `compiler_options` has it.
+    brief : bool, optional
+        Whether a command calls it so seldom, or has it compute so little, that it waits longer for the compiler: then
+        LLVM optimises nothing where code is wanted soon, in half the time.
     alone : callable, optional
         Tells from the arguments whether machine code is better where there is a compiler for it, as `Alone` has it.
     """
@@ -127,10 +130,11 @@ class Compiled:
         without: tuple[str, ...] = (),
         *,
         narrow: bool = False,
+        brief: bool = False,
         alone: Callable[..., bool] | None = None,
     ):
         self.function, self.static, self.made_of = function, static, made_of or (function,)
-        self.without, self.narrow = without, narrow
+        self.without, self.narrow, self.brief = without, narrow, brief
         self._programs: dict[Any, Callable[..., Any]] = {}
         self._suits_alone, self._alone = alone, Alone(function, self.made_of)
         self._names = tuple(inspect.signature(function).parameters)
@@ -171,11 +175,17 @@ class Compiled:
         kinds = tuple(map(_kind, leaves))
         if None in kinds or being_debugged():
             return self.jitted(*arguments, **keywords, **static)
-        key = (tree, kinds, tuple((name, type(value), value) for name, value in static.items()), settings())
+        told = tuple((name, type(value), value) for name, value in static.items())
+        key = tree, kinds, told, self._level(), settings()
         if (program := self._programs.get(key)) is not None:
             return program(*arguments, **keywords)
         self._programs[key], results = self._begun(store, tree, kinds, arguments, keywords, static)
         return results
+
+    def _level(self) -> int | None:
+        """Return how much LLVM is to optimise, where that is less than it does otherwise."""
+        hasty = self.brief and is_wanted_soon() and on_processor() and not _level_is_set()
+        return 0 if hasty and _processor_options() is not None else None
 
     def _begun(
         self, store: Store, tree: Any, kinds: tuple[Any, ...], arguments: Any, keywords: Any, static: Mapping[str, Any]
@@ -184,8 +194,9 @@ class Compiled:
 
         A program from the store has run to its end before it is trusted.
         """
+        level = self._level()
         try:
-            key = program_key(self.made_of, tree, kinds, static)
+            key = program_key(self.made_of, tree, (*kinds, level), static)
         except UndescribedError:
             program = partial(self.jitted, **static)
             return program, program(*arguments, **keywords)
@@ -198,7 +209,7 @@ class Compiled:
         with compiling_anew():
             lowered = self.jitted.lower(*arguments, **keywords, **static)
             _forget_sources(lowered.compiler_ir())
-            program = lowered.compile()
+            program = lowered.compile(None if level is None else {"xla_backend_optimization_level": level})
         if (packed := _packed(program, tree)) is not None:
             store.put(key, packed)
         return program, program(*arguments, **keywords)
@@ -273,7 +284,8 @@ def compiled(
     *static: str,
     without: tuple[str, ...] = (),
     narrow: bool = False,
+    brief: bool = False,
     alone: Callable[..., bool] | None = None,
 ) -> Callable[[Callable[..., Any]], Compiled]:
     """Compile the decorated function at its first call, with these static arguments, as `Compiled` has it."""
-    return lambda function: Compiled(function, static, without=without, narrow=narrow, alone=alone)
+    return lambda function: Compiled(function, static, without=without, narrow=narrow, brief=brief, alone=alone)

@@ -124,7 +124,7 @@ class ReducedConstraints:
         return powers @ coefficients
 
 
-@compiled("pose_type")
+@compiled("pose_type", brief=True)
 def _along(
     system: System,
     coordinates: dict[str, Numbers],

@@ -13,7 +13,6 @@ from jax.errors import ConcretizationTypeError
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
 from jounce.kinematics.actuation import actuated
 from jounce.kinematics.advance import SolvedState
-from jounce.kinematics.alone import is_short_lived
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.dead_ends import dead_end_words
@@ -26,6 +25,7 @@ from jounce.kinematics.rehearsal import first_time, rehearsed, tried
 from jounce.kinematics.sensitivities import differentiable_motion
 from jounce.kinematics.solver import NO_GRID, Solver
 from jounce.kinematics.status import Status
+from jounce.kinematics.store import expect, is_wanted_soon
 from jounce.kinematics.stretches import Stretches
 from jounce.kinematics.threads import thread_count
 from jounce.kinematics.traced_motion import TracedMotion
@@ -48,7 +48,6 @@ LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the us
 HIGHEST_ORDER = 30  # of derivatives of outputs
 HIGHEST_OF_MOTION = HIGHEST_ORDER + 2  # forces are two derivatives shorter than the motion
 LARGEST_TOLERANCE = 1e-2
-FEW_FOR_CODE = 100_000  # instants of one command: for fewer, faster code takes longer to compile than it saves
 REHEARSED = 2  # instants: forces are computed for many at a time, however few there are
 
 
@@ -230,8 +229,8 @@ def _followed(
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
     check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
     guessed = build(chosen(with_outputs_held(mechanism), first))
-    hasty = is_short_lived() and len(instants) <= FEW_FOR_CODE
-    solver = Solver(guessed, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order, hasty)
+    expect(len(instants))
+    solver = Solver(guessed, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order, is_wanted_soon())
     new = first_time("leg", guessed.system, solver.order, len(instants) > LONG_GRID)
     beside = new and thread_count() > 1
     with rehearsed(partial(_prepare, solver, first), wanted=beside):

@@ -24,7 +24,9 @@ class Store(Protocol):
         ...
 
 
+FEW = 100_000  # instants of one command: for fewer, faster code takes longer to compile than it saves
 _store: Store | None = None
+_many = False
 
 
 def keep_programs(store: Store | None) -> None:
@@ -36,6 +38,17 @@ def keep_programs(store: Store | None) -> None:
 def current_store() -> Store | None:
     """Return the store that programs go to."""
     return _store
+
+
+def expect(instants: int) -> None:
+    """Take note of how many instants this process is about to solve."""
+    global _many
+    _many = _many or instants > FEW
+
+
+def is_wanted_soon() -> bool:
+    """Tell whether code is compiled for one command, whose user waits for it: programs are kept, instants are few."""
+    return _store is not None and not _many
 
 
 def made_or_kept(key: str | None, make: Callable[[], tuple[Any, ...]], load: Callable[..., Any]) -> Any:

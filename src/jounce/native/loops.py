@@ -9,7 +9,7 @@ from jax.lax import GatherScatterMode
 
 from jounce.native.arrays import filled
 from jounce.native.code import Code
-from jounce.native.loops_along_axes import StoredRule, dot, extreme, reduction
+from jounce.native.loops_along_axes import REDUCTIONS, StoredRule, dot, extreme
 from jounce.native.operations import ELEMENTWISE, RULES
 from jounce.native.places import filler, kept_inside, within
 from jounce.native.stored import (
@@ -29,23 +29,45 @@ from jounce.native.stored import (
     without_home,
 )
 from jounce.native.values import Value, kind_of
-from jounce.native.views import Array, Stored, between, further, spread, transposed
+from jounce.native.views import Array, Deferred, InMemory, Stored, between, further, in_shape, spread, transposed
 
 # -- number by number -------------------------------------------------------------------------------------------------
 
 
+MOST_READ = 16  # arrays, of which a number each is in registers at once
+
+
 def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    """Return the results of an operation on each number: its rule for single values, in a loop."""
+    """Return the results of an operation on each number: its rule for single values, where they are wanted."""
     rule, aval = RULES[equation.primitive.name], equation.outvars[0].aval
-    arrays = [stored(code, array) for array in given]
-    arrays = [spread(x, aval.shape, range(x.ndim)) if x.ndim else spread(x, aval.shape, ()) for x in arrays]
-    found = room_for(code, aval.shape, kind_of(aval.dtype), lanes=any(x.lanes for x in arrays))
+    given = list(given)
+    while sum(len(array.given) for array in given if isinstance(array, Deferred)) + len(given) > MOST_READ:
+        longest = max(range(len(given)), key=lambda k: len(x.given) if isinstance(x := given[k], Deferred) else 0)
+        given[longest] = stored(code, given[longest])
+    read: list[Stored] = []
+    operands = [_operand(code, array, aval.shape, read) for array in given]
 
-    def body(values: Sequence[Value]) -> Sequence[Value]:
-        return [result.item() for result in rule(code, equation, [filled((), [value]) for value in values])]
+    def body(values: Sequence[Value]) -> Value:
+        numbers = [operand([values[k] for k in places]) for operand, places in operands]
+        return rule(code, equation, [filled((), [number]) for number in numbers])[0].item()
 
-    nest(code, arrays, [found], body)
-    return [found]
+    return [Deferred(tuple(read), kind_of(aval.dtype), body)]
+
+
+def _operand(
+    code: Code, array: Array, shape: Sequence[int], read: list[Stored]
+) -> tuple[Callable[[Sequence[Value]], Value], list[int]]:
+    """Return how a number of an array comes from numbers of those that are read, and of which: new ones are added."""
+    deferred = array if isinstance(array, Deferred) else None
+    parts = [stored(code, array)] if deferred is None else deferred.given
+    places = []
+    for part in parts:
+        part = spread(part, shape, range(part.ndim) if part.ndim else ())
+        known = [k for k, other in enumerate(read) if other.is_same(part)]
+        places.append(known[0] if known else len(read))
+        if not known:
+            read.append(part)
+    return (lambda values: values[0]) if deferred is None else deferred.body, places
 
 
 def _same(_: Code, __: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -64,16 +86,25 @@ def _part(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
 
 
 def _broadcast(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    p = equation.params
-    return [spread(stored(code, given[0]), p["shape"], tuple(map(int, p["broadcast_dimensions"])))]
+    p, array = equation.params, given[0]
+    axes = tuple(map(int, p["broadcast_dimensions"]))
+    if isinstance(array, Deferred) and array.size == equation.outvars[0].aval.size:
+        return [array.viewed(lambda x: spread(x, p["shape"], axes))]
+    return [spread(stored(code, array), p["shape"], axes)]
 
 
 def _reshape(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    return [reshaped(code, stored(code, given[0]), equation.outvars[0].aval.shape)]
+    array, shape = given[0], equation.outvars[0].aval.shape
+    if isinstance(array, Deferred) and (found := array.viewed(lambda x: in_shape(x, shape))) is not None:
+        return [found]
+    return [reshaped(code, stored(code, array), shape)]
 
 
 def _transpose(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    return [transposed(stored(code, given[0]), equation.params["permutation"])]
+    array, axes = given[0], equation.params["permutation"]
+    if isinstance(array, Deferred):
+        return [array.viewed(lambda x: transposed(x, axes))]
+    return [transposed(stored(code, array), axes)]
 
 
 def _reverse(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -155,7 +186,7 @@ def _dynamic_update_slice(code: Code, equation: Any, given: Sequence[Array]) -> 
     _, part, *starts = given
     found = _to_change(code, equation, given)
     target = _window(code, found, part.shape, starts)
-    put(code, target, _apart(code, part, found) if isinstance(part, Stored) else part)
+    put(code, target, _apart(code, part, found) if isinstance(part, InMemory) else part)
     return [found]
 
 
@@ -165,13 +196,14 @@ def _to_change(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
     if isinstance(array, Stored) and is_own(code, array) and (array.lanes or not any_lanes(others)):
         return array
     found = room_of(code, equation, given)
-    put(code, found, stored(code, array))
+    put(code, found, array)
     return found
 
 
-def _apart(code: Code, array: Stored, changed: Stored) -> Stored:
+def _apart(code: Code, array: InMemory, changed: Stored) -> InMemory:
     """Return an array that stays as it is while another one is changed: copied if it may be a part of that."""
-    return copied(code, array) if array.region is changed.region else array
+    read = array.given if isinstance(array, Deferred) else [array]
+    return copied(code, array) if any(x.region is changed.region for x in read) else array
 
 
 # -- at indices -------------------------------------------------------------------------------------------------------
@@ -268,7 +300,7 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
 def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Put numbers at indices, or add them to what is there."""
     found = _to_change(code, equation, given)
-    indices, updates = (_apart(code, stored(code, array), found) for array in given[1:])
+    indices, updates = (stored(code, _apart(code, stored(code, array), found)) for array in given[1:])
     p, add = equation.params, equation.primitive.name == "scatter-add"
     numbers = p["dimension_numbers"]
     if not updates.size or not found.size:
@@ -307,12 +339,7 @@ def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
 STORED: Mapping[str, StoredRule] = {
     **dict.fromkeys(ELEMENTWISE, _each),
     **dict.fromkeys(("copy", "stop_gradient", "optimization_barrier"), _same),
-    "reduce_sum": reduction("add"),
-    "reduce_prod": reduction("mul"),
-    "reduce_max": reduction("max"),
-    "reduce_min": reduction("min"),
-    "reduce_and": reduction("and"),
-    "reduce_or": reduction("or"),
+    **REDUCTIONS,
     "argmax": extreme,
     "argmin": extreme,
     "dot_general": dot,
@@ -336,3 +363,9 @@ STORED: Mapping[str, StoredRule] = {
     "scatter-add": _scatter,
 }
 """Rules for operations of which an array is large; of others, the numbers are taken out of memory."""
+
+DEFERRED = frozenset((*ELEMENTWISE, "broadcast_in_dim", "reshape", "squeeze", "expand_dims", "transpose"))
+"""Operations whose numbers may be computed where they are wanted."""
+
+READING = frozenset(("concatenate", "stack", "dynamic_update_slice", *REDUCTIONS))
+"""Others that read a number of an array once."""

@@ -15,11 +15,13 @@ from jounce.native.code import Code, flat
 from jounce.native.values import Region, Value, kind_of
 from jounce.native.views import (
     Array,
+    Deferred,
+    InMemory,
     Stored,
     between,
     contiguous,
-    divided,
     further,
+    in_shape,
     merged,
     spread,
 )
@@ -46,12 +48,12 @@ def is_large(code: Code, array: Any) -> bool:
 
 def any_lanes(arrays: Sequence[Array]) -> bool:
     """Tell whether numbers of some array differ from lane to lane."""
-    return any(x.lanes if isinstance(x, Stored) else any(v.lanes for v in flat(x)) for x in arrays)
+    return any(x.lanes if isinstance(x, InMemory) else any(v.lanes for v in flat(x)) for x in arrays)
 
 
 def kind_in(array: Array) -> str:
     """Return the kind of the numbers of an array that has some."""
-    return array.kind if isinstance(array, Stored) else flat(array)[0].kind
+    return array.kind if isinstance(array, InMemory) else flat(array)[0].kind
 
 
 def room_of(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
@@ -74,10 +76,8 @@ def row(code: Code, array: Array, index: int | Value) -> Array:
 
 def reshaped(code: Code, array: Stored, shape: Sequence[int]) -> Stored:
     """Return the same numbers in another shape, copied where no strides tell it."""
-    strides = divided(*merged(array.shape, [array.strides]), shape) if array.size else None
-    if strides is None:
-        return contiguous(copied(code, array).region, shape)
-    return replace(array, shape=tuple(shape), strides=strides)
+    found = in_shape(array, shape)
+    return contiguous(copied(code, array).region, shape) if found is None else found
 
 
 # -- numbers and memory -----------------------------------------------------------------------------------------------
@@ -85,6 +85,9 @@ def reshaped(code: Code, array: Stored, shape: Sequence[int]) -> Stored:
 
 def values_of(code: Code, array: Array) -> Values:
     """Return an array as single values."""
+    if isinstance(array, Deferred):
+        parts = [flat(values_of(code, part)) for part in array.given]
+        return filled(array.shape, [array.body(numbers) for numbers in zip(*parts, strict=True)])
     if not isinstance(array, Stored):
         return array
     places = [
@@ -104,6 +107,8 @@ def stored(code: Code, array: Array) -> Stored:
     """Return an array in memory, put there if it is not yet; what is repeated is put there once."""
     if isinstance(array, Stored):
         return array
+    if isinstance(array, Deferred):
+        return copied(code, array)
     if not array.size:
         return contiguous(Region("null", "f", False), array.shape)
     repeated = [size > 1 and stride == 0 for size, stride in zip(array.shape, array.strides, strict=True)]
@@ -120,7 +125,7 @@ def stored(code: Code, array: Array) -> Stored:
     return spread(contiguous(region, part.shape, first), array.shape, range(array.ndim))
 
 
-def settled(code: Code, array: Stored) -> Array:
+def settled(code: Code, array: Array) -> Array:
     """Return an array as single values where it is small."""
     return array if is_large(code, array) else values_of(code, array)
 
@@ -136,8 +141,12 @@ def put(code: Code, target: Stored, array: Array) -> None:
     """Write an array where another one is, which it does not overlap."""
     if not target.size:
         return
-    if not isinstance(array, Stored) and is_large(code, array):
+    if not isinstance(array, InMemory) and is_large(code, array):
         array = stored(code, array)
+    if isinstance(array, Deferred):
+        body = array.body
+        nest(code, array.given, [target], lambda values: [body(values)])
+        return
     if isinstance(array, Stored):
         nest(code, [array], [target], lambda values: values)
         return

@@ -4,7 +4,7 @@ Where lanes part, all ways that some lane takes are run, and each keeps what its
 last lane that is in it has left. So the results of a lane depend on no other.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,11 +13,11 @@ from jax.extend.core import Literal, jaxprs_in_params
 from jounce.native.arrays import constants, each, filled
 from jounce.native.carried import Carried
 from jounce.native.code import Code
-from jounce.native.loops import STORED
+from jounce.native.loops import DEFERRED, READING, STORED
 from jounce.native.operations import RULES
 from jounce.native.stored import any_lanes, is_large, kind_in, nest, put, room_for, row, settled, stored, values_of
 from jounce.native.values import Region, UnsupportedOperationError, Value, kind_of
-from jounce.native.views import Array, Stored, contiguous, further
+from jounce.native.views import Array, Deferred, InMemory, Stored, contiguous, further
 
 MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn after turn
 HOPE = 8  # times as many lines as in a later turn may be in one of the first, which later ones have in common with it
@@ -41,8 +41,18 @@ def translate(code: Code, program: Any, constants_: Sequence[Array], given: Sequ
     """
     known: dict[Any, Array] = dict(zip(program.constvars, constants_, strict=True))
     known |= zip(program.invars, given, strict=True)
-    last = {} if code.large is None else _last_uses(program)
+    delayed = {} if code.large is None else _delayed(program)
+    last = {} if code.large is None else _last_uses(program, delayed)
+    ends: dict[int, list[Any]] = {}
+    for variable, use in last.items():
+        ends.setdefault(use, []).append(variable)
+    read_last: dict[Region, int] = {}  # by which equation, what is in the memory of arrays
     now = 0
+
+    def noted(variable: Any, array: Array) -> None:
+        known[variable] = array
+        for region in _regions([array]):
+            read_last[region] = max(read_last.get(region, -1), last.get(variable, -1))
 
     def read(variable: Any) -> Array:
         if isinstance(variable, Literal):
@@ -50,32 +60,51 @@ def translate(code: Code, program: Any, constants_: Sequence[Array], given: Sequ
             return constants(code, np.asarray(variable.val, aval.dtype))
         return known[variable]
 
-    def wanted(region: Region) -> bool:
-        return any(
-            isinstance(array, Stored) and array.region is region and last.get(variable, -1) > now
-            for variable, array in known.items()
-        )
-
-    with code.used(wanted):
+    for variable, array in list(known.items()):
+        noted(variable, array)
+    with code.used(lambda region: read_last.get(region, -1) > now):
         for now, equation in enumerate(program.eqns):
             inputs = [read(variable) for variable in equation.invars]
             before = len(code.taken)
-            found = _results(code, equation, inputs)
+            found = _results(code, equation, inputs, delayed=now in delayed)
             for variable, values in zip(equation.outvars, found, strict=True):
-                known[variable] = _checked(values, variable.aval)
+                noted(variable, _checked(values, variable.aval))
             if last:
-                kept = {array.region for array in found if isinstance(array, Stored)}
-                for region in set(code.taken[before:]) - kept:
+                for region in set(code.taken[before:]) - _regions(found):
                     code.give_back(region)
-                used = [v for v in (*equation.invars, *equation.outvars) if not isinstance(v, Literal)]
-                _let_go(code, known, [v for v in dict.fromkeys(used) if last.get(v, now) <= now])
+                unread = [variable for variable in equation.outvars if variable not in last]
+                _let_go(code, known, [*ends.get(now, ()), *unread])
     return [read(variable) for variable in program.outvars]
 
 
-def _last_uses(program: Any) -> dict[Any, int]:
+def _delayed(program: Any) -> dict[int, int]:
+    """Return which operations may be computed where their result is wanted, which is once, and by which one."""
+    users: dict[Any, list[int]] = {}
+    for k, read in enumerate([*(equation.invars for equation in program.eqns), program.outvars]):
+        for variable in read:
+            if not isinstance(variable, Literal):
+                users.setdefault(variable, []).append(k)
+    found: dict[int, int] = {}
+    for k, equation in reversed([*enumerate(program.eqns)]):
+        if equation.primitive.name not in DEFERRED or len(equation.outvars) != 1:
+            continue
+        user, *more = users.get(equation.outvars[0], [len(program.eqns)])
+        if more or user == len(program.eqns):
+            continue
+        if user in found or program.eqns[user].primitive.name in (DEFERRED | READING):
+            found[k] = found.get(user, user)
+    return found
+
+
+def _last_uses(program: Any, delayed: Mapping[int, int]) -> dict[Any, int]:
     """Return the number of the last equation that reads each variable; results are read after all of them."""
     uses = [*(equation.invars for equation in program.eqns), program.outvars]
-    return {variable: k for k, read in enumerate(uses) for variable in read if not isinstance(variable, Literal)}
+    last: dict[Any, int] = {}
+    for k, read in enumerate(uses):
+        for variable in read:
+            if not isinstance(variable, Literal):
+                last[variable] = max(last.get(variable, -1), delayed.get(k, k))
+    return last
 
 
 def _let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
@@ -86,30 +115,29 @@ def _let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> No
             code.give_back(region)
 
 
-def _results(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+def _results(code: Code, equation: Any, given: Sequence[Array], *, delayed: bool) -> Sequence[Array]:
     """Return the results of an operation: by single values, or by loops where an array is large."""
     name = equation.primitive.name
+    if name not in DEFERRED and name not in READING:
+        given = [stored(code, array) if isinstance(array, Deferred) else array for array in given]
     if (control := _CONTROL.get(name)) is not None:
         return control(code, equation, given)
-    in_memory = any(map(_is_stored, given)) or any(is_large(code, variable.aval) for variable in equation.outvars)
-    if in_memory and (rule := STORED.get(name)) is not None:
-        return [settled(code, x) if isinstance(x, Stored) else x for x in rule(code, equation, given)]
+    large = any(is_large(code, variable.aval) for variable in equation.outvars)
+    if (large or any(isinstance(array, InMemory) for array in given)) and (rule := STORED.get(name)) is not None:
+        found = [settled(code, array) for array in rule(code, equation, given)]
+        return [stored(code, x) if isinstance(x, Deferred) and not delayed else x for x in found]
     if (rule := RULES.get(name)) is None:
         raise UnsupportedOperationError(name)
     return rule(code, equation, [values_of(code, array) for array in given])
 
 
-def _is_stored(array: Array) -> bool:
-    return isinstance(array, Stored)
-
-
 def _checked(values: Any, aval: Any) -> Array:
     """Return values as an array, as NumPy does not for a lone one: of the shape and the kind that JAX has for it."""
-    array = values if isinstance(values, np.ndarray | Stored) else filled((), [values])
+    array = values if isinstance(values, np.ndarray | InMemory) else filled((), [values])
     if array.shape != aval.shape:
         raise AssertionError(f"an array of shape {array.shape} where one of {aval.shape} belongs")
     kind = kind_of(aval.dtype)
-    if isinstance(array, Stored):
+    if isinstance(array, InMemory):
         if array.kind != kind:
             raise UnsupportedOperationError(f"an array of {array.kind} where one of {kind} belongs")
         return array
@@ -222,7 +250,9 @@ def _among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
 
 
 def _regions(arrays: Sequence[Array]) -> set[Region]:
-    return {array.region for array in arrays if isinstance(array, Stored)}
+    """Return the memory of arrays, and of what they are computed from."""
+    parts = [array.given if isinstance(array, Deferred) else [array] for array in arrays]
+    return {part.region for some in parts for part in some if isinstance(part, Stored)}
 
 
 def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:

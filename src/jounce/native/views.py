@@ -1,11 +1,12 @@
 """Arrays that stay in memory, where they are too large to be single values, as places and strides.
 
 Parts, transposes and repetitions of such an array are views, as in NumPy: where numbers begin, and how far apart they
-lie. None of them takes an operation on numbers.
+lie. None of them takes an operation on numbers. Numbers that are wanted once need not be in memory at all: they are
+computed where they are wanted, from those that are.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -64,7 +65,53 @@ class Stored:
         )
 
 
-Array = Values | Stored
+@dataclass(frozen=True, eq=False)
+class Deferred:
+    """An array whose numbers are computed where they are wanted, which is once.
+
+    Attributes
+    ----------
+    given : tuple of Stored
+        Arrays of its shape, from which it is computed number by number.
+    kind : str
+        Kind of the numbers.
+    body : callable
+        Maps numbers of these arrays to one of its own.
+    """
+
+    given: tuple[Stored, ...]
+    kind: str
+    body: Callable[[Sequence[Value]], Value]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the axes."""
+        return self.given[0].shape
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes."""
+        return len(self.shape)
+
+    @property
+    def size(self) -> int:
+        """Number of numbers."""
+        return math.prod(self.shape)
+
+    @property
+    def lanes(self) -> bool:
+        """Whether numbers differ from lane to lane."""
+        return any(array.lanes for array in self.given)
+
+    def viewed(self, view: Callable[[Stored], Stored | None]) -> "Deferred | None":
+        """Return a view of it, as one of each array that it is computed from; None where there is none of some."""
+        found = [view(array) for array in self.given]
+        whole = [array for array in found if array is not None]
+        return replace(self, given=tuple(whole)) if len(whole) == len(found) else None
+
+
+InMemory = Stored | Deferred
+Array = Values | InMemory
 
 
 def contiguous(region: Region, shape: Sequence[int], first: int | Value = 0) -> Stored:
@@ -143,3 +190,9 @@ def divided(sizes: Sequence[int], strides: Sequence[Sequence[int]], shape: Seque
         found.append(stride)
         left, stride = left // size, stride * size
     return tuple(reversed(found))
+
+
+def in_shape(array: Stored, shape: Sequence[int]) -> Stored | None:
+    """Return the same numbers in another shape, None where no strides tell it."""
+    strides = divided(*merged(array.shape, [array.strides]), shape) if array.size else None
+    return None if strides is None else replace(array, shape=tuple(shape), strides=strides)
