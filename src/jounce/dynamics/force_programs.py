@@ -4,6 +4,7 @@ What differs between mechanisms, the residuals, is compiled type by type on the 
 that all mechanisms share it.
 """
 
+import dataclasses
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -16,15 +17,19 @@ from jounce.dynamics.constraint_forces import Multipliers, Slope, Slopes
 from jounce.dynamics.forward import Lanes
 from jounce.dynamics.loads import loads, mass_matrices
 from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.motion_values import Coordinates, in_lots, pose_of
+from jounce.dynamics.motion_values import Coordinates, in_lots, part_of, pose_of
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.jacobian_series import slopes
-from jounce.mechanism.system import System, with_rows
+from jounce.kinematics.side_by_side import Prepared, SideBySide
+from jounce.kinematics.store import is_wanted_soon
+from jounce.mechanism.axis_angles import with_turns
+from jounce.mechanism.system import Group, System, with_rows
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
+LARGE = 16  # numbers of an array that stays in memory in machine code of an instant
 LOT = 16  # instants whose dense matrices are factored together
 
 
@@ -62,6 +67,38 @@ def multipliers(
     of_lot = partial(constraint_forces.multipliers, system)
     dense = mass is not None or system.fronts is None
     return in_lots(of_lot, LOT, blocks, load, mass) if dense else of_lot(blocks, load, mass)
+
+
+@SideBySide
+def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, Any]:
+    """Return what `multipliers` does for one instant, and which applied forces are finite there.
+
+    Parameters
+    ----------
+    shared : tuple
+        The system, one of its forces alone, masses and gravity.
+    lanes : tuple
+        Of the instant: the coordinates of all bodies, the angles about axes that forces measure, and its time.
+    pose_type
+        Of the coordinates.
+    """
+    (system, loaded, masses, gravity), (bodies, angles, instants) = shared, lanes
+    levels = len(bodies["position"]) - 2  # accelerations use up two
+    loaded = dataclasses.replace(loaded, forces=with_turns(loaded.forces, angles))
+    load, finite = body_loads.function(loaded, bodies, instants, masses, gravity, pose_type)
+
+    def slope(group: Group, slot: int) -> Any:
+        poses = [part_of(bodies, its, levels) for its in group.bodies]
+        return element_slopes.function(group.element, poses, instants, pose_type, slot, levels)
+
+    blocks = [[slope(group, slot) for slot in group.moving_slots] for group in system.groups]
+    still = None if system.shape[0] == system.shape[1] else part_of(bodies, None, 1)
+    return multipliers.function(system, blocks, load, still, masses, pose_type), finite
+
+
+def balance_of_instant(shared: Any, lanes: Any, pose_type: type[Pose]) -> Prepared | None:
+    """Return machine code for `_balanced`, None where there is none; any instant serves as an example."""
+    return _balanced.program(shared, lanes, large=LARGE, hasty=is_wanted_soon(), pose_type=pose_type)
 
 
 @compiled(brief=True)

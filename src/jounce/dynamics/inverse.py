@@ -11,13 +11,13 @@ from jaxtyping import Float
 
 from jounce.dynamics import force_programs as programs
 from jounce.dynamics.masses import check_loads, gravity_of, masses_of
-from jounce.dynamics.motion_values import along_motion, cut
+from jounce.dynamics.motion_values import along_motion, part_of
 from jounce.dynamics.redundant_forces import OPEN, OpenMultipliers
 from jounce.errors import MechanismError
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.change_points import spoiled
 from jounce.mechanism import Model
-from jounce.mechanism.axis_angles import at_lanes
+from jounce.mechanism.axis_angles import at_lanes, measures_angle
 from jounce.mechanism.builder import group_rows
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.redundant_reactions import resolved_reactions
@@ -115,7 +115,24 @@ class MotionForces:
         if self._looks_for_open:
             cases.append((0.0, self.open.chance()))
 
+        angles = [group.element.datum.near for group in self.forces if measures_angle(group)]
+
+        def lanes_of(lanes: np.ndarray) -> Any:
+            bodies = self.coordinates_at(None, lanes, self.levels + 2)
+            return bodies, tuple(angle[..., lanes] for angle in angles), self.motion.time[lanes]
+
+        shared = system, dataclasses.replace(unjoined, forces=self.forces), self.masses, self.gravity
+        code = (
+            None
+            if compliance is not None
+            else programs.balance_of_instant(shared, lanes_of(np.zeros(1, int)), self.pose_type)
+        )
+
         def chunk(lanes: np.ndarray) -> Any:
+            if code is not None:
+                found, finite = code(lanes_of(lanes))
+                self._check_finite(finite, lanes)
+                return found[None]
             blocks = self._blocks(lanes)
             bodies, instants = self.coordinates_at(None, lanes, self.levels + 2), self.motion.time[lanes]
             forces = dataclasses.replace(unjoined, forces=at_lanes(self.forces, lanes))
@@ -293,11 +310,9 @@ class MotionForces:
         return along_motion(self.motion, function)
 
     def coordinates_at(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
-        """Return coordinates at some instants; of the ground alone it is the place only, as it never moves."""
-        if bodies is not None and not any(bodies):
-            levels = 1
-        found = {name: values[..., lanes] for name, values in cut(self.coordinates, levels - 1).items()}
-        return found if bodies is None else {name: values[..., np.array(bodies), :] for name, values in found.items()}
+        """Return coordinates at some instants, of bodies and to a number of coefficients as `part_of` has them."""
+        found = part_of(self.coordinates, bodies, levels)
+        return {name: values[..., lanes] for name, values in found.items()}
 
     def _check_finite(self, finite: Any, lanes: np.ndarray) -> None:
         """Raise MechanismError for the first instant that was solved and at which an applied force is not finite."""

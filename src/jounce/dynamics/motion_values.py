@@ -126,6 +126,17 @@ def cut(coordinates: Coordinates, order: int) -> dict[str, Any]:
     return {name: values[: counts[name]] for name, values in coordinates.items() if counts[name]}
 
 
+def part_of(coordinates: Coordinates, bodies: tuple[int, ...] | None, levels: int) -> dict[str, Any]:
+    """Return coordinates of some bodies to a number of coefficients; of the ground alone, which never moves, the place.
+
+    All bodies are meant by None.
+    """
+    if bodies is not None and not any(bodies):
+        levels = 1
+    found = cut(coordinates, levels - 1)
+    return found if bodies is None else {name: values[..., np.array(bodies), :] for name, values in found.items()}
+
+
 def derivatives_along(motion: Motion, coefficients: Float[Numbers, "order *shape time"]) -> Numbers:
     """Return plain derivatives, the time first, from Taylor coefficients; NaN at instants that were not solved."""
     if motion.traced:

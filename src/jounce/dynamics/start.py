@@ -113,8 +113,6 @@ def consistent_start(
     equations = resident(equations_of(model, masses, gravity))
     if state is None:
         state = _set_in_motion(equations, model, coordinates, instant)
-    else:
-        state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
     facts = _facts(equations, state, instant)
     jacobian = _checked_jacobian(equations, model, facts, instant)
     if model.system.rank is not None:

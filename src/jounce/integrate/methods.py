@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float
 
 from jounce.dynamics.forward import Equations, Expansion, Flags, Inverse, Lanes, State
 from jounce.errors import JounceError
+from jounce.kinematics.alone import is_traced_alone
 from jounce.modules import Module
 from jounce.shapes import Numbers
 
@@ -98,9 +99,14 @@ def evaluated(polynomial: State, step: Lanes) -> State:
 def _horner(
     coefficients: Float[Numbers, "order component body #batch"], step: Lanes
 ) -> Float[Numbers, "component body batch"]:
+    def added(value: Any, coefficient: Any) -> tuple[Any, None]:
+        return value * step[None, None] + coefficient, None
+
+    if is_traced_alone():  # one turn is written there, instead of all of them
+        return jax.lax.scan(added, coefficients[-1], coefficients[:-1], reverse=True)[0]
     value = coefficients[-1]
-    for k in range(len(coefficients) - 2, -1, -1):
-        value = value * step[None, None] + coefficients[k]
+    for coefficient in coefficients[-2::-1]:
+        value, _ = added(value, coefficient)
     return value
 
 

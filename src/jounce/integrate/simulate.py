@@ -16,19 +16,18 @@ from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
 from jounce.integrate.events import Event, EventDetector, EventLog, pose_coordinates
 from jounce.integrate.lookahead import watched_names
-from jounce.integrate.march_ahead import STEPS, MarchAhead
 from jounce.integrate.marching import MOVING, DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.methods import AbstractMethod, evaluated
 from jounce.integrate.options import checked_options, instants_of
+from jounce.integrate.programs_ahead import STEPS, ProgramsAhead
 from jounce.integrate.robot_simulation import RobotSimulation
 from jounce.integrate.sensitivities import traced_simulation
 from jounce.integrate.simulate_robot import RobotOptions, simulate_robot
-from jounce.integrate.simulation import FEW_INSTANTS, Simulation
+from jounce.integrate.simulation import Simulation, derivatives_of_motion
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.motion import check_output, output_group
-from jounce.kinematics.rehearsal import tried
 from jounce.kinematics.store import expect
 from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.law_checks import check_laws
@@ -184,15 +183,13 @@ def simulate(
     expect(len(instants))
     for event in events:
         _check_event(event, mechanism)
-    first, last = float(instants[0]), float(instants[-1])
-    with MarchAhead(mechanism, (first, last), method, float(tolerance), float(longest_step)) as ahead:
+    first = float(instants[0])
+    highest = derivatives_of_motion(mechanism, order)
+    with ProgramsAhead(mechanism, instants, highest, method, float(tolerance), float(longest_step)) as ahead:
         start = consistent_start(mechanism, first, ahead.begin)
         _check_forces(start, first)
         detectors = [_detector_of(event, mechanism, start) for event in events]
-        if ahead.new:
-            ahead.follow_up(start)
-            with tried():  # for the programs that evaluate the steps
-                Simulation(mechanism, start, ahead.one_step(start), instants[: FEW_INSTANTS + 1], order)
+        ahead.go_on(start)
     run = _Run(start, method, float(tolerance), float(longest_step), detectors)
     run.go(instants, progress)
     simulation = Simulation(mechanism, start, run.dense_output, instants, order, run.ending, run.events.happened)

@@ -33,7 +33,7 @@ from jounce.shapes import ArrayLike, Numbers
 MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
 )
-LARGE = 64  # numbers of an array that stays in memory in machine code of an instant
+LARGE = 32  # numbers of an array that stays in memory in machine code of an instant
 FEW_INSTANTS = 8  # evaluated together, where there are no more: the end of a long run, say
 APPROACH = 4  # steps to such a place, each much shorter than the one before
 
@@ -73,10 +73,9 @@ class Simulation(Motion):
         self.dense_output, self._start = dense, start
         self.events = [] if events is None else events
         self._ending = ending
-        lost = max((output.lost_orders for output in mechanism.outputs.values()), default=0)
         reached, chosen = _steps_of(dense, instants)
-        outputs = start.model.system.outputs
-        state, self._angles, found = _at(start.equations, outputs, dense, instants, chosen, order + max(lost, 1))
+        outputs, highest = start.model.system.outputs, derivatives_of_motion(mechanism, order)
+        state, self._angles, found = motion_at(start.equations, outputs, dense, instants, chosen, highest)
         coordinates = pose_coordinates(state)
         found = zip(outputs, found, strict=True)
         groups = tuple(self._counted(group, series, instants) for group, series in found)
@@ -234,7 +233,12 @@ def _steps_of(dense: DenseOutput, instants: np.ndarray) -> tuple[np.ndarray, np.
     return reached, np.clip(chosen, 0, len(dense.start) - 1)
 
 
-def _at(
+def derivatives_of_motion(mechanism: Mechanism, order: int) -> int:
+    """Return the highest derivative of the motion that outputs up to an order need."""
+    return order + max([1, *(output.lost_orders for output in mechanism.outputs.values())])
+
+
+def motion_at(
     equations: Equations,
     outputs: tuple[Group, ...],
     dense: DenseOutput,

@@ -1,6 +1,8 @@
 """The module of LLVM that computes a function of JAX: its text, and its machine code."""
 
-from collections.abc import Callable, Mapping
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import jax
@@ -20,6 +22,7 @@ from jounce.native.views import Array, Stored, contiguous
 
 MOST_MEMORY = 2**20  # bytes of the stack: threads have little
 MOST_HEAP = 2**28  # bytes elsewhere
+_thread = threading.local()
 ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
 attributes #2 = { nounwind willreturn memory(none) "min-legal-vector-width"="512" "prefer-vector-width"="512" }
 attributes #1 = { nounwind "min-legal-vector-width"="512" "prefer-vector-width"="512" }
@@ -66,9 +69,21 @@ def object_file(
     UnsupportedOperationError
         Where there is no code for it, or too much.
     """
-    closed, results = jax.make_jaxpr(function, return_shape=True)(shared, lanes)
     count, options = len(jax.tree.leaves(shared)), {"most_lines": most_lines, "large": large, "alone": alone}
-    return compiled(_text(closed, count, known, vector_width(), rows=rows, **options), hasty=hasty), results
+    closed, results = jax.make_jaxpr(function, return_shape=True)(shared, lanes)
+    text = _text(closed, count, known, vector_width(), rows=rows, **options)
+    getattr(_thread, "written", lambda: None)()
+    return compiled(text, hasty=hasty), results
+
+
+@contextmanager
+def telling(written: Callable[[], None]) -> Iterator[None]:
+    """Call a function whenever this thread has written a module, which LLVM then compiles without Python's lock."""
+    _thread.written = written
+    try:
+        yield
+    finally:
+        del _thread.written
 
 
 def _text(

@@ -20,6 +20,7 @@ from jounce.native.values import Region, UnsupportedOperationError, Value, kind_
 from jounce.native.views import Array, Deferred, InMemory, Stored, contiguous, further
 
 MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn after turn
+MOST_UNROLLED_IN_MEMORY = 1_000  # where arrays may stay in memory
 HOPE = 8  # times as many lines as in a later turn may be in one of the first, which later ones have in common with it
 
 
@@ -153,6 +154,13 @@ def _called(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     return _closed(code, closed, given) if hasattr(closed, "jaxpr") else translate(code, closed, (), given)
 
 
+def _linear_solve(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
+    """Write what solves linear equations, of whose derivatives JAX was told more."""
+    lengths = equation.params["const_lengths"]
+    first = lengths.matvec + lengths.vecmat
+    return _closed(code, equation.params["jaxprs"].solve, given[first : first + lengths.solve], given[sum(lengths) :])
+
+
 def _number(code: Code, array: Array) -> Value:
     return values_of(code, array).item()
 
@@ -263,7 +271,9 @@ def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     made = [variable.aval for variable in equation.outvars[len(start) :]]
     if p["length"] == 0:
         return [*start, *(np.empty(aval.shape, object) for aval in made)]
-    most = code.most if code.large is None and _needs_known_places(p["jaxpr"].jaxpr) else MOST_UNROLLED
+    most = MOST_UNROLLED if code.large is None else MOST_UNROLLED_IN_MEMORY
+    if code.large is None and _needs_known_places(p["jaxpr"].jaxpr):
+        most = code.most
     if (unrolled := _unrolled(code, equation, needed, start, rows, most)) is not None:
         return unrolled
     mark = code.mark()
@@ -385,4 +395,9 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
 
 
 _CALLS = ("jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "custom_vjp_call", "checkpoint", "remat2")
-_CONTROL = dict.fromkeys(_CALLS, _called) | {"while": _while, "scan": _scan, "cond": _cond}
+_CONTROL = dict.fromkeys(_CALLS, _called) | {
+    "while": _while,
+    "scan": _scan,
+    "cond": _cond,
+    "custom_linear_solve": _linear_solve,
+}

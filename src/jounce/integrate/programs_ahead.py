@@ -1,0 +1,109 @@
+"""The programs of a run, compiled while its start is looked for."""
+
+import threading
+from contextlib import ExitStack
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.forward import Equations, State
+from jounce.dynamics.masses import gravity_of, required_masses
+from jounce.dynamics.start import ConsistentStart, at_rest, equations_of
+from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, march, unexpanded
+from jounce.integrate.methods import AbstractMethod
+from jounce.integrate.simulation import FEW_INSTANTS, motion_at
+from jounce.kinematics.device import resident
+from jounce.kinematics.rehearsal import first_time, rehearsed
+from jounce.mechanism import Mechanism, Model
+from jounce.mechanism.builder import released
+from jounce.native.modules import telling
+
+STEPS = 64  # tried between two looks at progress and events
+
+
+class ProgramsAhead(ExitStack):
+    """The programs of the steps of a run, and of the motion within them, compiled in threads until this context ends.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What is to move.
+    instants : array of shape (time,)
+        At which the motion is wanted, s.
+    order : int
+        Highest derivative of the outputs.
+    method : AbstractMethod
+        How steps are taken.
+    tolerance, longest : float
+        Of the error of a step, and the longest one, s.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        instants: Float[np.ndarray, " time"],
+        order: int,
+        method: AbstractMethod,
+        tolerance: float,
+        longest: float,
+    ):
+        super().__init__()
+        self._mechanism, self._instants, self._order = mechanism, instants, order
+        self._method, self._limits = method, (tolerance, longest)
+        self._expansion = method.expansion_order(tolerance)
+        self._wanted = False
+
+    def begin(self, model: Model) -> None:
+        """Begin with what is built already, if the programs depend on nothing else."""
+        self._wanted = first_time("march", model.system, self._expansion, self._order, self._method)
+        if not self._wanted:
+            return
+        model = released(model) if self._mechanism.initial else model
+        rows, columns = model.system.shape
+        if rows > columns and model.system.rank is None:
+            return  # which rows are redundant is found by a number that only the assembled bodies show
+        masses, gravity = required_masses(self._mechanism, "the equations of motion"), gravity_of(self._mechanism)
+        self._compile(resident(equations_of(model, masses, gravity)), model, at_rest(model, model.guess))
+
+    def go_on(self, start: ConsistentStart) -> None:
+        """Begin with the start, if that was not possible before."""
+        if self._wanted:
+            self._compile(start.equations, start.model, start.state)
+
+    def _compile(self, equations: Equations, model: Model, state: State) -> None:
+        self._wanted = False
+        first, last = (float(self._instants[k]) for k in (0, -1))
+
+        def begun() -> IntegratorState:
+            return unexpanded(equations, state, np.array([first]), order=self._expansion)
+
+        written = threading.Event()  # the march, which takes longer to compile
+
+        def arrived() -> None:
+            current = begun()
+            current = current._replace(outcome=np.full_like(current.outcome, int(Outcome.ARRIVED)))
+            try:
+                with telling(written.set):
+                    march(equations, current, last, *self._limits, method=self._method, count=STEPS)
+            finally:
+                written.set()
+
+        def evaluated() -> Any:
+            written.wait()
+            dense = self._one_step(begun(), last - first)
+            outputs, some = model.system.outputs, self._instants[: FEW_INSTANTS + 1]
+            return motion_at(equations, outputs, dense, some, np.zeros(len(some), int), self._order)
+
+        self.enter_context(rehearsed(arrived, wanted=True))
+        self.enter_context(rehearsed(evaluated, wanted=True))
+
+    def _one_step(self, current: IntegratorState, length: float) -> DenseOutput:
+        """Return one step, at rest, in the form of those that will be taken."""
+        form = jax.eval_shape(self._method.polynomial, current.expansion, current.expansion, current.time)
+        still = jax.tree.map(lambda x: np.zeros((1, *x.shape[:-1])), form)
+        for part, known in zip(still, current.expansion.state, strict=True):
+            part[0, 0] = np.asarray(known)[0, ..., 0]
+        angles = tuple(np.asarray(part).T for part in current.angles)
+        return DenseOutput(np.asarray(current.time), np.full(1, length), still, np.full(1, -1), angles)
