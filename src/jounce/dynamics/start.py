@@ -96,6 +96,7 @@ def consistent_start(
     mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
     model, gravity, state = build(mechanism, initial=True), gravity_of(mechanism), None
+    exact = True  # whether the state is known to fulfil the rates of what is left without the initial conditions
     if built is not None:
         built(model)
     if mechanism.initial:
@@ -103,8 +104,9 @@ def consistent_start(
         model = released(model)
         driven = equations_of(whole, masses, gravity)
         state = _set_in_motion(driven, whole, coordinates, instant)
-        if whole.system.rank is not None:
+        if whole.system.rank is not None:  # rows may contradict each other by less than is refused
             _check_rates(whole, state, _facts(driven, state, instant).rates, instant)
+            exact = False
         system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
         model = dataclasses.replace(
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
@@ -113,6 +115,8 @@ def consistent_start(
     equations = resident(equations_of(model, masses, gravity))
     if state is None:
         state = _set_in_motion(equations, model, coordinates, instant)
+    elif not exact:
+        state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
     facts = _facts(equations, state, instant)
     jacobian = _checked_jacobian(equations, model, facts, instant)
     if model.system.rank is not None:
