@@ -122,19 +122,15 @@ class MotionForces:
             return bodies, tuple(angle[..., lanes] for angle in angles), self.motion.time[lanes]
 
         shared = system, dataclasses.replace(unjoined, forces=self.forces), self.masses, self.gravity
-        code = (
-            None
-            if compliance is not None
-            else programs.balance_of_instant(shared, lanes_of(np.zeros(1, int)), self.pose_type)
-        )
+        one = lanes_of(np.zeros(1, int))
+        code = programs.balance_of_instant(shared, one, self.pose_type) if compliance is None else None
 
         def chunk(lanes: np.ndarray) -> Any:
             if code is not None:
                 found, finite = code(lanes_of(lanes))
                 self._check_finite(finite, lanes)
                 return found[None]
-            blocks = self._blocks(lanes)
-            bodies, instants = self.coordinates_at(None, lanes, self.levels + 2), self.motion.time[lanes]
+            blocks, (bodies, _, instants) = self._blocks(lanes), lanes_of(lanes)
             forces = dataclasses.replace(unjoined, forces=at_lanes(self.forces, lanes))
             load, finite = programs.body_loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
             self._check_finite(finite, lanes)

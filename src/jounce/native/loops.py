@@ -29,7 +29,18 @@ from jounce.native.stored import (
     without_home,
 )
 from jounce.native.values import Value, kind_of
-from jounce.native.views import Array, Deferred, InMemory, Stored, between, further, in_shape, spread, transposed
+from jounce.native.views import (
+    Array,
+    Deferred,
+    InMemory,
+    Stored,
+    as_read,
+    between,
+    further,
+    in_shape,
+    spread,
+    transposed,
+)
 
 # -- number by number -------------------------------------------------------------------------------------------------
 
@@ -40,34 +51,28 @@ MOST_READ = 16  # arrays, of which a number each is in registers at once
 def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Return the results of an operation on each number: its rule for single values, where they are wanted."""
     rule, aval = RULES[equation.primitive.name], equation.outvars[0].aval
-    given = list(given)
-    while sum(len(array.given) for array in given if isinstance(array, Deferred)) + len(given) > MOST_READ:
-        longest = max(range(len(given)), key=lambda k: len(x.given) if isinstance(x := given[k], Deferred) else 0)
-        given[longest] = stored(code, given[longest])
+    operands = [array if isinstance(array, Deferred) else as_read(stored(code, array)) for array in given]
+    while sum(len(operand.given) for operand in operands) > MOST_READ:
+        longest = max(range(len(operands)), key=lambda k: len(operands[k].given))
+        operands[longest] = as_read(stored(code, operands[longest]))
     read: list[Stored] = []
-    operands = [_operand(code, array, aval.shape, read) for array in given]
+    places = [[_place_among(read, part, aval.shape) for part in operand.given] for operand in operands]
 
     def body(values: Sequence[Value]) -> Value:
-        numbers = [operand([values[k] for k in places]) for operand, places in operands]
+        numbers = [x.body([values[k] for k in its]) for x, its in zip(operands, places, strict=True)]
         return rule(code, equation, [filled((), [number]) for number in numbers])[0].item()
 
     return [Deferred(tuple(read), kind_of(aval.dtype), body)]
 
 
-def _operand(
-    code: Code, array: Array, shape: Sequence[int], read: list[Stored]
-) -> tuple[Callable[[Sequence[Value]], Value], list[int]]:
-    """Return how a number of an array comes from numbers of those that are read, and of which: new ones are added."""
-    deferred = array if isinstance(array, Deferred) else None
-    parts = [stored(code, array)] if deferred is None else deferred.given
-    places = []
-    for part in parts:
-        part = spread(part, shape, range(part.ndim) if part.ndim else ())
-        known = [k for k, other in enumerate(read) if other.is_same(part)]
-        places.append(known[0] if known else len(read))
-        if not known:
-            read.append(part)
-    return (lambda values: values[0]) if deferred is None else deferred.body, places
+def _place_among(arrays: list[Stored], array: Stored, shape: Sequence[int]) -> int:
+    """Return the place of an array, in a shape, among some, to which it is added if it is none of them."""
+    array = spread(array, shape, range(array.ndim) if array.ndim else ())
+    for place, other in enumerate(arrays):
+        if other.is_same(array):
+            return place
+    arrays.append(array)
+    return len(arrays) - 1
 
 
 def _same(_: Code, __: Any, given: Sequence[Array]) -> Sequence[Array]:

@@ -8,7 +8,7 @@ from jounce.native.axes import combination, is_better, nothing
 from jounce.native.code import Code
 from jounce.native.stored import counted, fill, nest, put, room_for, room_of, stored
 from jounce.native.values import Value
-from jounce.native.views import Array, Deferred, between, spread, transposed
+from jounce.native.views import Array, Deferred, as_read, between, spread, transposed
 
 StoredRule = Callable[[Code, Any, Sequence[Array]], Sequence[Array]]
 
@@ -17,23 +17,19 @@ def reduction(operation: str) -> StoredRule:
     """Return the rule for sums, products and the like along some axes."""
 
     def rule(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-        array, axes = given[0] if isinstance(given[0], Deferred) else stored(code, given[0]), equation.params["axes"]
+        array, axes = given[0], equation.params["axes"]
+        if not isinstance(array, Deferred):
+            array = as_read(stored(code, array))
         kept = [axis for axis in range(array.ndim) if axis not in axes]
         found = room_of(code, equation, [array])
         fill(code, found, code.constant(nothing(operation, found.kind), found.kind))
         combine = combination(code, operation)
         total = spread(found, array.shape, kept)
-        if isinstance(array, Deferred):
-            body = array.body
-            nest(
-                code,
-                [total, *array.given],
-                [total],
-                lambda values: [combine(values[0], body(values[1:]))],
-                adds=True,
-            )
-        else:
-            nest(code, [total, array], [total], lambda values: [combine(*values)], adds=True)
+
+        def body(values: Sequence[Value]) -> Sequence[Value]:
+            return [combine(values[0], array.body(values[1:]))]
+
+        nest(code, [total, *array.given], [total], body, adds=True)
         return [found]
 
     return rule

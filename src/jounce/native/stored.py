@@ -18,6 +18,7 @@ from jounce.native.views import (
     Deferred,
     InMemory,
     Stored,
+    as_read,
     between,
     contiguous,
     further,
@@ -143,12 +144,9 @@ def put(code: Code, target: Stored, array: Array) -> None:
         return
     if not isinstance(array, InMemory) and is_large(code, array):
         array = stored(code, array)
-    if isinstance(array, Deferred):
-        body = array.body
-        nest(code, array.given, [target], lambda values: [body(values)])
-        return
-    if isinstance(array, Stored):
-        nest(code, [array], [target], lambda values: values)
+    if isinstance(array, InMemory):
+        read = array if isinstance(array, Deferred) else as_read(array)
+        nest(code, read.given, [target], lambda values: [read.body(values)])
         return
     for index, value in zip(np.ndindex(*target.shape), flat(array), strict=True):
         place = further(code, target.first, int(np.dot(index, target.strides)), 1) if target.ndim else target.first

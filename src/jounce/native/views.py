@@ -110,6 +110,11 @@ class Deferred:
         return replace(self, given=tuple(whole)) if len(whole) == len(found) else None
 
 
+def as_read(array: Stored) -> Deferred:
+    """Return an array as one whose numbers are read where they are wanted."""
+    return Deferred((array,), array.kind, lambda values: values[0])
+
+
 InMemory = Stored | Deferred
 Array = Values | InMemory
 
