@@ -35,6 +35,8 @@ class Code(Scalars):
         Memory of what loops carry that are being written, which is not given back.
     taken : list of Region
         All memory that was taken, in that order.
+    plans : dict
+        Of programs to how they are written, as `plans.plan_of` has it.
     """
 
     entry: list[str] = field(default_factory=list)
@@ -46,6 +48,7 @@ class Code(Scalars):
     changeable: set[Region] = field(default_factory=set)
     held: list[Region] = field(default_factory=list)
     taken: list[Region] = field(default_factory=list)
+    plans: dict[Any, Any] = field(default_factory=dict)
     _rooms: dict[tuple[int, str, bool], list[Region]] = field(default_factory=dict)  # that nobody uses any more
     _taken: dict[Region, tuple[int, str, bool]] = field(default_factory=dict)  # that somebody may, by what they hold
     _tables: dict[tuple[str, bytes], Region] = field(default_factory=dict)

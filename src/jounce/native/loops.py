@@ -1,6 +1,7 @@
 """JAX's operations on arrays that stay in memory: views where numbers keep their places, and loops elsewhere."""
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -51,7 +52,8 @@ MOST_READ = 16  # arrays, of which a number each is in registers at once
 def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Return the results of an operation on each number: its rule for single values, where they are wanted."""
     rule, aval = RULES[equation.primitive.name], equation.outvars[0].aval
-    operands = [array if isinstance(array, Deferred) else as_read(stored(code, array)) for array in given]
+    size = math.prod(aval.shape)  # an operand that is repeated is computed once
+    operands = [x if isinstance(x, Deferred) and x.size == size else as_read(stored(code, x)) for x in given]
     while sum(len(operand.given) for operand in operands) > MOST_READ:
         longest = max(range(len(operands)), key=lambda k: len(operands[k].given))
         operands[longest] = as_read(stored(code, operands[longest]))

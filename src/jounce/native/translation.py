@@ -4,7 +4,7 @@ Where lanes part, all ways that some lane takes are run, and each keeps what its
 last lane that is in it has left. So the results of a lane depend on no other.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from jounce.native.carried import Carried
 from jounce.native.code import Code
 from jounce.native.loops import DEFERRED, READING, STORED
 from jounce.native.operations import RULES
+from jounce.native.plans import plan_of
 from jounce.native.stored import any_lanes, is_large, kind_in, nest, put, room_for, row, settled, stored, values_of
 from jounce.native.values import Region, UnsupportedOperationError, Value, kind_of
 from jounce.native.views import Array, Deferred, InMemory, Stored, contiguous, further
@@ -40,20 +41,17 @@ def translate(code: Code, program: Any, constants_: Sequence[Array], given: Sequ
     UnsupportedOperationError
         Where there is no code for an operation.
     """
-    known: dict[Any, Array] = dict(zip(program.constvars, constants_, strict=True))
-    known |= zip(program.invars, given, strict=True)
-    delayed = {} if code.large is None else _delayed(program)
-    last = {} if code.large is None else _last_uses(program, delayed)
-    ends: dict[int, list[Any]] = {}
-    for variable, use in last.items():
-        ends.setdefault(use, []).append(variable)
-    read_last: dict[Region, int] = {}  # by which equation, what is in the memory of arrays
+    plan = code.plans.get(program)
+    if plan is None:
+        plan = code.plans[program] = plan_of(program, *((DEFERRED, READING) if code.large is not None else ((), ())))
+    known: dict[Any, Array] = {}
+    read_last: dict[Region, int] = {}  # by which operation, what is in the memory of arrays
     now = 0
 
     def noted(variable: Any, array: Array) -> None:
         known[variable] = array
         for region in _regions([array]):
-            read_last[region] = max(read_last.get(region, -1), last.get(variable, -1))
+            read_last[region] = max(read_last.get(region, -1), plan.last.get(variable, -1))
 
     def read(variable: Any) -> Array:
         if isinstance(variable, Literal):
@@ -61,51 +59,22 @@ def translate(code: Code, program: Any, constants_: Sequence[Array], given: Sequ
             return constants(code, np.asarray(variable.val, aval.dtype))
         return known[variable]
 
-    for variable, array in list(known.items()):
+    for variable, array in zip((*program.constvars, *program.invars), (*constants_, *given), strict=True):
         noted(variable, array)
+    for variable, value in plan.constants.items():
+        noted(variable, constants(code, value))
     with code.used(lambda region: read_last.get(region, -1) > now):
-        for now, equation in enumerate(program.eqns):
-            inputs = [read(variable) for variable in equation.invars]
+        for now, operation in enumerate(plan.operations):
+            inputs = [read(variable) for variable in operation.invars]
             before = len(code.taken)
-            found = _results(code, equation, inputs, delayed=now in delayed)
-            for variable, values in zip(equation.outvars, found, strict=True):
+            found = _results(code, operation, inputs, delayed=now in plan.delayed)
+            for variable, values in zip(operation.outvars, found, strict=True):
                 noted(variable, _checked(values, variable.aval))
-            if last:
+            if code.large is not None:
                 for region in set(code.taken[before:]) - _regions(found):
                     code.give_back(region)
-                unread = [variable for variable in equation.outvars if variable not in last]
-                _let_go(code, known, [*ends.get(now, ()), *unread])
-    return [read(variable) for variable in program.outvars]
-
-
-def _delayed(program: Any) -> dict[int, int]:
-    """Return which operations may be computed where their result is wanted, which is once, and by which one."""
-    users: dict[Any, list[int]] = {}
-    for k, read in enumerate([*(equation.invars for equation in program.eqns), program.outvars]):
-        for variable in read:
-            if not isinstance(variable, Literal):
-                users.setdefault(variable, []).append(k)
-    found: dict[int, int] = {}
-    for k, equation in reversed([*enumerate(program.eqns)]):
-        if equation.primitive.name not in DEFERRED or len(equation.outvars) != 1:
-            continue
-        user, *more = users.get(equation.outvars[0], [len(program.eqns)])
-        if more or user == len(program.eqns):
-            continue
-        if user in found or program.eqns[user].primitive.name in (DEFERRED | READING):
-            found[k] = found.get(user, user)
-    return found
-
-
-def _last_uses(program: Any, delayed: Mapping[int, int]) -> dict[Any, int]:
-    """Return the number of the last equation that reads each variable; results are read after all of them."""
-    uses = [*(equation.invars for equation in program.eqns), program.outvars]
-    last: dict[Any, int] = {}
-    for k, read in enumerate(uses):
-        for variable in read:
-            if not isinstance(variable, Literal):
-                last[variable] = max(last.get(variable, -1), delayed.get(k, k))
-    return last
+                _let_go(code, known, plan.ends.get(now, ()))
+    return [read(variable) for variable in plan.results]
 
 
 def _let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
@@ -145,13 +114,6 @@ def _checked(values: Any, aval: Any) -> Array:
     if array.size and array.item(0).kind != kind:
         raise UnsupportedOperationError(f"an array of {array.item(0).kind} where one of {kind} belongs")
     return array
-
-
-def _called(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
-    """Write a program within the program."""
-    p = equation.params
-    closed = next(p[name] for name in ("jaxpr", "call_jaxpr", "fun_jaxpr") if name in p)
-    return _closed(code, closed, given) if hasattr(closed, "jaxpr") else translate(code, closed, (), given)
 
 
 def _linear_solve(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
@@ -394,8 +356,7 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     return _until_settled(code, [which.lanes or likely for likely in _likely_made(code, avals)], attempt)
 
 
-_CALLS = ("jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "custom_vjp_call", "checkpoint", "remat2")
-_CONTROL = dict.fromkeys(_CALLS, _called) | {
+_CONTROL = {
     "while": _while,
     "scan": _scan,
     "cond": _cond,

@@ -1,0 +1,158 @@
+"""In which order a program of JAX is written: calls within it are part of it, and numbers wanted once come late."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from jax.extend.core import Literal
+
+CALLS = ("jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "custom_vjp_call", "checkpoint", "remat2")
+"""Operations that call a program, which is written in their place."""
+
+
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """What an operation has found, or a constant of a program."""
+
+    aval: Any  # its shape and type
+
+
+@dataclass(frozen=True, eq=False)
+class Operation:
+    """An operation, with the names that an equation of JAX has for its parts."""
+
+    primitive: Any
+    params: Mapping[str, Any]
+    invars: Sequence[Any]
+    outvars: Sequence[Any]
+    source_info: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A program without calls, and when its variables are read.
+
+    Attributes
+    ----------
+    operations : sequence of Operation
+        In their order.
+    results : sequence of Variable or Literal
+        Of the program.
+    constants : mapping
+        Of variables to the values of the programs that are called.
+    delayed : mapping
+        Of operations, by number, to the one that wants their numbers, once; they may be computed there.
+    last : mapping
+        Of variables to the number of the last operation that reads them; results are read after all of them.
+    ends : mapping
+        Of operations to the variables that nobody reads after them.
+    """
+
+    operations: Sequence[Operation]
+    results: Sequence[Any]
+    constants: Mapping[Any, Any]
+    delayed: Mapping[int, int]
+    last: Mapping[Any, int]
+    ends: Mapping[int, Sequence[Any]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        ends: dict[int, list[Any]] = {}
+        for variable, number in self.last.items():
+            ends.setdefault(number, []).append(variable)
+        for number, operation in enumerate(self.operations):
+            ends.setdefault(number, []).extend(x for x in operation.outvars if x not in self.last)
+        object.__setattr__(self, "ends", ends)
+
+
+def plan_of(program: Any, deferred: Collection[str], reading: Collection[str]) -> Plan:
+    """Return how a program is written.
+
+    Parameters
+    ----------
+    program : Jaxpr
+    deferred : collection of str
+        Operations whose numbers may be computed where they are wanted.
+    reading : collection of str
+        Others that read a number once.
+    """
+    operations: list[Operation] = []
+    constants: dict[Any, Any] = {}
+    results = _written(program, {}, operations, constants, whole=True)
+    delayed = _delayed(operations, results, deferred, reading)
+    return Plan(operations, results, constants, delayed, _last_reads(operations, results, delayed))
+
+
+def _written(
+    program: Any, names: dict[Any, Any], operations: list[Operation], constants: dict[Any, Any], *, whole: bool
+) -> list[Any]:
+    """Add the operations of a program, those that it calls among them, and return its results.
+
+    Parameters
+    ----------
+    program : Jaxpr
+    names : dict
+        Of its variables to those of the whole; what is not there has the same name. A program that is called twice has
+        other names each time.
+    whole : bool
+        Whether it is called by none.
+    """
+
+    def name(variable: Any) -> Any:
+        return variable if isinstance(variable, Literal) else names.get(variable, variable)
+
+    for equation in program.eqns:
+        given, found = [name(variable) for variable in equation.invars], list(equation.outvars)
+        if equation.primitive.name in CALLS:
+            called, values = _called(equation)
+            inner = dict(zip(called.invars, given, strict=True))
+            for variable, value in zip(called.constvars, values, strict=True):
+                inner[variable] = Variable(variable.aval)
+                constants[inner[variable]] = value
+            names |= zip(found, _written(called, inner, operations, constants, whole=False), strict=True)
+            continue
+        if not whole:
+            found = [Variable(variable.aval) for variable in found]
+            names |= zip(equation.outvars, found, strict=True)
+        operations.append(Operation(equation.primitive, equation.params, given, found, equation.source_info))
+    return [name(variable) for variable in program.outvars]
+
+
+def _called(equation: Any) -> tuple[Any, Sequence[Any]]:
+    """Return the program that is called, and the values of its constants."""
+    p = equation.params
+    called = next(p[name] for name in ("jaxpr", "call_jaxpr", "fun_jaxpr") if name in p)
+    return (called.jaxpr, called.consts) if hasattr(called, "jaxpr") else (called, ())
+
+
+def _reads(operations: Sequence[Operation], results: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+    """Yield the number of an operation and a variable that it reads, in their order."""
+    for number, read in enumerate([*(operation.invars for operation in operations), results]):
+        for variable in read:
+            if not isinstance(variable, Literal):
+                yield number, variable
+
+
+def _delayed(
+    operations: Sequence[Operation], results: Sequence[Any], deferred: Collection[str], reading: Collection[str]
+) -> dict[int, int]:
+    readers: dict[Any, list[int]] = {}
+    for number, variable in _reads(operations, results):
+        readers.setdefault(variable, []).append(number)
+    found: dict[int, int] = {}
+    for number, operation in reversed([*enumerate(operations)]):
+        if operation.primitive.name not in deferred or len(operation.outvars) != 1:
+            continue
+        reader, *more = readers.get(operation.outvars[0], [len(operations)])
+        if more or reader == len(operations):
+            continue
+        name = operations[reader].primitive.name
+        if name in deferred or name in reading:
+            found[number] = found.get(reader, reader)
+    return found
+
+
+def _last_reads(operations: Sequence[Operation], results: Sequence[Any], delayed: Mapping[int, int]) -> dict[Any, int]:
+    last: dict[Any, int] = {}
+    for number, variable in _reads(operations, results):
+        last[variable] = max(last.get(variable, -1), delayed.get(number, number))
+    return last
