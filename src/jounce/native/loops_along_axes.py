@@ -8,8 +8,9 @@ from jounce.native.axes import combination, is_better, nothing
 from jounce.native.code import Code
 from jounce.native.stored import counted, fill, nest, put, room_for, room_of, stored
 from jounce.native.values import Value
-from jounce.native.views import Array, Deferred, as_read, between, spread, transposed
+from jounce.native.views import Array, Deferred, Stored, as_read, between, in_shape, spread, transposed
 
+ORDERLESS = ("max", "min", "and", "or")  # operations that give the same in any order
 StoredRule = Callable[[Code, Any, Sequence[Array]], Sequence[Array]]
 
 
@@ -23,16 +24,44 @@ def reduction(operation: str) -> StoredRule:
         kept = [axis for axis in range(array.ndim) if axis not in axes]
         found = room_of(code, equation, [array])
         fill(code, found, code.constant(nothing(operation, found.kind), found.kind))
-        combine = combination(code, operation)
-        total = spread(found, array.shape, kept)
-
-        def body(values: Sequence[Value]) -> Sequence[Value]:
-            return [combine(values[0], array.body(values[1:]))]
-
-        nest(code, [total, *array.given], [total], body, adds=True)
+        if code.alone and operation in ORDERLESS and found.size == 1:
+            for part in _in_vectors(code, operation, array):
+                _gathered(code, operation, spread(replace(found, shape=(), strides=()), part.shape, ()), part)
+            return [found]
+        _gathered(code, operation, spread(found, array.shape, kept), array)
         return [found]
 
     return rule
+
+
+def _gathered(code: Code, operation: str, total: Stored, array: Deferred) -> None:
+    """Write a loop that combines each number of an array with what there is of the total."""
+    combine = combination(code, operation)
+
+    def body(values: Sequence[Value]) -> Sequence[Value]:
+        return [combine(values[0], array.body(values[1:]))]
+
+    nest(code, [total, *array.given], [total], body, adds=True)
+
+
+def _in_vectors(code: Code, operation: str, array: Deferred) -> list[Deferred]:
+    """Return a vector that combines the numbers of an array as far as whole vectors go, and what is left of it.
+
+    Where the order does not matter, a vector at a time takes less time than a number at a time.
+    """
+    row = array.viewed(lambda x: in_shape(x, (x.size,)))
+    if row is None or row.size < 2 * code.width:
+        return [array]
+    left = row.size % code.width
+    whole = (row.size // code.width, code.width)
+    most = room_for(code, (code.width,), row.kind, lanes=False)
+    fill(code, most, code.constant(nothing(operation, row.kind), row.kind))
+    rows = row.viewed(lambda x: in_shape(between(code, x, 0, 0, row.size - left), whole))
+    rest = row.viewed(lambda x: between(code, x, 0, row.size - left, left))
+    if rows is None or rest is None:
+        return [array]
+    _gathered(code, operation, spread(most, whole, (1,)), rows)
+    return [as_read(most), rest]
 
 
 REDUCTIONS = {
