@@ -5,6 +5,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from jax import lax
 
 from jounce.native import modules, views
@@ -60,6 +61,23 @@ def test_what_a_loop_carries():
         return rolled, while_, summed, made
 
     assert_agree(run, ordinary(9), ordinary(9, seed=3))
+
+
+@pytest.mark.parametrize("size", [8, 11, 16, 21])
+def test_what_is_computed_in_its_own_place(size):
+    def run(x, y):
+        def turn(_, carry):
+            a, b, c = carry
+            return a * 1.01 + b, b - 0.001, a[::-1] * 0.5 + c * 0.25
+
+        def going(carry):
+            return jnp.max(jnp.abs(carry[0])) < 1e3
+
+        return lax.fori_loop(0, 300, turn, (x, y, x)), lax.while_loop(
+            going, lambda z: (z[0] * 1.5 + 1.0, -z[1]), (x, y)
+        )
+
+    assert_agree(run, ordinary(size), ordinary(size, seed=5))
 
 
 def test_what_lies_between_is_a_branch_or_a_loop():

@@ -1,15 +1,15 @@
 """Memory for the arrays that a loop changes, or that ways of which one is taken make."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 from jounce.native.arrays import filled
 from jounce.native.code import Code, flat
 from jounce.native.stored import copied, is_large, put
-from jounce.native.values import kind_of
-from jounce.native.views import Array, Stored, contiguous
+from jounce.native.values import Region, kind_of
+from jounce.native.views import Array, Deferred, InMemory, Stored, contiguous
 
 
 class Carried:
@@ -47,16 +47,20 @@ class Carried:
         targets = [contiguous(region, shape) for region, shape in zip(self.regions, self.shapes, strict=True)]
         changing = {target.region for target, array in zip(targets, arrays, strict=True) if not target.is_same(array)}
         apart = [  # what is a part of an array that changes is read before
-            copied(self.code, array)
-            if isinstance(array, Stored) and array.region in changing and not target.is_same(array)
-            else array
+            copied(self.code, array) if _reads_others(array, target, changing) else array
             for target, array in zip(targets, arrays, strict=True)
         ]
         for target, array in zip(targets, apart, strict=True):
-            if isinstance(array, Stored) or is_large(self.code, array):
+            if isinstance(array, InMemory) or is_large(self.code, array):
                 if not target.is_same(array):
                     put(self.code, target, array)
                 continue
             for k, value in enumerate(flat(array)):
                 if value.home != (target.region, k):
                     self.code.store(target.region, k, value)
+
+
+def _reads_others(array: Array, target: Stored, changing: Collection[Region]) -> bool:
+    """Tell whether an array reads other numbers that change than the one in whose place a number is put."""
+    read = array.given if isinstance(array, Deferred) else [array] if isinstance(array, Stored) else []
+    return any(part.region in changing and not target.is_same(part) for part in read)

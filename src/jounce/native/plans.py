@@ -41,7 +41,8 @@ class Plan:
     constants : mapping
         Of variables to the values of the programs that are called.
     delayed : mapping
-        Of operations, by number, to the one that wants their numbers, once; they may be computed there.
+        Of operations, by number, to the one that wants their numbers, once; they may be computed there. Results are
+        wanted after all of them.
     last : mapping
         Of variables to the number of the last operation that reads them; results are read after all of them.
     ends : mapping
@@ -142,11 +143,11 @@ def _delayed(
     for number, operation in reversed([*enumerate(operations)]):
         if operation.primitive.name not in deferred or len(operation.outvars) != 1:
             continue
-        reader, *more = readers.get(operation.outvars[0], [len(operations)])
-        if more or reader == len(operations):
+        reader, *more = readers.get(operation.outvars[0], [-1])
+        if more or reader < 0:
             continue
-        name = operations[reader].primitive.name
-        if name in deferred or name in reading:
+        name = None if reader == len(operations) else operations[reader].primitive.name
+        if name is None or name in deferred or name in reading:
             found[number] = found.get(reader, reader)
     return found
 

@@ -139,14 +139,15 @@ def copied(code: Code, array: Array) -> Stored:
 
 
 def put(code: Code, target: Stored, array: Array) -> None:
-    """Write an array where another one is, which it does not overlap."""
+    """Write an array where another one is: it reads nothing there but the number in whose place one is put."""
     if not target.size:
         return
     if not isinstance(array, InMemory) and is_large(code, array):
         array = stored(code, array)
     if isinstance(array, InMemory):
         read = array if isinstance(array, Deferred) else as_read(array)
-        nest(code, read.given, [target], lambda values: [read.body(values)])
+        in_place = any(part.region == target.region for part in read.given)  # then each number once
+        nest(code, read.given, [target], lambda values: [read.body(values)], adds=in_place)
         return
     for index, value in zip(np.ndindex(*target.shape), flat(array), strict=True):
         place = further(code, target.first, int(np.dot(index, target.strides)), 1) if target.ndim else target.first

@@ -16,16 +16,18 @@ from jounce.native.code import Code
 from jounce.native.loops import DEFERRED, READING, STORED
 from jounce.native.operations import RULES
 from jounce.native.plans import plan_of
-from jounce.native.stored import any_lanes, is_large, kind_in, nest, put, room_for, row, settled, stored, values_of
+from jounce.native.stored import any_lanes, is_large, kind_in, put, room_for, row, settled, stored, values_of
 from jounce.native.values import Region, UnsupportedOperationError, Value, kind_of
-from jounce.native.views import Array, Deferred, InMemory, Stored, contiguous, further
+from jounce.native.views import Array, Deferred, InMemory, Stored, as_read, contiguous, further
 
 MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn after turn
 MOST_UNROLLED_IN_MEMORY = 1_000  # where arrays may stay in memory
 HOPE = 8  # times as many lines as in a later turn may be in one of the first, which later ones have in common with it
 
 
-def translate(code: Code, program: Any, constants_: Sequence[Array], given: Sequence[Array]) -> list[Array]:
+def translate(
+    code: Code, program: Any, constants_: Sequence[Array], given: Sequence[Array], *, late: bool = False
+) -> list[Array]:
     """Write the operations of a program, and return its results.
 
     Parameters
@@ -35,6 +37,8 @@ def translate(code: Code, program: Any, constants_: Sequence[Array], given: Sequ
     program : Jaxpr
     constants_, given : sequence of arrays of Value
         Its constants and arguments.
+    late : bool, default False
+        Whether numbers of the results may be computed by who wants them next.
 
     Raises
     ------
@@ -74,13 +78,19 @@ def translate(code: Code, program: Any, constants_: Sequence[Array], given: Sequ
                 for region in set(code.taken[before:]) - _regions(found):
                     code.give_back(region)
                 _let_go(code, known, plan.ends.get(now, ()))
-    return [read(variable) for variable in plan.results]
+        results = [read(variable) for variable in plan.results]
+        return results if late else [stored(code, x) if isinstance(x, Deferred) else x for x in results]
 
 
 def _let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
     """Forget variables that nobody reads any more, and give back what memory only they had."""
     gone = [known.pop(variable, None) for variable in variables]
-    for region in _regions([array for array in gone if array is not None]):
+    _give_back(code, [array for array in gone if array is not None])
+
+
+def _give_back(code: Code, arrays: Sequence[Array]) -> None:
+    """Give back the memory of arrays that nobody reads any more, where nobody reads it by another one."""
+    for region in _regions(arrays):
         if code.is_unshared(region):
             code.give_back(region)
 
@@ -127,9 +137,9 @@ def _number(code: Code, array: Array) -> Value:
     return values_of(code, array).item()
 
 
-def _closed(code: Code, closed: Any, *given: Sequence[Array]) -> list[Array]:
+def _closed(code: Code, closed: Any, *given: Sequence[Array], late: bool = False) -> list[Array]:
     numbers = [constants(code, number) for number in closed.consts]
-    return translate(code, closed.jaxpr, numbers, [array for some in given for array in some])
+    return translate(code, closed.jaxpr, numbers, [array for some in given for array in some], late=late)
 
 
 def _until_settled(code: Code, lanes: list[bool], attempt: Callable[[list[bool]], tuple[list[bool], Any]]) -> Any:
@@ -169,14 +179,17 @@ def _likely_made(code: Code, avals: Sequence[Any]) -> list[bool]:
 
 def _chosen(code: Code, choice: Value, new: Sequence[Array], old: Sequence[Array]) -> list[Array]:
     def chosen(x: Array, y: Array) -> Array:
-        if not isinstance(x, Stored) and not isinstance(y, Stored):
+        if not isinstance(x, InMemory) and not isinstance(y, InMemory):
             return each(lambda a, b: code.select(choice, a, b), x, y)
-        a, b = stored(code, x), stored(code, y)
-        if a.is_same(b):
-            return a
-        found = room_for(code, a.shape, a.kind, lanes=choice.lanes or a.lanes or b.lanes)
-        nest(code, [a, b], [found], lambda values: [code.select(choice, *values)])
-        return found
+        a, b = (array if isinstance(array, Deferred) else as_read(stored(code, array)) for array in (x, y))
+        if a.given[0].is_same(b.given[0]) and not isinstance(x, Deferred) and not isinstance(y, Deferred):
+            return a.given[0]
+        count = len(a.given)
+
+        def body(values: Sequence[Value]) -> Value:
+            return code.select(choice, a.body(values[:count]), b.body(values[count:]))
+
+        return Deferred((*a.given, *b.given), a.kind, body, choice.lanes)
 
     return [chosen(x, y) for x, y in zip(new, old, strict=True)]
 
@@ -203,10 +216,11 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
             code.begin(body)
             kept = [*asked, *needed, *(before if goes.lanes else ())]
             with code.scope(goes if goes.lanes else None), code.used(_among(kept)):
-                after = _closed(code, p["body_jaxpr"], needed, before)
+                after = _closed(code, p["body_jaxpr"], needed, before, late=True)
                 if goes.lanes:
                     after = _chosen(code, goes, after, before)
                 carried.store(after)
+                _give_back(code, after)
             code.jump(head)
         code.begin(end)
         return _in_lanes(after, lanes), carried.load()
@@ -278,11 +292,12 @@ def _rolled(
             count = code.load(counter, 0)
             at = code.arithmetic("sub", last, count) if p["reverse"] else count
             taken = [row(code, array, at) if array.size else np.empty(array.shape[1:], object) for array in homes]
-            results = _closed(code, p["jaxpr"], needed, carried.load(), taken)
+            results = _closed(code, p["jaxpr"], needed, carried.load(), taken, late=True)
             for region, array in zip(written.regions, results[size:], strict=True):
                 if array.size:
                     put(code, contiguous(region, array.shape, further(code, 0, at, array.size)), array)
             carried.store(results[:size])  # after what may be a part of what was carried
+            _give_back(code, results)
             code.store(counter, 0, code.arithmetic("add", count, code.constant(1, "l")))
             code.branch(code.operand(code.compare("lt", count, last), lanes=False), body, end)
         code.begin(end)

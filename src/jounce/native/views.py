@@ -77,11 +77,14 @@ class Deferred:
         Kind of the numbers.
     body : callable
         Maps numbers of these arrays to one of its own.
+    parts : bool, default False
+        Whether it makes lanes differ by itself.
     """
 
     given: tuple[Stored, ...]
     kind: str
     body: Callable[[Sequence[Value]], Value]
+    parts: bool = False
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -101,7 +104,7 @@ class Deferred:
     @property
     def lanes(self) -> bool:
         """Whether numbers differ from lane to lane."""
-        return any(array.lanes for array in self.given)
+        return self.parts or any(array.lanes for array in self.given)
 
     def viewed(self, view: Callable[[Stored], Stored | None]) -> "Deferred | None":
         """Return a view of it, as one of each array that it is computed from; None where there is none of some."""
