@@ -141,3 +141,30 @@ def test_a_motion_is_the_same_with_kept_programs(shelf):
     assert len(shelf) == count
     for name, values in before.outputs.items():
         np.testing.assert_array_equal(after.outputs[name], values)
+
+
+def test_brief_programs_are_not_optimised_for_a_command_about_few_instants(shelf, monkeypatch):
+    options, compile_ = [], jax.stages.Lowered.compile
+    monkeypatch.delenv("XLA_FLAGS", raising=False)  # by which tests have all of them compiled so
+    monkeypatch.setattr(store_, "_many", False)
+    monkeypatch.setattr(
+        jax.stages.Lowered, "compile", lambda self, given=None: options.append(given) or compile_(self, given)
+    )
+
+    def results(*, brief):
+        jax.clear_caches()
+        program = Compiled(example, ("times",), (Compiled.__call__,), brief=brief)
+        return float(program(np.arange(3.0), (2.0,), times=2)["sum"])
+
+    assert [results(brief=True), results(brief=False)] == [6.0, 6.0]
+    store_.expect(store_.FEW)
+    assert results(brief=True) == 6.0  # from the store
+    store_.expect(store_.FEW + 1)
+    store_.expect(1)  # the many are not forgotten
+    assert results(brief=True) == 6.0
+    assert options == [{"xla_backend_optimization_level": 0}, None]  # the last one is that of the second
+    assert len(shelf) == 2
+
+
+def test_without_a_store_all_programs_are_optimised():
+    assert not store_.is_wanted_soon()

@@ -38,7 +38,6 @@ from jounce.native.views import (
     as_read,
     between,
     further,
-    in_shape,
     spread,
     transposed,
 )
@@ -102,7 +101,7 @@ def _broadcast(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Ar
 
 def _reshape(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     array, shape = given[0], equation.outvars[0].aval.shape
-    if isinstance(array, Deferred) and (found := array.viewed(lambda x: in_shape(x, shape))) is not None:
+    if isinstance(array, Deferred) and (found := array.in_shape(shape)) is not None:
         return [found]
     return [reshaped(code, stored(code, array), shape)]
 

@@ -8,7 +8,7 @@ from jounce.native.axes import combination, is_better, nothing
 from jounce.native.code import Code
 from jounce.native.stored import counted, fill, nest, put, room_for, room_of, stored
 from jounce.native.values import Value
-from jounce.native.views import Array, Deferred, Stored, as_read, between, in_shape, spread, transposed
+from jounce.native.views import Array, Deferred, Stored, as_read, between, spread, transposed
 
 ORDERLESS = ("max", "min", "and", "or")  # operations that give the same in any order
 StoredRule = Callable[[Code, Any, Sequence[Array]], Sequence[Array]]
@@ -49,17 +49,17 @@ def _in_vectors(code: Code, operation: str, array: Deferred) -> list[Deferred]:
 
     Where the order does not matter, a vector at a time takes less time than a number at a time.
     """
-    row = array.viewed(lambda x: in_shape(x, (x.size,)))
+    row = array.in_shape((array.size,))
     if row is None or row.size < 2 * code.width:
         return [array]
     left = row.size % code.width
     whole = (row.size // code.width, code.width)
+    rows = row.viewed(lambda x: between(code, x, 0, 0, row.size - left)).in_shape(whole)
+    rest = row.viewed(lambda x: between(code, x, 0, row.size - left, left))
+    if rows is None:
+        return [array]
     most = room_for(code, (code.width,), row.kind, lanes=False)
     fill(code, most, code.constant(nothing(operation, row.kind), row.kind))
-    rows = row.viewed(lambda x: in_shape(between(code, x, 0, 0, row.size - left), whole))
-    rest = row.viewed(lambda x: between(code, x, 0, row.size - left, left))
-    if rows is None or rest is None:
-        return [array]
     _gathered(code, operation, spread(most, whole, (1,)), rows)
     return [as_read(most), rest]
 

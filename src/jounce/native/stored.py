@@ -68,10 +68,10 @@ def room_of(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
 
 def row(code: Code, array: Array, index: int | Value) -> Array:
     """Return the part of an array at an index of its first axis: an index that is not known wants a stored one."""
-    if not isinstance(array, Stored):
+    if isinstance(array, np.ndarray):
         assert isinstance(index, int)
         return array[index, ...]
-    part = between(code, array, 0, index, 1)
+    part = between(code, stored(code, array), 0, index, 1)
     return settled(code, replace(part, shape=part.shape[1:], strides=part.strides[1:]))
 
 

@@ -330,7 +330,7 @@ def _unrolled(
 
 
 def _stacked(code: Code, parts: Sequence[Array]) -> Array:
-    single = [part for part in parts if not isinstance(part, Stored)]
+    single = [part for part in parts if isinstance(part, np.ndarray)]
     if len(single) == len(parts) and (code.large is None or len(parts) * parts[0].size <= code.large):
         return np.stack(single)
     found = room_for(code, (len(parts), *parts[0].shape), kind_in(parts[0]), lanes=any_lanes(parts))

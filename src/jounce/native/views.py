@@ -106,11 +106,15 @@ class Deferred:
         """Whether numbers differ from lane to lane."""
         return self.parts or any(array.lanes for array in self.given)
 
-    def viewed(self, view: Callable[[Stored], Stored | None]) -> "Deferred | None":
-        """Return a view of it, as one of each array that it is computed from; None where there is none of some."""
-        found = [view(array) for array in self.given]
-        whole = [array for array in found if array is not None]
-        return replace(self, given=tuple(whole)) if len(whole) == len(found) else None
+    def viewed(self, view: Callable[[Stored], Stored]) -> "Deferred":
+        """Return a view of it, as one of each array that it is computed from."""
+        return replace(self, given=tuple(map(view, self.given)))
+
+    def in_shape(self, shape: Sequence[int]) -> "Deferred | None":
+        """Return the same numbers in another shape, None where no strides tell it of some array."""
+        found = [in_shape(array, shape) for array in self.given]
+        whole = tuple(array for array in found if array is not None)
+        return replace(self, given=whole) if len(whole) == len(found) else None
 
 
 def as_read(array: Stored) -> Deferred:

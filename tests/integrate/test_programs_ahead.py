@@ -1,0 +1,65 @@
+"""Programs of a run that are made while its start is looked for: those that the run then needs, and no others."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.kinematics.alone import Alone
+from jounce.kinematics.side_by_side import SideBySide
+from jounce.native import machine
+from tests.problems.dynamics import simple_pendulum
+
+pytestmark = pytest.mark.skipif(
+    not machine.is_usable(), reason="there is no compiler, or a system where it was not tried"
+)
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """What machine code is made of, and by which thread."""
+    monkeypatch.delenv("JOUNCE_NATIVE", raising=False)
+    found = []
+    for kind in (Alone, SideBySide):
+        make = kind._made
+
+        def told(self, *given, make=make, **named):
+            found.append(self.function.__name__)
+            return make(self, *given, **named)
+
+        monkeypatch.setattr(kind, "_made", told)
+    return found
+
+
+def swing(mechanism, tolerance):
+    """Each tolerance wants series of another length, and so programs of their own."""
+    return jn.simulate(mechanism, np.linspace(0.0, 0.1, 3), tolerance=tolerance)
+
+
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_they_are_those_of_the_run(made, monkeypatch, threads):
+    monkeypatch.setenv("JOUNCE_THREADS", threads)
+    tolerance = {"1": 3e-5, "2": 2e-6}[threads]
+    found = swing(simple_pendulum(0.3, 1.0), tolerance)
+    assert sorted(made) == ["_expanded", "march"]
+    again = swing(simple_pendulum(0.4, 1.0), tolerance)
+    assert sorted(made) == ["_expanded", "march"]
+    assert found.outputs["angle"][0, 0] != again.outputs["angle"][0, 0]
+
+
+@pytest.mark.slow
+def test_those_with_redundant_rows_begin_with_the_start(made, monkeypatch):
+    monkeypatch.setenv("JOUNCE_THREADS", "2")
+    pendulum = simple_pendulum(0.3, 1.0)
+    joints = pendulum.joints | {"again": next(iter(pendulum.joints.values()))}
+    swing(dataclasses.replace(pendulum, joints=joints), 1e-7)
+    assert sorted(made) == ["_expanded", "march"]
+
+
+def test_a_start_that_is_refused_is_told(made, monkeypatch):
+    monkeypatch.setenv("JOUNCE_THREADS", "2")
+    pendulum = simple_pendulum(0.3, 1.0)
+    other = jn.drivers.CoordinateDriver(("ground", "bob"), "angle", "angle + 1")
+    with pytest.raises(jn.AssemblyError, match="contradict each other"):
+        swing(dataclasses.replace(pendulum, initial=pendulum.initial | {"other": other}), 1e-9)
