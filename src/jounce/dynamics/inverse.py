@@ -114,15 +114,15 @@ class MotionForces:
         cases = [(1.0, np.zeros(len(self.model.rows)))]
         if self._looks_for_open:
             cases.append((0.0, self.open.chance()))
-
         angles = [group.element.datum.near for group in self.forces if measures_angle(group)]
 
         def lanes_of(lanes: np.ndarray) -> Any:
             bodies = self.coordinates_at(None, lanes, self.levels + 2)
             return bodies, tuple(angle[..., lanes] for angle in angles), self.motion.time[lanes]
 
-        shared = system, dataclasses.replace(unjoined, forces=self.forces), self.masses, self.gravity
-        one = lanes_of(np.zeros(1, int))
+        first = np.zeros(1, int)
+        loaded = dataclasses.replace(unjoined, forces=at_lanes(self.forces, first))  # angles come with each instant
+        shared, one = (system, loaded, self.masses, self.gravity), lanes_of(first)
         code = programs.balance_of_instant(shared, one, self.pose_type) if compliance is None else None
 
         def chunk(lanes: np.ndarray) -> Any:
