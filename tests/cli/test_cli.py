@@ -6,6 +6,7 @@ import pathlib
 import re
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -391,3 +392,15 @@ def test_a_cache_that_cannot_be_made_does_no_harm(tmp_path):
     done = process("run", "none.yaml", cwd=tmp_path, JOUNCE_CACHE_DIR=str(tmp_path / "file" / "cache"))
     assert done.returncode == 2
     assert done.stderr == "error: none.yaml: file not found\n"
+
+
+@pytest.mark.parametrize("rehearsing", [False, True])
+def test_a_command_that_fails_waits_for_no_program_that_is_compiled_beside(monkeypatch, rehearsing):
+    ended = []
+    monkeypatch.setattr("sys.argv", ["jounce", "run", "examples/no_such_file.yaml"])
+    monkeypatch.setattr("jounce.kinematics.rehearsal.is_rehearsing", lambda: rehearsing)
+    monkeypatch.setattr("jounce.cli.end_on_signals", lambda: None)
+    monkeypatch.setattr("jounce.cli.gc", SimpleNamespace(freeze=lambda: None, set_threshold=lambda _: None))
+    monkeypatch.setattr("jounce.cli.os._exit", ended.append)
+    assert main() == 2
+    assert ended == [2] * rehearsing

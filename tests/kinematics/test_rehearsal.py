@@ -11,7 +11,7 @@ import pytest
 
 import jounce as jn
 from jounce.kinematics.compilation import Compiled, StoppedError, compiled, stopped_by
-from jounce.kinematics.rehearsal import first_time, rehearsed
+from jounce.kinematics.rehearsal import NAME, first_time, is_rehearsing, rehearsed
 from jounce.kinematics.threads import VARIABLE
 from tests.problems.dynamics import double_pendulum
 from tests.problems.small import four_bar
@@ -35,7 +35,7 @@ def compiled_later(monkeypatch):
         yield
 
     monkeypatch.setattr(sys.modules["jounce.kinematics.solve"], "rehearsed", first)
-    monkeypatch.setattr(sys.modules["jounce.integrate.simulate"], "rehearsed", first)
+    monkeypatch.setattr(sys.modules["jounce.integrate.programs_ahead"], "rehearsed", first)
     return lambda: {name for name, count in compilations().items() if count > before[name]}
 
 
@@ -149,3 +149,28 @@ def test_a_program_is_new_once_for_arguments_of_one_form():
     name = "a program of this test"
     assert [first_time(name, (np.ones(2), 1.0), 3), first_time(name, (np.zeros(2), 2.0), 3)] == [True, False]
     assert [first_time(name, (np.ones(3), 1.0), 3), first_time(name, (np.ones(2), 1.0), 4)] == [True, True]
+
+
+def test_it_is_known_whether_some_thread_still_compiles(monkeypatch):
+    monkeypatch.setenv(VARIABLE, "2")
+    going, done = threading.Event(), threading.Event()
+
+    def rehearsal():
+        going.set()
+        done.wait(10)
+
+    assert not is_rehearsing()
+
+    def stopped():
+        with rehearsed(rehearsal, wanted=True):
+            assert going.wait(10)
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        stopped()
+    assert is_rehearsing()
+    done.set()
+    for thread in threading.enumerate():
+        if thread.name == NAME:
+            thread.join(10)
+    assert not is_rehearsing()

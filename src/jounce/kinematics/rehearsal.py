@@ -15,6 +15,7 @@ import numpy as np
 from jounce.kinematics.compilation import stopped_by
 from jounce.kinematics.threads import callers_device, thread_count
 
+NAME = "jounce-rehearsal"
 _had: set[Any] = set()
 
 
@@ -25,6 +26,11 @@ def first_time(program: str, arguments: Any, *static: Any) -> bool:
     new = key not in _had
     _had.add(key)
     return new
+
+
+def is_rehearsing() -> bool:
+    """Tell whether some thread still compiles what was rehearsed."""
+    return any(thread.name == NAME for thread in threading.enumerate())
 
 
 @contextlib.contextmanager
@@ -54,7 +60,7 @@ def rehearsed(rehearsal: Callable[[], Any], *, wanted: bool) -> Iterator[None]:
         with tried(), context(), stopped_by(enough):
             rehearsal()
 
-    thread = threading.Thread(target=rehearse, name="jounce-rehearsal")
+    thread = threading.Thread(target=rehearse, name=NAME)
     thread.start()
     try:
         yield

@@ -63,7 +63,7 @@ def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
         numbers = [x.body([values[k] for k in its]) for x, its in zip(operands, places, strict=True)]
         return rule(code, equation, [filled((), [number]) for number in numbers])[0].item()
 
-    return [Deferred(tuple(read), kind_of(aval.dtype), body)]
+    return [Deferred(tuple(read), kind_of(aval.dtype), body, any(operand.parts for operand in operands))]
 
 
 def _place_among(arrays: list[Stored], array: Stored, shape: Sequence[int]) -> int:
