@@ -6,19 +6,21 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.integrate.marching import march
+from jounce.integrate.simulation import expanded
 from jounce.kinematics.alone import Alone
 from jounce.kinematics.side_by_side import SideBySide
 from jounce.native import machine
 from tests.problems.dynamics import simple_pendulum
 
-pytestmark = pytest.mark.skipif(
+needs_machine_code = pytest.mark.skipif(
     not machine.is_usable(), reason="there is no compiler, or a system where it was not tried"
 )
 
 
 @pytest.fixture
 def made(monkeypatch):
-    """What machine code is made of, and by which thread."""
+    """What machine code is made of."""
     monkeypatch.delenv("JOUNCE_NATIVE", raising=False)
     found = []
     for kind in (Alone, SideBySide):
@@ -37,6 +39,7 @@ def swing(mechanism, tolerance):
     return jn.simulate(mechanism, np.linspace(0.0, 0.1, 3), tolerance=tolerance)
 
 
+@needs_machine_code
 @pytest.mark.parametrize("threads", ["1", "2"])
 def test_they_are_those_of_the_run(made, monkeypatch, threads):
     monkeypatch.setenv("JOUNCE_THREADS", threads)
@@ -48,6 +51,15 @@ def test_they_are_those_of_the_run(made, monkeypatch, threads):
     assert found.outputs["angle"][0, 0] != again.outputs["angle"][0, 0]
 
 
+def test_xla_compiles_each_once(monkeypatch):
+    monkeypatch.setenv("JOUNCE_NATIVE", "0")
+    monkeypatch.setenv("JOUNCE_THREADS", "2")
+    before = [program.jitted._cache_size() for program in (march, expanded)]
+    swing(simple_pendulum(0.3, 1.0), 7e-6)
+    assert [program.jitted._cache_size() for program in (march, expanded)] == [count + 1 for count in before]
+
+
+@needs_machine_code
 @pytest.mark.slow
 def test_those_with_redundant_rows_begin_with_the_start(made, monkeypatch):
     monkeypatch.setenv("JOUNCE_THREADS", "2")

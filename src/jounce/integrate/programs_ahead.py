@@ -14,6 +14,7 @@ from jounce.dynamics.start import ConsistentStart, at_rest, equations_of
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulation import FEW_INSTANTS, motion_at
+from jounce.kinematics.alone import is_wanted
 from jounce.kinematics.device import resident
 from jounce.kinematics.rehearsal import first_time, rehearsed
 from jounce.mechanism import Mechanism, Model
@@ -33,7 +34,7 @@ class ProgramsAhead(ExitStack):
     instants : array of shape (time,)
         At which the motion is wanted, s.
     order : int
-        Highest derivative of the outputs.
+        Highest derivative of the motion that the outputs need.
     method : AbstractMethod
         How steps are taken.
     tolerance, longest : float
@@ -74,12 +75,14 @@ class ProgramsAhead(ExitStack):
 
     def _compile(self, equations: Equations, model: Model, state: State) -> None:
         self._wanted = False
-        first, last = (float(self._instants[k]) for k in (0, -1))
+        first, last = self._instants[:1], self._instants[-1]  # of the types that the run has: XLA tells them apart
 
         def begun() -> IntegratorState:
-            return unexpanded(equations, state, np.array([first]), order=self._expansion)
+            return unexpanded(equations, state, first, order=self._expansion)
 
-        written = threading.Event()  # the march, which takes longer to compile
+        written = threading.Event()  # the march, which takes longer to compile: first of those that Python writes
+        if not is_wanted():
+            written.set()
 
         def arrived() -> None:
             current = begun()
@@ -92,7 +95,7 @@ class ProgramsAhead(ExitStack):
 
         def evaluated() -> Any:
             written.wait()
-            dense = self._one_step(begun(), last - first)
+            dense = self._one_step(begun(), last - first[0])
             outputs, some = model.system.outputs, self._instants[: FEW_INSTANTS + 1]
             return motion_at(equations, outputs, dense, some, np.zeros(len(some), int), self._order)
 
