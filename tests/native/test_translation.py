@@ -7,7 +7,7 @@ import pytest
 from jax import lax
 
 from jounce.native import code, modules, translation
-from jounce.native.values import UnsupportedOperationError
+from jounce.native.values import Region, UnsupportedOperationError
 from tests.native.lanes import COUNT, TRUTH, assert_agree, assert_same, compiled, one_by_one, ordinary, whole
 
 COUNTS = (1, 3, 8, COUNT)
@@ -399,3 +399,18 @@ def test_long_scans_within_scans_are_given_up_early(monkeypatch):
     monkeypatch.setattr(code.Code, "back_to", counted)
     assert_agree(run, ordinary(), rtol=1e-9)
     assert 0 < sum(written) < 2000
+
+
+def test_a_program_has_one_text():
+    def run(x, which):
+        for k in range(6):  # the memory of several arrays ends at once, and others take it
+            x = jnp.sin(x)[which] + (x * k)[which[::-1]]
+        return x
+
+    given = [jax.ShapeDtypeStruct((8,), dtype) for dtype in (jnp.float64, jnp.int64)]
+    closed = jax.make_jaxpr(run)(*given)
+    kept, texts = [], set()
+    for k in range(20):
+        kept += [Region("", "f", lanes=False) for _ in range(k)]  # so that what is made next lies elsewhere
+        texts.add(modules._text(closed, 0, {}, 8, large=3))
+    assert len(texts) == 1

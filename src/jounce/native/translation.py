@@ -75,8 +75,10 @@ def translate(
             for variable, values in zip(operation.outvars, found, strict=True):
                 noted(variable, _checked(values, variable.aval))
             if code.large is not None:
-                for region in set(code.taken[before:]) - _regions(found):
-                    code.give_back(region)
+                wanted = _regions(found)
+                for region in dict.fromkeys(code.taken[before:]):
+                    if region not in wanted:
+                        code.give_back(region)
                 _let_go(code, known, plan.ends.get(now, ()))
         results = [read(variable) for variable in plan.results]
         return results if late else [stored(code, x) if isinstance(x, Deferred) else x for x in results]
@@ -233,10 +235,14 @@ def _among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
     return _regions(arrays).__contains__
 
 
-def _regions(arrays: Sequence[Array]) -> set[Region]:
-    """Return the memory of arrays, and of what they are computed from."""
+def _regions(arrays: Sequence[Array]) -> dict[Region, None]:
+    """Return the memory of arrays, and of what they are computed from: each once, in their order.
+
+    A set has another order in each process, and memory that is given back in another order is taken so: then the same
+    program has another text, and another name in the store.
+    """
     parts = [array.given if isinstance(array, Deferred) else [array] for array in arrays]
-    return {part.region for some in parts for part in some if isinstance(part, Stored)}
+    return dict.fromkeys(part.region for some in parts for part in some if isinstance(part, Stored))
 
 
 def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
