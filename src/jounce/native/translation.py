@@ -75,10 +75,7 @@ def translate(
             for variable, values in zip(operation.outvars, found, strict=True):
                 noted(variable, _checked(values, variable.aval))
             if code.large is not None:
-                wanted = _regions(found)
-                for region in dict.fromkeys(code.taken[before:]):
-                    if region not in wanted:
-                        code.give_back(region)
+                _give_back_but(code, code.taken[before:], found)
                 _let_go(code, known, plan.ends.get(now, ()))
         results = [read(variable) for variable in plan.results]
         return results if late else [stored(code, x) if isinstance(x, Deferred) else x for x in results]
@@ -94,6 +91,14 @@ def _give_back(code: Code, arrays: Sequence[Array]) -> None:
     """Give back the memory of arrays that nobody reads any more, where nobody reads it by another one."""
     for region in _regions(arrays):
         if code.is_unshared(region):
+            code.give_back(region)
+
+
+def _give_back_but(code: Code, taken: Sequence[Region], arrays: Sequence[Array]) -> None:
+    """Give back memory that was taken, but that of arrays."""
+    wanted = _regions(arrays)
+    for region in dict.fromkeys(taken):
+        if region not in wanted:
             code.give_back(region)
 
 
