@@ -95,7 +95,7 @@ def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -
     return IntegratorState(time, expansion, refused, opening, nothing, time, *known, none, angles)
 
 
-@compiled(narrow=True)
+@compiled(narrow=True, alone=True)
 def _measured(equations: Equations, state: State) -> AnglesOfForces:
     return measured(equations, state)
 

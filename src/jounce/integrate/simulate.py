@@ -250,7 +250,7 @@ def _unsound(start: ConsistentStart, sound: Bool[np.ndarray, " force"]) -> str:
     return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), sound, strict=True) if not good)
 
 
-@compiled(narrow=True, brief=True)
+@compiled(narrow=True, brief=True, alone=True)
 def _finite_forces(equations: Equations, state: State, time: Instants) -> Bool[Numbers, "force 1"]:
     return equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
 

@@ -62,7 +62,7 @@ class Alone:
             return None
         leaves, tree = jax.tree.flatten((tuple(arguments), dict(keywords)))
         arrays = [np.asarray(leaf) for leaf in leaves]
-        kinds = tuple((x.shape, x.dtype.str) for x in arrays)
+        kinds = tuple([(x.shape, x.dtype) for x in arrays])
         key = tree, kinds, tuple((name, type(value), value) for name, value in static.items()), settings()
         if key not in self._programs:
             with self._lock:
@@ -92,5 +92,6 @@ class Alone:
         name = None
         if current_store() is not None:
             with suppress(UndescribedError):
-                name = program_key(self.made_of, tree, [kinds, "alone", is_wanted_soon(), machine.processor()], static)
+                told = [(shape, dtype.str) for shape, dtype in kinds]
+                name = program_key(self.made_of, tree, [told, "alone", is_wanted_soon(), machine.processor()], static)
         return made_or_kept(name, make, lambda binary, *rest: Single(binary, *rest) if binary else None)

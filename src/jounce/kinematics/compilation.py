@@ -118,8 +118,9 @@ class Compiled:
     brief : bool, optional
         Whether a command calls it so seldom, or has it compute so little, that it waits longer for the compiler: then
         LLVM optimises nothing where code is wanted soon, in half the time.
-    alone : callable, optional
-        Tells from the arguments whether machine code is better where there is a compiler for it, as `Alone` has it.
+    alone : bool or callable, optional
+        Whether machine code is better where there is a compiler for it, as `Alone` has it; or what tells that from the
+        arguments.
     """
 
     def __init__(
@@ -131,7 +132,7 @@ class Compiled:
         *,
         narrow: bool = False,
         brief: bool = False,
-        alone: Callable[..., bool] | None = None,
+        alone: Callable[..., bool] | bool = False,
     ):
         self.function, self.static, self.made_of = function, static, made_of or (function,)
         self.without, self.narrow, self.brief = without, narrow, brief
@@ -161,12 +162,13 @@ class Compiled:
             whole = self.jitted if all(map(_runs_at_once, traced)) else self._within
             return whole(*arguments, **keywords)
         store = current_store()
-        if store is None and self._suits_alone is None:
+        if store is None and self._suits_alone is False:
             return self.jitted(*arguments, **keywords)
         keywords |= zip(self._names[self._traced :], arguments[self._traced :], strict=False)
         arguments = arguments[: self._traced]
         static = {name: keywords.pop(name) for name in self.static if name in keywords}
-        suits = self._suits_alone is not None and self._suits_alone(*arguments, **keywords)
+        suits = self._suits_alone
+        suits = suits if isinstance(suits, bool) else suits(*arguments, **keywords, **static)
         if suits and (code := self._alone.program(arguments, keywords, static)) is not None:
             return code()
         if store is None:
@@ -285,7 +287,7 @@ def compiled(
     without: tuple[str, ...] = (),
     narrow: bool = False,
     brief: bool = False,
-    alone: Callable[..., bool] | None = None,
+    alone: Callable[..., bool] | bool = False,
 ) -> Callable[[Callable[..., Any]], Compiled]:
     """Compile the decorated function at its first call, with these static arguments, as `Compiled` has it."""
     return lambda function: Compiled(function, static, without=without, narrow=narrow, brief=brief, alone=alone)

@@ -40,7 +40,7 @@ class _Going(NamedTuple):
     left: Int[Numbers, ""]  # steps that may follow; below zero none does
 
 
-@compiled("pose_type", narrow=True, brief=True)
+@compiled("pose_type", narrow=True, brief=True, alone=True)
 def _moved(
     system: System,
     coordinates: dict[str, Numbers],

@@ -122,7 +122,12 @@ PIECES = Pieces(corrections=3000, derivatives=0)
 _batch = jax.jit(partial(advance, pieces=PIECES), static_argnames=("pose_type", "order"))  # traced once
 
 
-@compiled("pose_type", "order", "batches", "native", narrow=True, without=LIBRARIES)
+def _calls_code(*_: Any, native: str | None, **__: Any) -> bool:
+    """Tell whether batches are solved by machine code, and not within the program."""
+    return native is not None
+
+
+@compiled("pose_type", "order", "batches", "native", narrow=True, without=LIBRARIES, alone=_calls_code)
 def leg(
     system: System,
     way: Way,

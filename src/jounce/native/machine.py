@@ -14,6 +14,7 @@ TRIED = ("linux",)
 HASTE = ("-regalloc=fast", "-enable-misched=false")  # options of LLVM
 LONG = 10_000  # lines, for which another process is worth its start
 _lock = threading.Lock()  # LLVM's state is one for the process
+_published: set[str] = set()
 
 
 @lru_cache(maxsize=1)
@@ -92,6 +93,11 @@ def _compiled_elsewhere(text: str, hasty: bool) -> bytes | None:
         return None
 
 
+def is_published(name: str) -> bool:
+    """Tell whether machine code that calls a function of this name finds it."""
+    return name in _published
+
+
 class MachineCode:
     """The functions `run`, `handle` and `relay` of an object file, in memory.
 
@@ -109,10 +115,17 @@ class MachineCode:
             self._engine.add_object_file(binding.object_file.ObjectFileRef.from_data(binary))
             self._engine.finalize_object()
             address, handler, relay = map(self._engine.get_function_address, ("run", "handle", "relay"))
+        self._address = address
         self._run = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64)(address)
         self.handler = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)(handler)  # for XLA
         addresses, numbers = [ctypes.c_void_p] * 2, [ctypes.c_int64] * 3
         self.relay = ctypes.CFUNCTYPE(None, *addresses, *numbers, *addresses, ctypes.c_int64)(relay)
+
+    def publish(self, name: str) -> None:
+        """Let machine code that is loaded from here on call `run` by a name, as long as this one is kept."""
+        with _lock:
+            _binding().add_symbol(name, self._address)
+            _published.add(name)
 
     def __call__(self, addresses: Any, lanes: int) -> None:
         """Run it: without Python's lock, so in several threads at once."""

@@ -3,6 +3,7 @@
 import ctypes
 import hashlib
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -27,18 +28,33 @@ class Single:
 
     def __init__(self, binary: bytes, given: Any, results: Any):
         self._run = MachineCode(binary)
-        self._given = [(x.shape, x.dtype) for x in jax.tree.leaves(given)]
-        leaves, self._structure = jax.tree.flatten(results)
-        self._results = [(leaf.shape, leaf.dtype) for leaf in leaves]
+        leaves, (found, self._structure) = jax.tree.leaves(given), jax.tree.flatten(results)
+        kinds = [(x.shape, np.dtype(x.dtype)) for x in (*leaves, *found)]
+        groups: dict[tuple[np.dtype, bool], list[int]] = {}
+        for k, (_, dtype) in enumerate(kinds):
+            groups.setdefault((dtype, k < len(leaves)), []).append(k)
+        places, self._size, self._groups = np.empty(len(kinds), np.int64), 8 * len(kinds), []
+        for (dtype, is_given), members in groups.items():
+            begin = self._size = -(-self._size // 64) * 64
+            for k in members:
+                places[k] = self._size
+                self._size += math.prod(kinds[k][0]) * dtype.itemsize
+            if is_given:
+                self._groups.append((members, slice(begin, self._size), dtype))
+        self._places, self._results = places, [(*kinds[k], places[k]) for k in range(len(leaves), len(kinds))]
 
     def __call__(self, given: Sequence[np.ndarray]) -> Any:
-        """Return the results, for the leaves of the arguments."""
-        if [(x.shape, x.dtype) for x in given] != self._given:
-            raise ValueError(f"arrays of {[(x.shape, x.dtype) for x in given]}, where the program is for {self._given}")
-        found = [np.empty(*shape) for shape in self._results]
-        arrays = [*map(np.ascontiguousarray, given), *found]
-        addresses = [array.__array_interface__["data"][0] for array in arrays]
-        self._run((ctypes.c_void_p * len(addresses))(*addresses), 1)
+        """Return the results, for the leaves of the arguments, of the shapes and types that the program is for.
+
+        All are in one piece of memory, after their addresses: NumPy takes long to tell where an array is.
+        """
+        memory = np.empty(self._size, np.uint8)
+        address = memory.__array_interface__["data"][0]
+        np.add(self._places, address, out=memory[: 8 * len(self._places)].view(np.int64))
+        for members, place, dtype in self._groups:
+            np.concatenate([given[k] for k in members], axis=None, out=memory[place].view(dtype), casting="no")
+        self._run(address, 1)
+        found = [np.ndarray(shape, dtype, memory, place) for shape, dtype, place in self._results]
         return jax.tree.unflatten(self._structure, found)
 
 
@@ -136,9 +152,10 @@ class Program:
         return Relay(self._run.relay, shared, *groups, sources, self._width)
 
     def register(self) -> bool:
-        """Make it known to XLA by its name, for `in_program`; tell whether that goes."""
+        """Make it known by its name, to XLA and to machine code, for `in_program`; tell whether that goes."""
         if self._rows or not is_known():
             return False
+        self._run.publish(self.name)
         jax.ffi.register_ffi_target(self.name, jax.ffi.pycapsule(self._run.handler), platform="cpu")
         return True
 

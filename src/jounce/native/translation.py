@@ -11,6 +11,7 @@ import numpy as np
 from jax.extend.core import Literal, jaxprs_in_params
 
 from jounce.native.arrays import constants, each, filled
+from jounce.native.calls import call
 from jounce.native.carried import Carried
 from jounce.native.code import Code
 from jounce.native.loops import DEFERRED, READING, STORED
@@ -387,4 +388,5 @@ _CONTROL = {
     "scan": _scan,
     "cond": _cond,
     "custom_linear_solve": _linear_solve,
+    "ffi_call": call,
 }
