@@ -86,7 +86,8 @@ def _compiled_elsewhere(text: str, hasty: bool) -> bytes | None:
     """
     if not Path(sys.executable or "").name.startswith("python"):  # it may be an application that has Python within
         return None
-    words = [sys.executable, "-P", "-m", __name__, *(HASTE if hasty else ())]  # -P: nothing of the folder it starts in
+    # by its file, as by its name it would import JAX; -P: nothing of the folder that this file is in
+    words = [sys.executable, "-P", __file__, *(HASTE if hasty else ())]
     try:
         return subprocess.run(words, input=text.encode(), capture_output=True, check=True).stdout
     except (OSError, subprocess.SubprocessError):
