@@ -90,7 +90,7 @@ def test_what_is_kept_is_loaded_or_made_again(damage, monkeypatch):
     monkeypatch.setattr(alone, "object_file", lambda *a, **k: made.append(k["hasty"]) or real(*a, **k))
     monkeypatch.setattr(store_, "_store", shelf)
     for _ in range(2):
-        run = alone.Alone(logistic, (Compiled.__call__,)).program((x, 4), {}, {"power": 2})
+        run = alone.Alone(logistic, (Compiled.__call__,)).program(*jax.tree.flatten(((x, 4), {})), {"power": 2})
         assert run is not None
         check(run(), expected(x, 4, power=2))
         if damage is not None:

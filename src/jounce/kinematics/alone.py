@@ -54,13 +54,18 @@ class Alone:
         self._programs: dict[Any, Single | None] = {}
         self._lock = threading.Lock()
 
-    def program(
-        self, arguments: Sequence[Any], keywords: Mapping[str, Any], static: Mapping[str, Any]
-    ) -> Callable[[], Any] | None:
-        """Return what computes the results for arguments, arrays of NumPy; None where there is no code for it."""
+    def program(self, leaves: Sequence[Any], tree: Any, static: Mapping[str, Any]) -> Callable[[], Any] | None:
+        """Return what computes the results for arguments; None where there is no code for it.
+
+        Parameters
+        ----------
+        leaves, tree
+            What JAX takes apart arguments and keywords into, each an array of NumPy or a number.
+        static : mapping
+            Further keywords.
+        """
         if not is_wanted():
             return None
-        leaves, tree = jax.tree.flatten((tuple(arguments), dict(keywords)))
         arrays = [np.asarray(leaf) for leaf in leaves]
         kinds = tuple([(x.shape, x.dtype) for x in arrays])
         key = tree, kinds, tuple((name, type(value), value) for name, value in static.items()), settings()

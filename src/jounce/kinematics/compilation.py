@@ -158,22 +158,19 @@ class Compiled:
         check_process()
         if (enough := getattr(_thread, "enough", None)) is not None and enough.is_set():
             raise StoppedError
-        if traced := [leaf for leaf in jax.tree.leaves((arguments, keywords)) if isinstance(leaf, Tracer)]:
-            whole = self.jitted if all(map(_runs_at_once, traced)) else self._within
-            return whole(*arguments, **keywords)
-        store = current_store()
-        if store is None and self._suits_alone is False:
-            return self.jitted(*arguments, **keywords)
         keywords |= zip(self._names[self._traced :], arguments[self._traced :], strict=False)
         arguments = arguments[: self._traced]
         static = {name: keywords.pop(name) for name in self.static if name in keywords}
+        leaves, tree = jax.tree.flatten((arguments, keywords))
+        if traced := [leaf for leaf in leaves if isinstance(leaf, Tracer)]:
+            whole = self.jitted if all(map(_runs_at_once, traced)) else self._within
+            return whole(*arguments, **keywords, **static)
         suits = self._suits_alone
         suits = suits if isinstance(suits, bool) else suits(*arguments, **keywords, **static)
-        if suits and (code := self._alone.program(arguments, keywords, static)) is not None:
+        if suits and (code := self._alone.program(leaves, tree, static)) is not None:
             return code()
-        if store is None:
+        if (store := current_store()) is None:
             return self.jitted(*arguments, **keywords, **static)
-        leaves, tree = jax.tree.flatten((arguments, keywords))
         kinds = tuple(map(_kind, leaves))
         if None in kinds or being_debugged():
             return self.jitted(*arguments, **keywords, **static)

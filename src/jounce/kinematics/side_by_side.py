@@ -118,19 +118,21 @@ class SideBySide:
         **static
             Further arguments of the function.
         """
-        if not is_wanted() or is_traced((shared, lanes)):
-            return None
         leaves, structure = jax.tree.flatten(shared)
+        few, form = jax.tree.flatten(lanes)
+        if not is_wanted() or is_traced([*leaves, *few]):
+            return None
         arrays = [np.asarray(leaf) for leaf in leaves]
-        shapes = jax.tree.unflatten(structure, [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in arrays])
-        one = jax.tree.map(lambda x: jax.ShapeDtypeStruct(self._one(x.shape), x.dtype), lanes)
+        kinds = tuple([(x.shape, x.dtype) for x in arrays])
+        ones = tuple([(self._one(np.shape(x)), np.asarray(x).dtype) for x in few])
         places = {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
-        kinds = tuple((x.shape, x.dtype.str) for x in (*arrays, *jax.tree.leaves(one)))
-        known = tuple(x.tobytes() for x in places.values())
-        key = structure, jax.tree.structure(one), kinds, known, large, hasty, tuple(static.items()), settings()
+        known = tuple([x.tobytes() for x in places.values()])
+        key = structure, form, kinds, ones, known, large, hasty, tuple(static.items()), settings()
         with self._lock:
             if key not in self._programs:
-                self._programs[key] = self._made((shapes, one), places, {"large": large, "hasty": hasty}, static)
+                parts = zip((structure, form), (kinds, ones), strict=True)
+                given = [jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(*kind) for kind in its]) for tree, its in parts]
+                self._programs[key] = self._made(tuple(given), places, {"large": large, "hasty": hasty}, static)
             program = self._programs[key]
         return None if program is None else Prepared(program, arrays)
 

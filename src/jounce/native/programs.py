@@ -15,6 +15,45 @@ from jounce.native.machine import MachineCode, vector_width
 from jounce.native.relays import Column, Relay
 
 
+class Layout:
+    """Where arrays are in one piece of memory: NumPy takes long to tell the address of an array.
+
+    Parameters
+    ----------
+    kinds : sequence of tuple
+        Shapes and types of the arrays.
+    begin : int, default 0
+        Bytes before them.
+
+    Attributes
+    ----------
+    places : array of int
+        Of the arrays, in bytes.
+    end : int
+        Of them all.
+    """
+
+    def __init__(self, kinds: Sequence[tuple[tuple[int, ...], Any]], begin: int = 0):
+        self._kinds = [(shape, np.dtype(dtype)) for shape, dtype in kinds]
+        self.places, self.end, self._groups = np.empty(len(kinds), np.int64), begin, []
+        by_type = sorted(range(len(kinds)), key=lambda k: self._kinds[k][1].str)
+        for _, group in itertools.groupby(by_type, key=lambda k: self._kinds[k][1].str):
+            members, first = list(group), -(-self.end // 64) * 64
+            dtype, sizes = self._kinds[members[0]][1], [math.prod(self._kinds[k][0]) for k in members]
+            ends = first + dtype.itemsize * np.cumsum([0, *sizes])
+            self.places[members], self.end = ends[:-1], int(ends[-1])
+            self._groups.append((members, slice(first, self.end), dtype))
+
+    def put(self, memory: np.ndarray, arrays: Sequence[np.ndarray]) -> None:
+        """Copy arrays of these shapes and types to their places in a memory of bytes."""
+        for members, place, dtype in self._groups:
+            np.concatenate([arrays[k] for k in members], axis=None, out=memory[place].view(dtype), casting="no")
+
+    def views(self, memory: np.ndarray) -> list[np.ndarray]:
+        """Return the arrays in a memory of bytes."""
+        return [np.ndarray(*kind, memory, place) for kind, place in zip(self._kinds, self.places, strict=True)]
+
+
 class Single:
     """Machine code of a function of one instant, for it alone.
 
@@ -29,33 +68,19 @@ class Single:
     def __init__(self, binary: bytes, given: Any, results: Any):
         self._run = MachineCode(binary)
         leaves, (found, self._structure) = jax.tree.leaves(given), jax.tree.flatten(results)
-        kinds = [(x.shape, np.dtype(x.dtype)) for x in (*leaves, *found)]
-        groups: dict[tuple[np.dtype, bool], list[int]] = {}
-        for k, (_, dtype) in enumerate(kinds):
-            groups.setdefault((dtype, k < len(leaves)), []).append(k)
-        places, self._size, self._groups = np.empty(len(kinds), np.int64), 8 * len(kinds), []
-        for (dtype, is_given), members in groups.items():
-            begin = self._size = -(-self._size // 64) * 64
-            for k in members:
-                places[k] = self._size
-                self._size += math.prod(kinds[k][0]) * dtype.itemsize
-            if is_given:
-                self._groups.append((members, slice(begin, self._size), dtype))
-        self._places, self._results = places, [(*kinds[k], places[k]) for k in range(len(leaves), len(kinds))]
+        self._addresses = 8 * (len(leaves) + len(found))  # bytes
+        self._given = Layout([(x.shape, x.dtype) for x in leaves], self._addresses)
+        self._results = Layout([(x.shape, x.dtype) for x in found], self._given.end)
+        self._places = np.concatenate([self._given.places, self._results.places])
 
     def __call__(self, given: Sequence[np.ndarray]) -> Any:
-        """Return the results, for the leaves of the arguments, of the shapes and types that the program is for.
-
-        All are in one piece of memory, after their addresses: NumPy takes long to tell where an array is.
-        """
-        memory = np.empty(self._size, np.uint8)
-        address = memory.__array_interface__["data"][0]
-        np.add(self._places, address, out=memory[: 8 * len(self._places)].view(np.int64))
-        for members, place, dtype in self._groups:
-            np.concatenate([given[k] for k in members], axis=None, out=memory[place].view(dtype), casting="no")
-        self._run(address, 1)
-        found = [np.ndarray(shape, dtype, memory, place) for shape, dtype, place in self._results]
-        return jax.tree.unflatten(self._structure, found)
+        """Return the results, for the leaves of the arguments, of the shapes and types that the program is for."""
+        memory = np.empty(self._results.end, np.uint8)
+        first = _address(memory)
+        np.add(self._places, first, out=memory[: self._addresses].view(np.int64))
+        self._given.put(memory, given)
+        self._run(first, 1)
+        return jax.tree.unflatten(self._structure, self._results.views(memory))
 
 
 class Program:
@@ -76,6 +101,7 @@ class Program:
         self.name = f"jounce_{hashlib.sha256(binary).hexdigest()[:32]}"
         shared, lanes = map(jax.tree.leaves, given)
         self._shared = [(x.shape, x.dtype) for x in shared]
+        self._layout = Layout(self._shared)
         self._lanes = [(x.shape[:-1], x.dtype) for x in lanes]
         leaves, self._structure = jax.tree.flatten(results)
         self._results = [(leaf.shape[:-1], leaf.dtype) for leaf in leaves]
@@ -101,15 +127,17 @@ class Program:
         self._check(shared, lanes, count)
         if total > count:
             lanes = [_filled(x, total, axis) for x in lanes]
-        given = [np.ascontiguousarray(x) for x in (*shared, *lanes)]
+        given = [np.ascontiguousarray(x) for x in lanes]
         shapes = [((total, *shape) if self._rows else (*shape, total), dtype) for shape, dtype in self._results]
         found = [np.empty(*shape) for shape in shapes]
+        memory = np.empty(self._layout.end, np.uint8)
+        self._layout.put(memory, shared)
         arrays = [*given, *found]
-        addresses = [array.__array_interface__["data"][0] for array in arrays]
+        addresses = [*(self._layout.places + _address(memory)).tolist(), *map(_address, arrays)]
         if not self._rows or (vectors := total // self._width) < 2 or parts == 1:
             self._run((ctypes.c_void_p * len(addresses))(*addresses), total)
         else:
-            steps = [0] * len(shared) + [x.strides[0] for x in arrays[len(shared) :]]
+            steps = [0] * len(shared) + [x.strides[0] for x in arrays]
             ends = [vectors * k // parts * self._width for k in range(parts)] + [total]
 
             def run(part: int) -> None:
@@ -172,6 +200,10 @@ class Program:
         """Raise ValueError unless arrays of so many instants are of the shapes and types that the code reads."""
         many = [((count, *shape) if self._rows else (*shape, count), dtype) for shape, dtype in self._lanes]
         _agree([*shared, *lanes], [*self._shared, *many])
+
+
+def _address(array: np.ndarray) -> int:
+    return array.__array_interface__["data"][0]
 
 
 def _agree(arrays: Sequence[Any], wanted: Sequence[tuple[tuple[int, ...], Any]]) -> None:
