@@ -9,6 +9,7 @@ import pytest
 
 import jounce as jn
 from jounce import drivers, forces
+from jounce.integrate.turns import attitudes_along, attitudes_at
 
 BODIES, Z, ORIGIN = ("ground", "rotor"), [0, 0, 1], [0, 0, 0]
 STIFFNESS = INERTIA = 2.0  # a vibration with a period of 2 pi
@@ -139,3 +140,18 @@ def test_the_solvers_of_diffrax_carry_the_turns_along():
     motion = equation.motion(solution.ts, solution.ys, order=2)
     torque = jn.applied_force(motion, "spring").values[:, 0]
     np.testing.assert_allclose(torque, -STIFFNESS * closed_form(TIME, 1)[:, 0], rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_attitudes_along_steps_are_those_at_their_instants(sense):
+    random = np.random.default_rng(3)
+    series = random.normal(size=(5, 12, 4, 2)) / np.cumprod([1.0, *np.arange(1.0, 12)])[:, None, None]
+    series[3, 2:] = 0.0  # an even turn, for as long as nobody asks for another step
+    length = sense * np.array([0.3, 0.7, 1.1, 1e40, 0.2])
+    found = attitudes_along(series, length, 8)
+    step, share = np.repeat(np.arange(5), 8), np.tile(np.arange(8) / 8, 5)
+    step, share = np.append(step, 4), np.append(share, 1.0)
+    expected = attitudes_at(series[step], share * length[step])
+    assert found.shape == (4, 3, 41)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
+    np.testing.assert_array_equal(found[:, 0], np.eye(4)[:, :1] * np.ones(41))

@@ -17,7 +17,7 @@ from jounce.integrate.lookahead import watched_names
 from jounce.integrate.marching import DenseOutput
 from jounce.integrate.methods import evaluated
 from jounce.integrate.projection import projected
-from jounce.integrate.turns import PLACES, AnglesOfForces, attitudes_at, followed, measured
+from jounce.integrate.turns import PLACES, AnglesOfForces, attitudes_along, attitudes_at, followed, measured
 from jounce.jet import Jet, dot
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
@@ -183,7 +183,8 @@ class Simulation(Motion):
             return AttitudeHistory(self._attitudes_at(dense.start), dense.start)
         instants = (dense.start[:, None] + dense.length[:, None] * (np.arange(PLACES) / PLACES)).ravel()
         instants = np.append(instants, dense.end)
-        return AttitudeHistory(self._attitudes_at(instants), instants, between=self._attitudes_at)
+        along = attitudes_along(dense.polynomial.attitude, dense.length, PLACES)
+        return AttitudeHistory(along, instants, between=self._attitudes_at)
 
     def _attitudes_at(self, instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, "4 bodies time"]:
         dense, chosen = self.dense_output, self.steps_at(instants)

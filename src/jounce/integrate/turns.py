@@ -95,3 +95,19 @@ def attitudes_at(
     for k in range(series.shape[1])[::-1]:
         found = found * since[:, None, None] + np.asarray(series[:, k])
     return np.asarray(turns_with_ground(np.moveaxis(found, 0, -1)))
+
+
+def attitudes_along(
+    series: Float[np.ndarray, "step order 4 bodies"], length: Float[np.ndarray, " step"], places: int
+) -> Float[np.ndarray, "4 bodies+1 place"]:
+    """Return the Euler parameters of all bodies, the ground first, at even parts of steps, and at the end of the last.
+
+    Steps are of known Taylor coefficients, and follow one another.
+    """
+    known = series.reshape(*series.shape[:2], -1)
+    with np.errstate(over="ignore"):  # powers of long steps, in which bodies turn evenly
+        powers = length[:, None, None] ** np.arange(series.shape[1])[:, None]
+    terms = np.multiply(known, powers, where=known != 0, out=np.zeros_like(known))
+    shares = (np.arange(places)[:, None] / places) ** np.arange(series.shape[1])
+    found = np.concatenate([(shares @ terms).reshape(-1, known.shape[-1]), terms[-1:].sum(axis=1)])
+    return np.asarray(turns_with_ground(np.moveaxis(found.reshape(-1, *series.shape[2:]), 0, -1)))

@@ -70,11 +70,11 @@ class AttitudeHistory(NamedTuple):
         measure : callable
             Returns the angles, rad, of attitudes of all bodies, (4, bodies, places).
         """
-        between = self.between
+        between, known = self.between, measure(self.quaternion)
         if between is None:
-            return self.time, measure(self.quaternion)
+            return self.time, known
         whole = np.zeros(len(self.time), int)  # one path, along which instants are measured
-        found = closer_places(lambda _, instants: measure(between(instants)), whole, self.time)
+        found = closer_places(lambda _, instants: measure(between(instants)), whole, self.time, known)
         return found.share, found.angle
 
     def angles(self, group: Group) -> tuple[Float[np.ndarray, " place"], Float[np.ndarray, "instance place"]]:

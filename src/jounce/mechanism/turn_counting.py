@@ -44,7 +44,7 @@ class Places(NamedTuple):
         return self.angle[:, nearest_instants(2.0 * self.path + self.share, 2.0 * path + share)]
 
 
-def closer_places(measure: Measure, path: Paths, share: Shares) -> Places:
+def closer_places(measure: Measure, path: Paths, share: Shares, angle: Angles | None = None) -> Places:
     """Return places between which no angle makes half a turn: those given, and more of them where an angle is fast.
 
     Parameters
@@ -53,8 +53,10 @@ def closer_places(measure: Measure, path: Paths, share: Shares) -> Places:
         Returns angles, up to whole turns, at places given by path and share.
     path, share : array of shape (places,)
         Those to begin with, in their order.
+    angle : array of shape (angles, places), optional
+        What is measured there, if it is known.
     """
-    angle = measure(path, share)
+    angle = measure(path, share) if angle is None else angle
     for _ in range(HALVINGS):
         fast = (np.abs(principal(np.diff(angle))) > LARGEST_CHANGE).any(axis=0)
         wide = np.flatnonzero(fast & (path[1:] == path[:-1]))
