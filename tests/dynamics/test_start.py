@@ -3,11 +3,13 @@
 import dataclasses
 import sys
 
+import jax
 import numpy as np
 import pytest
 
 import jounce as jn
 from jounce import drivers, forces, planar
+from jounce.dynamics import start
 from jounce.dynamics.start import consistent_start
 from tests.problems.dynamics import simple_pendulum
 
@@ -32,6 +34,47 @@ def test_without_a_condition_the_guess_is_kept_and_the_body_rests():
     state = consistent_start(with_initial(), 0.0).state
     assert state.attitude[0, 0, 0] == pytest.approx(0.3, abs=1e-14)
     assert np.allclose([*state.spin.ravel(), *state.velocity.ravel()], 0.0, atol=1e-14)
+
+
+STARTS = ["simple_pendulum", "double_pendulum", "andrews", "sprung_four_bar", "flyball_governor"]
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in (*STARTS[2:], "spatial_slider_crank_free")]
+
+
+@pytest.mark.parametrize("name", [*STARTS[:2], *SLOW])
+def test_where_conditions_let_go_the_rest_is_together(name, monkeypatch):
+    mechanism = jn.load(f"examples/{name}.yaml")
+    used, let_go = [], start._let_go
+    monkeypatch.setattr(start, "_let_go", lambda *given: used.append(let_go(*given)) or used[-1])
+    found = consistent_start(mechanism, 0.0)
+    monkeypatch.setattr(start, "_let_go", lambda *_: None)
+    assembled = consistent_start(mechanism, 0.0)
+    assert all(model is not None for model in used)
+    assert len(used) == bool(mechanism.initial)
+    assert found.model.rows == assembled.model.rows
+    assert found.mobility == assembled.mobility
+    for (path, mine), theirs in zip(
+        jax.tree.leaves_with_path((found.equations, found.state, found.model.guess, found.model.reference)),
+        jax.tree.leaves((assembled.equations, assembled.state, assembled.model.guess, assembled.model.reference)),
+        strict=True,
+    ):
+        np.testing.assert_allclose(mine, theirs, rtol=1e-12, atol=1e-12, err_msg=jax.tree_util.keystr(path))
+
+
+FAR = "sqrt((50 - cos(0.3))**2 + sin(0.3)**2)"
+UNLIKE = {
+    "the same twice": {"start": turn("bob", "0.3"), "again": turn("bob", "0.3")},
+    "another size": {"start": drivers.DistanceDriver(("ground", "bob"), [50, 0], [1, 0], FAR)},
+}
+
+
+@pytest.mark.parametrize("unlike", UNLIKE)
+def test_the_rest_is_assembled_where_conditions_repeat_each_other_or_give_the_size(unlike, monkeypatch):
+    used, let_go = [], start._let_go
+    monkeypatch.setattr(start, "_let_go", lambda *given: used.append(let_go(*given)) or used[-1])
+    found = consistent_start(with_initial(**UNLIKE[unlike]), 0.0).state
+    assert used == [None]
+    assert found.attitude[0, 0, 0] == pytest.approx(0.3, abs=1e-10)
+    assert np.allclose([*found.spin.ravel(), *found.velocity.ravel()], 0.0, atol=1e-12)
 
 
 @pytest.mark.slow

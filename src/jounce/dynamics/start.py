@@ -16,14 +16,14 @@ from jounce.dynamics.saddle_point import even_scale
 from jounce.errors import AssemblyError, MechanismError, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.advance import LARGEST_CONTRADICTION
-from jounce.kinematics.assembly import assemble, freely_moving
+from jounce.kinematics.assembly import SETTLED, assemble, freely_moving
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.device import resident
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
-from jounce.mechanism.builder import released
+from jounce.mechanism.builder import released, with_reference
 from jounce.modules import unchecked, with_fields
 from jounce.shapes import Numbers
 
@@ -95,7 +95,7 @@ def consistent_start(
     """
     mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
-    model, gravity, state = build(mechanism, initial=True), gravity_of(mechanism), None
+    model, gravity, state, together = build(mechanism, initial=True), gravity_of(mechanism), None, None
     exact = True  # whether the state is known to fulfil the rates of what is left without the initial conditions
     if built is not None:
         built(model)
@@ -111,7 +111,11 @@ def consistent_start(
         model = dataclasses.replace(
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
         )
-    model, coordinates = assemble(model, instant, TOLERANCE, free=True)
+        together = _let_go(model, whole, instant)
+    if together is None:
+        model, coordinates = assemble(model, instant, TOLERANCE, free=True)
+    else:
+        model = together
     equations = resident(equations_of(model, masses, gravity))
     if state is None:
         state = _set_in_motion(equations, model, coordinates, instant)
@@ -148,6 +152,20 @@ def _assembled(model: Model, instant: float) -> tuple[Model, dict[str, np.ndarra
     except MobilityError as error:
         message = f"joints, drivers and initial conditions together: {error.message}"
         raise MobilityError(message) from None
+
+
+def _let_go(model: Model, whole: Model, instant: float) -> Model | None:
+    """Return the model without initial conditions where they were assembled, its rows scaled; None where it is unlike.
+
+    The rows that are left are fulfilled there, and independent if all were.
+    """
+    kept = [k for k, name in enumerate(whole.rows) if not name.startswith("initial.")]
+    alike = model.length == whole.length and model.rows == tuple(whole.rows[k] for k in kept)
+    if not kept or not alike or whole.system.rank is not None:
+        return None
+    model, away = with_reference(model, model.guess, instant, model.prescribed)
+    system = resident(with_fields(model.system, row_scale=np.asarray(whole.system.row_scale)[kept]))
+    return dataclasses.replace(model, system=system) if away <= SETTLED else None
 
 
 def initial_as_drivers(mechanism: Mechanism) -> Mechanism:

@@ -22,7 +22,6 @@ from jounce.shapes import Numbers
 
 MAX_STEPS = 100
 NEXT_STEP = 1e-3  # of the tolerance: a step that would be this short, as residuals fall, is left out
-ROUNDING = 1e-15  # rad, or sizes of the mechanism: bodies that are as near are together
 LONGEST_STEP = 0.5  # rad, or sizes of the mechanism
 REGULAR = 1e-4  # smallest pivot over the largest, from where on a matrix is inverted instead of decomposed
 
@@ -201,8 +200,7 @@ def put_together(
         known = moved.at(begin) if known is None else known
     coordinates, residual, jacobian = opened(known)
     scale = jacobian.row_scale
-    together = np.abs(scale * residual).max(initial=0.0) <= ROUNDING
-    for _ in range(0 if together else MAX_STEPS):
+    for _ in range(MAX_STEPS):
         step = jacobian.step(residual)
         if step is None:
             break  # told by name
