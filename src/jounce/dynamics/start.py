@@ -112,10 +112,7 @@ def consistent_start(
             model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
         )
         together = _let_go(model, whole, instant)
-    if together is None:
-        model, coordinates = assemble(model, instant, TOLERANCE, free=True)
-    else:
-        model = together
+    model, coordinates = together or assemble(model, instant, TOLERANCE, free=True)
     equations = resident(equations_of(model, masses, gravity))
     if state is None:
         state = _set_in_motion(equations, model, coordinates, instant)
@@ -154,8 +151,8 @@ def _assembled(model: Model, instant: float) -> tuple[Model, dict[str, np.ndarra
         raise MobilityError(message) from None
 
 
-def _let_go(model: Model, whole: Model, instant: float) -> Model | None:
-    """Return the model without initial conditions where they were assembled, its rows scaled; None where it is unlike.
+def _let_go(model: Model, whole: Model, instant: float) -> tuple[Model, dict[str, np.ndarray]] | None:
+    """Return the model without initial conditions as `assemble` does, where they were assembled; None if it is unlike.
 
     The rows that are left are fulfilled there, and independent if all were.
     """
@@ -165,7 +162,7 @@ def _let_go(model: Model, whole: Model, instant: float) -> Model | None:
         return None
     model, away = with_reference(model, model.guess, instant, model.prescribed)
     system = resident(with_fields(model.system, row_scale=np.asarray(whole.system.row_scale)[kept]))
-    return dataclasses.replace(model, system=system) if away <= SETTLED else None
+    return (dataclasses.replace(model, system=system), model.guess) if away <= SETTLED else None
 
 
 def initial_as_drivers(mechanism: Mechanism) -> Mechanism:
