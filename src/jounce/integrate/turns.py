@@ -98,13 +98,13 @@ def attitudes_at(
 
 
 def attitudes_along(
-    series: Float[np.ndarray, "step order 4 bodies"], length: Float[np.ndarray, " step"], places: int
+    series: Float[Numbers, "step order 4 bodies"], length: Float[np.ndarray, " step"], places: int
 ) -> Float[np.ndarray, "4 bodies+1 place"]:
     """Return the Euler parameters of all bodies, the ground first, at even parts of steps, and at the end of the last.
 
     Steps are of known Taylor coefficients, and follow one another.
     """
-    known = series.reshape(*series.shape[:2], -1)
+    known = np.asarray(series).reshape(*series.shape[:2], -1)
     with np.errstate(over="ignore"):  # powers of long steps, in which bodies turn evenly
         powers = length[:, None, None] ** np.arange(series.shape[1])[:, None]
     terms = np.multiply(known, powers, where=known != 0, out=np.zeros_like(known))
