@@ -11,10 +11,12 @@ import jounce as jn
 from jounce.kinematics import Status, side_by_side, store as store_
 from jounce.kinematics.instant_program import advance_instant
 from jounce.kinematics.side_by_side import SideBySide
+from jounce.mechanism.builder import build
 from jounce.native import handler, machine
 from jounce.native.modules import object_file
 from jounce.native.programs import Program
 from tests.kinematics.test_compilation import Shelf
+from tests.kinematics.test_frontal import chain
 from tests.problems.small import four_bar, slider_crank
 
 pytestmark = pytest.mark.skipif(
@@ -51,6 +53,13 @@ def both_ways(mechanism, times, monkeypatch, **given):
 @pytest.mark.parametrize("mechanism", [four_bar, slider_crank])
 def test_motions_are_those_of_xla(mechanism, count, monkeypatch):
     agree(*both_ways(mechanism(), np.linspace(0, 2, count), monkeypatch))
+
+
+@pytest.mark.slow
+def test_motions_of_many_bodies_are_those_of_xla(monkeypatch):
+    mechanism = chain(20)
+    assert build(mechanism).system.fronts is not None
+    agree(*both_ways(mechanism, np.linspace(0, 2, 50), monkeypatch))
 
 
 @pytest.mark.slow

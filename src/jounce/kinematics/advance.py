@@ -250,6 +250,7 @@ def advance(
     pose_type: type[Pose],
     order: int,
     pieces: Pieces = XLA_S_OWN,
+    with_turnover: bool = True,
 ) -> Arrival:
     """Solve a batch of instants, each from a neighbour solved before.
 
@@ -276,6 +277,8 @@ def advance(
         PlanarPose or SpatialPose; derivatives wanted.
     pieces : Pieces, optional
         Which parts are to be one piece of machine code.
+    with_turnover : bool, default True
+        Whether the turnover is looked for here, too; else it is left at zero.
     """
     given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
     arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order, pieces=pieces)
@@ -283,7 +286,7 @@ def advance(
 
     def surveyed() -> Any:
         hidden = hidden_by_laws(system, first, instant[:1], step[:1], order)
-        return turnover_of(system, pose_type, reached, factor, instant), hidden
+        return turnover_of(system, pose_type, reached, factor, instant) if with_turnover else np.zeros(1), hidden
 
     turnover, first = jax.lax.cond(survey, surveyed, lambda: (np.zeros(1), first))
     return arrival._replace(turnover=turnover, status=jnp.concatenate([first, arrival.status[1:]]))

@@ -4,6 +4,7 @@ from typing import Any
 
 from jounce.kinematics.advance import Arrival, advance
 from jounce.kinematics.side_by_side import SideBySide
+from jounce.mechanism.system import System
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
 
@@ -36,4 +37,10 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
         wanted,
         pose_type=pose_type,
         order=order,
+        with_turnover=finds_turnover(system),
     )
+
+
+def finds_turnover(system: System) -> bool:
+    """Tell whether the turnover of an instant is found with it; of many bodies it takes vectors of its own."""
+    return system.fronts is None

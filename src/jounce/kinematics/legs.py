@@ -20,9 +20,11 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, Pieces, SolvedState, advance, predictor
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.instant_program import finds_turnover
 from jounce.kinematics.kernels import LIBRARIES
 from jounce.kinematics.side_by_side import called
 from jounce.kinematics.status import Status
+from jounce.kinematics.turnover import turnover_at
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
@@ -166,7 +168,10 @@ def leg(
             first = np.arange(len(way.instant)) == 0
             lanes = way.known, way.away, way.instant, survey & first
             arrival = called(native, (system, tolerance, refine, wanted), lanes)
-            return arrival._replace(turnover=arrival.turnover[:1])
+            if finds_turnover(system):
+                return arrival._replace(turnover=arrival.turnover[:1])
+            there = partial(turnover_at, system, pose_type, arrival.coordinates, way.instant)
+            return arrival._replace(turnover=jax.lax.cond(survey, there, lambda: jnp.zeros(1)))
         return _batch(system, *way.known, way.away, way.instant, *settings, pose_type=pose_type, order=order)
 
     def going(state: Leg) -> Any:

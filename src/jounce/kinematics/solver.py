@@ -23,7 +23,6 @@ LONGEST_LEG = 32  # batches
 LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
 FEWEST_SIDE_BY_SIDE, MOST_SIDE_BY_SIDE = 64, 1024  # instants of a long grid in a call of machine code
 FEW_COLUMNS = 36  # of a Jacobian: of more, machine code of single values alone is too long to be fast
-MOST_COLUMNS = 1500  # of more, what a vector of instants has is in no cache: XLA takes fewer at a time
 LARGE = 64  # numbers of an array that stays in memory there
 NO_GRID = np.empty(0)
 
@@ -150,10 +149,7 @@ class Solver:
         outputs = tuple(np.zeros((self.order + 1, 1, group.instances, 1)) for group in system.outputs)
         instants = self.needed((still, outputs, nothing)), nothing, nothing, np.zeros(1, bool)
         kind = self.model.pose_type
-        size = system.shape[1]
-        if size > MOST_COLUMNS:
-            return None
-        small = size <= FEW_COLUMNS and not self.hasty
+        small = system.shape[1] <= FEW_COLUMNS and not self.hasty
         how = {"large": None if small else LARGE, "hasty": self.hasty}
         shared = system, tolerance, refine, wanted
         return advance_instant.program(shared, instants, **how, pose_type=kind, order=self.order)

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.jet import Jet
-from jounce.kinematics.factors import Factor
+from jounce.kinematics.factors import Factor, factored
 from jounce.kinematics.frontal import FrontalFactor
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
@@ -47,6 +47,15 @@ def turnover_of(
 
         return _of_products(product, system.shape[1])
     return _of_matrix(factor.applied_inverse(system.pattern.dense(slope)[..., 0] * system.row_scale))
+
+
+def turnover_at(
+    system: System, pose_type: type[Pose], coordinates: dict[str, Numbers], time: Float[Numbers, " batch"]
+) -> Float[Numbers, " 1"]:
+    """Return what `turnover_of` does, from the jets of the coordinates alone."""
+    first = {name: Jet(tuple(x[:2, ..., :1])) for name, x in coordinates.items()}
+    pose = pose_type.predicted_from(first, np.zeros(1))
+    return turnover_of(system, pose_type, first, factored(system, pose, Jet([time[None, :1]])), time)
 
 
 def turnovers_of(

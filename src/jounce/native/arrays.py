@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from jounce.native.code import Code, flat
-from jounce.native.scalars import MOST_LINES
 from jounce.native.values import Region, UnsupportedOperationError, Value
 
+MOST_CONSTANTS = 2**20  # of an array
 Values = np.ndarray  # of objects, each a Value
 Rule = Callable[[Code, Any, Sequence[Values]], Sequence[Values]]  # of an equation and its arguments; its results
 
@@ -26,10 +26,10 @@ def constants(code: Code, array: Any) -> Values:
     Raises
     ------
     UnsupportedOperationError
-        If there are more than lines of a program.
+        If there are too many.
     """
     array = np.asarray(array)
-    if array.size > MOST_LINES:
+    if array.size > MOST_CONSTANTS:
         raise UnsupportedOperationError(f"{array.size} constants")
     return filled(array.shape, [code.constant(number) for number in array.ravel()])
 

@@ -21,7 +21,7 @@ from jounce.native.values import Region, UnsupportedOperationError, kind_of
 from jounce.native.views import Array, Stored, contiguous
 
 MOST_MEMORY = 2**20  # bytes of the stack: threads have little
-MOST_HEAP = 2**28  # bytes elsewhere
+MOST_HEAP = 2**30  # bytes elsewhere
 _thread = threading.local()
 ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
 attributes #2 = { nounwind willreturn memory(none) "min-legal-vector-width"="512" "prefer-vector-width"="512" }
