@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.kinematics import Status, side_by_side, store as store_
+from jounce.kinematics import Status, legs, side_by_side, store as store_
 from jounce.kinematics.instant_program import advance_instant
 from jounce.kinematics.side_by_side import SideBySide
 from jounce.mechanism.builder import build
-from jounce.native import handler, machine
+from jounce.native import machine
 from jounce.native.modules import object_file
 from jounce.native.programs import Program
 from tests.kinematics.test_compilation import Shelf
@@ -187,32 +187,29 @@ def test_arrays_of_another_kind_are_refused(shared, lanes):
         code([np.asarray(x) for x in shared], [np.asarray(x) for x in lanes])
 
 
-def test_programs_of_xla_call_it():
-    prepared = fresh().program((2.0,), (np.arange(5.0),), times=3)
-    name = prepared.name
+def test_a_leg_without_code_of_its_own_is_left_to_xla_whole(monkeypatch):
+    """XLA cannot call the machine code of an instant."""
+    grid = np.linspace(0.0, 2.0, 5)
+    expected = jn.solve(four_bar(), grid)
+    wanted = []
 
-    @jax.jit
-    def program(x):
-        def again(_, y):
-            return side_by_side.called(name, (jnp.asarray(2.0),), (y,))["sum"]
+    def program(leaves, tree, static):
+        wanted.append(static["native"])
 
-        return jax.lax.fori_loop(0, 3, again, x)
+    monkeypatch.setattr(legs.leg._alone, "program", program)
+    found = jn.solve(four_bar(), grid)
+    assert wanted
+    assert None not in wanted
+    agree(found, expected)
 
-    x = np.arange(16.0)
-    np.testing.assert_array_equal(program(x), 2 * (2 * (2 * x + 3) + 3) + 3)
+
+def test_only_a_program_that_becomes_machine_code_calls_it():
+    name = fresh().program((2.0,), (np.arange(5.0),), times=3).name
+    lanes = np.arange(16.0)
+    with pytest.raises(Exception, match=name):
+        jax.jit(lambda x: side_by_side.called(name, (jnp.asarray(2.0),), (x,)))(lanes)
     with pytest.raises(ValueError, match="a vector has"):
         side_by_side.called(name, (jnp.asarray(2.0),), (jnp.zeros(1),))
-
-
-def test_an_interface_of_xla_that_is_not_known_is_left_alone(monkeypatch):
-    monkeypatch.setattr("jounce.native.programs.is_known", lambda: False)
-    prepared = SideBySide(lambda shared, lanes: shared[0] - lanes[0]).program((2.0,), (np.arange(5.0),))
-    assert prepared.name is None
-    np.testing.assert_array_equal(prepared((np.arange(5.0),)), 2 - np.arange(5.0))
-    handler.is_known.cache_clear()
-    monkeypatch.setattr("jax.ffi.include_dir", lambda: "nowhere")
-    assert not handler.is_known()
-    handler.is_known.cache_clear()
 
 
 def test_the_machine_code_of_a_motion_is_that_of_its_structure():

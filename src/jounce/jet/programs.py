@@ -63,7 +63,7 @@ class ProgramReader(abc.ABC):
         if name == "cond":
             return self._branches(operands[0], operands[1:], parameters["branches"])
         if name == "scan":
-            return self._unrolled(operands, parameters)
+            return self._unrolled(equation, operands)
         inner = inner_program(parameters)
         if name == "while" or inner is None:
             return self.applied(equation, operands)
@@ -80,9 +80,10 @@ class ProgramReader(abc.ABC):
 
         return [self.composed(selected, cases) for cases in outcomes]
 
-    def _unrolled(self, operands: list[Any], parameters: dict[str, Any]) -> list[Any]:
+    def _unrolled(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
         """Run a loop of known length step by step."""
-        inner, constants, carried = parameters["jaxpr"], parameters["num_consts"], parameters["num_carry"]
+        parameters, inner = equation.params, equation.params["jaxpr"]
+        constants, carried = sizes_of_scan(equation)
         fixed, carry = operands[:constants], operands[constants : constants + carried]
         sequences, collected = operands[constants + carried :], []
         steps = range(parameters["length"])
@@ -119,6 +120,21 @@ def only_adds(jaxpr: Any) -> bool:
         elif equation.primitive.name not in ADDITIVE | REARRANGING:
             return False
     return True
+
+
+def sizes_of_scan(equation: Any) -> tuple[int, int]:
+    """Return how many operands of a loop of known length are constants, and how many are carried from turn to turn.
+
+    Releases of JAX write this down in different ways. What is carried has one shape outside and inside the loop; what
+    is read or collected turn by turn has one axis more outside.
+    """
+    inner = equation.params["jaxpr"].jaxpr
+
+    def alike(outer: Sequence[Any], inside: Sequence[Any]) -> int:
+        return sum(x.aval.ndim == y.aval.ndim for x, y in zip(outer, inside, strict=True))
+
+    carried = alike(equation.outvars, inner.outvars)
+    return alike(equation.invars, inner.invars) - carried, carried
 
 
 def inner_program(parameters: dict[str, Any]) -> Any:

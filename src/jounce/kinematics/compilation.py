@@ -12,7 +12,7 @@ import threading
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cached_property, lru_cache, partial, update_wrapper
+from functools import cache, cached_property, partial, update_wrapper
 from typing import Any
 
 import jax
@@ -69,7 +69,7 @@ to do here, and one that moves reshapes to where its simplifier does not want th
 def compiler_options(without: Iterable[str] = (), *, narrow: bool = False) -> dict[str, Any] | None:
     """Return options that halve XLA's compile time of long chains of small operations, without making them slower.
 
-    They are private to XLA, and a release that does not know them refuses them: then there are none, as on a GPU.
+    They are private to XLA: those that a release does not know are left out. There are none on a GPU.
 
     Parameters
     ----------
@@ -79,10 +79,12 @@ def compiler_options(without: Iterable[str] = (), *, narrow: bool = False) -> di
         Whether arrays are so short that most of the time is that of calling operations: then LLVM need not do more
         than the first level of its optimisations, a fifth of the time in which a program is compiled.
     """
-    if not on_processor() or (options := _processor_options()) is None:
+    if not on_processor():
         return None
-    options = options | {"xla_disable_hlo_passes": ",".join((*UNENDING, *without))}
-    return options | {"xla_backend_optimization_level": 1} if narrow and not _level_is_set() else options
+    options = {"xla_cpu_use_fusion_emitters": False, "xla_disable_hlo_passes": ",".join((*UNENDING, *without))}
+    if narrow and not _level_is_set():
+        options["xla_backend_optimization_level"] = 1
+    return {name: value for name, value in options.items() if name in _known_options()} or None
 
 
 def _level_is_set() -> bool:
@@ -90,14 +92,21 @@ def _level_is_set() -> bool:
     return "xla_backend_optimization_level" in os.environ.get("XLA_FLAGS", "")
 
 
-@lru_cache(maxsize=1)
-def _processor_options() -> dict[str, Any] | None:
-    options = {"xla_cpu_use_fusion_emitters": False}
+@cache
+def _known_options() -> frozenset[str]:
+    """Return which of the options this release of XLA has; JAX 0.11, for one, came without the older emitters."""
+    options = {"xla_cpu_use_fusion_emitters": False, "xla_disable_hlo_passes": "", "xla_backend_optimization_level": 1}
+    if _are_known(options):
+        return frozenset(options)
+    return frozenset(name for name, value in options.items() if _are_known({name: value}))
+
+
+def _are_known(options: dict[str, Any]) -> bool:
     try:
         jax.jit(lambda: 0.0, compiler_options=options).lower().compile()
     except (RuntimeError, ValueError):  # jax.errors.JaxRuntimeError is a RuntimeError
-        return None
-    return options
+        return False
+    return True
 
 
 class Compiled:
@@ -121,6 +130,8 @@ class Compiled:
     alone : bool or callable, optional
         Whether machine code is better where there is a compiler for it, as `Alone` has it; or what tells that from the
         arguments.
+    otherwise : mapping of str to object, optional
+        Static arguments where there is none, in the place of those given.
     """
 
     def __init__(
@@ -133,11 +144,12 @@ class Compiled:
         narrow: bool = False,
         brief: bool = False,
         alone: Callable[..., bool] | bool = False,
+        otherwise: Mapping[str, Any] | None = None,
     ):
         self.function, self.static, self.made_of = function, static, made_of or (function,)
         self.without, self.narrow, self.brief = without, narrow, brief
         self._programs: dict[Any, Callable[..., Any]] = {}
-        self._suits_alone, self._alone = alone, Alone(function, self.made_of)
+        self._suits_alone, self._alone, self._otherwise = alone, Alone(function, self.made_of), dict(otherwise or {})
         self._names = tuple(inspect.signature(function).parameters)
         self._traced = min([self._names.index(name) for name in static], default=len(self._names))
         update_wrapper(self, function)
@@ -162,13 +174,15 @@ class Compiled:
         arguments = arguments[: self._traced]
         static = {name: keywords.pop(name) for name in self.static if name in keywords}
         leaves, tree = jax.tree.flatten((arguments, keywords))
-        if traced := [leaf for leaf in leaves if isinstance(leaf, Tracer)]:
-            whole = self.jitted if all(map(_runs_at_once, traced)) else self._within
-            return whole(*arguments, **keywords, **static)
-        suits = self._suits_alone
+        traced = [leaf for leaf in leaves if isinstance(leaf, Tracer)]
+        suits = self._suits_alone if not traced else False
         suits = suits if isinstance(suits, bool) else suits(*arguments, **keywords, **static)
         if suits and (code := self._alone.program(leaves, tree, static)) is not None:
             return code()
+        static |= self._otherwise
+        if traced:
+            whole = self.jitted if all(map(_runs_at_once, traced)) else self._within
+            return whole(*arguments, **keywords, **static)
         if (store := current_store()) is None:
             return self.jitted(*arguments, **keywords, **static)
         kinds = tuple(map(_kind, leaves))
@@ -184,7 +198,7 @@ class Compiled:
     def _level(self) -> int | None:
         """Return how much LLVM is to optimise, where that is less than it does otherwise."""
         hasty = self.brief and is_wanted_soon() and on_processor() and not _level_is_set()
-        return 0 if hasty and _processor_options() is not None else None
+        return 0 if hasty and "xla_backend_optimization_level" in _known_options() else None
 
     def _begun(
         self, store: Store, tree: Any, kinds: tuple[Any, ...], arguments: Any, keywords: Any, static: Mapping[str, Any]
@@ -273,18 +287,12 @@ def _runs_at_once(leaf: Tracer) -> bool:
     return kinds[-1:] == ["EvalTrace"] and {"JVPTrace", "BatchTrace"}.issuperset(kinds[:-1])
 
 
-@lru_cache(maxsize=1)
+@cache
 def _home() -> jax.sharding.Sharding:
     """Return where arrays are unless they were put elsewhere."""
     return jax.sharding.SingleDeviceSharding(jax.devices()[0])
 
 
-def compiled(
-    *static: str,
-    without: tuple[str, ...] = (),
-    narrow: bool = False,
-    brief: bool = False,
-    alone: Callable[..., bool] | bool = False,
-) -> Callable[[Callable[..., Any]], Compiled]:
+def compiled(*static: str, **how: Any) -> Callable[[Callable[..., Any]], Compiled]:
     """Compile the decorated function at its first call, with these static arguments, as `Compiled` has it."""
-    return lambda function: Compiled(function, static, without=without, narrow=narrow, brief=brief, alone=alone)
+    return lambda function: Compiled(function, static, **how)

@@ -129,7 +129,13 @@ def _calls_code(*_: Any, native: str | None, **__: Any) -> bool:
     return native is not None
 
 
-@compiled("pose_type", "order", "batches", "native", narrow=True, without=LIBRARIES, alone=_calls_code)
+@compiled(
+    *("pose_type", "order", "batches", "native"),
+    narrow=True,
+    without=LIBRARIES,
+    alone=_calls_code,
+    otherwise={"native": None},  # where there is no code for a leg, XLA has none to call
+)
 def leg(
     system: System,
     way: Way,
@@ -159,7 +165,7 @@ def leg(
     batches : int
         As many as there is room for.
     native : str, optional
-        Name of the machine code that solves a batch, see `advance_instant`; XLA's own does, unless it is given.
+        Name of the machine code that solves a batch, see `advance_instant`; unless it is given, the leg does.
     """
 
     def solved(way: Way) -> Any:

@@ -26,7 +26,7 @@ from jounce.native.scalars import MOST_LINES
 from jounce.native.values import UnsupportedOperationError
 from jounce.shapes import is_traced
 
-_registered: dict[str, Program] = {}  # by the names under which XLA calls them
+_published: dict[str, Program] = {}  # by the names under which other machine code calls them
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,19 +51,18 @@ class Prepared:
         return self.machine_code.relay(self.shared, leaves, kept, sources)
 
     @cached_property
-    def name(self) -> str | None:
-        """Name by which programs of XLA call it, as `called` has it; None if they cannot."""
+    def name(self) -> str:
+        """Name by which other machine code calls it, as `called` has it."""
         name = self.machine_code.name
-        if name not in _registered:
-            if not self.machine_code.register():
-                return None
-            _registered[name] = self.machine_code
+        if name not in _published:
+            self.machine_code.publish()
+            _published[name] = self.machine_code
         return name
 
 
 def called(name: str, shared: Any, lanes: Any) -> Any:
-    """Return the results of machine code as part of a program of XLA."""
-    return _registered[name].in_program(jax.tree.leaves(shared), jax.tree.leaves(lanes))
+    """Return the results of machine code as part of a program that becomes machine code, too."""
+    return _published[name].in_program(jax.tree.leaves(shared), jax.tree.leaves(lanes))
 
 
 class SideBySide:

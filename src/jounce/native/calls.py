@@ -12,7 +12,7 @@ from jounce.native.views import Array, Stored, contiguous
 
 
 def call(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
-    """Write a call of a program that is published, as JAX has it where XLA is to call it; its lanes are along axes.
+    """Write a call of a program that is published, from JAX's call of a foreign function; its lanes are along axes.
 
     Raises
     ------

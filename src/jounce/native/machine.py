@@ -100,7 +100,7 @@ def is_published(name: str) -> bool:
 
 
 class MachineCode:
-    """The functions `run`, `handle` and `relay` of an object file, in memory.
+    """The functions `run` and `relay` of an object file, in memory.
 
     Parameters
     ----------
@@ -115,10 +115,9 @@ class MachineCode:
             self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target())
             self._engine.add_object_file(binding.object_file.ObjectFileRef.from_data(binary))
             self._engine.finalize_object()
-            address, handler, relay = map(self._engine.get_function_address, ("run", "handle", "relay"))
+            address, relay = map(self._engine.get_function_address, ("run", "relay"))
         self._address = address
         self._run = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64)(address)
-        self.handler = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)(handler)  # for XLA
         addresses, numbers = [ctypes.c_void_p] * 2, [ctypes.c_int64] * 3
         self.relay = ctypes.CFUNCTYPE(None, *addresses, *numbers, *addresses, ctypes.c_int64)(relay)
 

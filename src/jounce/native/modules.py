@@ -11,7 +11,6 @@ import numpy as np
 from jounce.native import rows as rows_
 from jounce.native.arrays import constants
 from jounce.native.code import Code, flat
-from jounce.native.handler import handler_text
 from jounce.native.machine import compiled, vector_width
 from jounce.native.relays import relay_text
 from jounce.native.scalars import MOST_LINES
@@ -156,7 +155,7 @@ def _text(
     for name, count in sorted(code.functions):
         lines += [f"declare double @{name}({', '.join(['double'] * count)}) #0", _lane_by_lane(name, count, width)]
     if not alone:
-        lines += [handler_text(len(given), len(results), shared), relay_text(width)]
+        lines.append(relay_text(width))
     return "\n".join([*lines, ATTRIBUTES])
 
 

@@ -10,7 +10,6 @@ from typing import Any
 import jax
 import numpy as np
 
-from jounce.native.handler import is_known
 from jounce.native.machine import MachineCode, vector_width
 from jounce.native.relays import Column, Relay
 
@@ -179,16 +178,18 @@ class Program:
         groups = columns[:first], columns[first:second], columns[second:], kept
         return Relay(self._run.relay, shared, *groups, sources, self._width)
 
-    def register(self) -> bool:
-        """Make it known by its name, to XLA and to machine code, for `in_program`; tell whether that goes."""
-        if self._rows or not is_known():
-            return False
+    def publish(self) -> None:
+        """Make it known by its name to machine code, for `in_program`."""
+        if self._rows:
+            raise ValueError("instants are along the first axis")
         self._run.publish(self.name)
-        jax.ffi.register_ffi_target(self.name, jax.ffi.pycapsule(self._run.handler), platform="cpu")
-        return True
 
     def in_program(self, shared: Sequence[Any], lanes: Sequence[Any]) -> Any:
-        """Return the results as part of a program of JAX, for arguments as in a call; at least a vector of lanes."""
+        """Return the results as part of a program that becomes machine code, for arguments as in a call.
+
+        There is at least a vector of lanes. JAX's own call of foreign functions stands for this one (see
+        `calls.call`); XLA does not know the name.
+        """
         count = lanes[0].shape[-1]
         if count < self._width:
             raise ValueError(f"{count} lanes, where a vector has {self._width}")

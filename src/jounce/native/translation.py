@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from jax.extend.core import Literal, jaxprs_in_params
 
+from jounce.jet.programs import sizes_of_scan
 from jounce.native.arrays import constants, each, filled
 from jounce.native.calls import call
 from jounce.native.carried import Carried
@@ -254,8 +255,8 @@ def _regions(arrays: Sequence[Array]) -> dict[Region, None]:
 def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Write a loop of known length over the first axis of arrays."""
     p = equation.params
-    split = p["num_consts"], p["num_consts"] + p["num_carry"]
-    needed, start, rows = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
+    fixed, carried = sizes_of_scan(equation)
+    needed, start, rows = given[:fixed], given[fixed : fixed + carried], given[fixed + carried :]
     made = [variable.aval for variable in equation.outvars[len(start) :]]
     if p["length"] == 0:
         return [*start, *(np.empty(aval.shape, object) for aval in made)]
