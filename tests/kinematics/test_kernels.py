@@ -85,7 +85,7 @@ def test_nothing_is_marked_for_releases_that_were_not_tried(monkeypatch):
     assert not marked(halved(lambda x: 0.5 * jnp.sin(x)), jnp.ones(3))
 
 
-def test_all_that_is_given_is_one_argument_which_is_used():
+def test_all_that_is_given_is_one_argument_which_is_used(tried):
     """XLA ends the process over an argument that is without effect, as it does not find its memory."""
 
     def loop(argument):

@@ -344,8 +344,8 @@ class Problem:
 
     def state_after(self, h):
         """Return position and velocity at a time h later, by the series."""
-        position = [mp.polyval(n.c[::-1], h) for n in self.q]
-        velocity = [mp.polyval([k * c for k, c in enumerate(n.c)][:0:-1], h) for n in self.q]
+        position = [mp.fsum(c * h**k for k, c in enumerate(n.c)) for n in self.q]
+        velocity = [mp.fsum(k * c * h ** (k - 1) for k, c in enumerate(n.c) if k) for n in self.q]
         return position, velocity
 
     def integrate(self, stop, order, tolerance):

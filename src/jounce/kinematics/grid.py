@@ -150,8 +150,9 @@ class GridSolver:
 
     def _sources(self, lanes: Indices, neighbour: Indices, known: Bool[np.ndarray, " lane"]) -> Indices:
         """Return from where each instant is predicted: its neighbour, where that is known, or its nearest anchor."""
-        nearest = len(self.time) + nearest_instants(self._instants[len(self.time) :], self.time[lanes])
-        nearer = self._away(lanes, neighbour) <= self._away(lanes, nearest)
+        time = self.time[lanes]
+        nearest = len(self.time) + nearest_instants(self._instants[len(self.time) :], time)
+        nearer = np.abs(time - self._instants[neighbour]) <= np.abs(time - self._instants[nearest])
         return np.where(nearer & known, neighbour, nearest)
 
     def _solved(self, batch: tuple[Indices, Indices]) -> Arrival:
@@ -170,9 +171,6 @@ class GridSolver:
             self.faults[int(lanes[k])] = self.solver.fault(arrival, k)
             if arrival.status[k] not in PASSABLE:
                 self._rescue(int(lanes[k]))
-
-    def _away(self, lanes: Indices, source: Indices) -> Float[np.ndarray, " lane"]:
-        return np.abs(self.time[lanes] - self._instants[source])
 
     def _place_known(self, each: Callable[..., Iterable[None]]) -> None:
         """Put the anchors behind the instants, those solved on the way among them, and zeros where none is reached."""
