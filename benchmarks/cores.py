@@ -38,9 +38,10 @@ def _at_once(work: Callable[[], Any], threads: int) -> Callable[[], Any]:
 def cases(quick: bool) -> Cases:
     """Yield grids and batches; errors are how far results are from those of one core."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    instants, samples = (5_000, 5_000) if quick else (100_000, 100_000)
+    instants, longest, samples = (5_000, 10_000, 5_000) if quick else (100_000, 1_000_000, 100_000)
     works = {
         f"four-bar to jounce, {instants:,} instants": ("solve", ("four_bar", instants), instants),
+        f"four-bar to jounce, {longest:,} instants": ("solve", ("four_bar", longest), longest),
         f"RSUR to jounce, {instants:,} instants": ("solve", ("rsur", instants), instants),
         f"torque and two rates of the panda, {samples:,} samples": ("torques", (samples,), samples),
     }

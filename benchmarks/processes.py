@@ -84,6 +84,9 @@ class Worker:
 
 
 def _serve(connection: Connection, task: str, arguments: Any, environment: dict[str, str], cores: int | None) -> None:
+    if environment and "jax" in sys.modules:  # by what starts the process, which begins with its imports
+        connection.send(f"JAX is imported already, and heeds {', '.join(environment)} no more")
+        return
     os.environ.update(environment)
     if cores is not None and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-cores:])

@@ -2,12 +2,12 @@
 
 A long grid is not solved one instant after another. The instants start from their nearest anchor, in levels that halve
 the spacing, so that most are predicted to rounding by an instant solved before and all of a level are solved together.
-Machine code takes them up in another order, from the same neighbours (see `rounds`): what it tells to have failed is
+Machine code takes them up in another order, from the same neighbours (see `spans`): what it tells to have failed is
 solved in levels again. Between two anchors lies no singular position, so that the sign of the determinant tells an
 instant on another branch.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import jax
@@ -22,15 +22,14 @@ from jounce.kinematics.path_following import (
     Passage,
     follow,
 )
-from jounce.kinematics.rounds import Part, phases
 from jounce.kinematics.solver import SMALL_BATCH, Solver
+from jounce.kinematics.spans import solve_spans, spans_of
 from jounce.kinematics.status import Status
 from jounce.kinematics.threads import Threads
 from jounce.mechanism.time import nearest_instants
 
 Indices = Int[np.ndarray, " lane"]
 LONG_GRID = 1024  # instants: from here on in large batches
-LINKED = 2**15  # instants of which a thread looks for the sources at once, at most
 FEW_BATCHES = 4  # of instants: no level of its own for each halving of the spacing
 
 
@@ -79,7 +78,7 @@ class GridSolver:
         if count > LONG_GRID:
             width, most = self.solver.width, self.solver.together // self.solver.width
         left = self._reached & (self.status != Status.OK)
-        stride = _stride(left, len(self._anchors), width)
+        stride = stride_of(self.solver, int(np.count_nonzero(left)), count, len(self._anchors))
         done = count - int(np.count_nonzero(left))
 
         def tell(solved: int) -> None:
@@ -88,11 +87,12 @@ class GridSolver:
             if progress is not None:
                 progress(done, count)
 
-        in_rounds = count > LONG_GRID and self.solver.is_compiled
-        with Threads(threads, compiled=in_rounds) as pool:
-            self._place_known(pool.map if in_rounds else map)
-            if in_rounds:
-                left = self._in_rounds(left, stride, pool, tell)
+        in_spans = count > LONG_GRID and self.solver.is_compiled
+        with Threads(threads, compiled=in_spans) as pool:
+            if in_spans:
+                left = self._in_spans(left, stride, pool, tell)
+            if self.path.on_the_way or left.any() or not self._reached.all():
+                self._place_known()
             for lanes, distance in _levels(left, stride):
                 neighbour = lanes - distance
                 known = (self.status[neighbour] == Status.OK) & (distance > 0)
@@ -111,37 +111,17 @@ class GridSolver:
         if progress is not None and done < count:
             progress(count, count)
 
-    def _in_rounds(
+    def _in_spans(
         self, left: Bool[np.ndarray, " time"], stride: int, pool: Threads, tell: Callable[[int], None]
     ) -> Bool[np.ndarray, " time"]:
-        """Solve instants in rounds of machine code; return what is left: those that failed, and what starts from them.
+        """Solve instants by machine code; return what is left: those that failed, and what starts from them.
 
         Nothing is known of a failure but that there is one, so that these are solved once more, level after level.
         """
         count = int(np.count_nonzero(left))  # a long grid is reached up to some instant, and nothing is solved yet
-        if count == 0:
-            return left
-        source, step = np.empty(count, np.int64), np.empty(count)
-        size = min(LINKED, -(-count // pool.count))
-
-        def link(first: int) -> None:
-            lanes = np.arange(first, min(first + size, count))
-            here = slice(first, first + len(lanes))
-            source[here] = self._sources(lanes, lanes & (lanes - 1), lanes & (stride - 1) > 0)
-            step[here] = self.time[here] - self._instants[source[here]]
-
-        for _ in pool.map(link, range(0, count, size)):
-            pass
-        relay = self.solver.relay(self._store, step, self.time[:count], self.status[:count], source)
-
-        def solve(part: Part) -> int:
-            rounds = part.rounds(relay.width, count)
-            relay(rounds)
-            return rounds.size
-
-        for parts in phases(count, stride, relay.width, pool.count):
-            for solved in pool.map(solve, parts):
-                tell(solved)
+        spans = spans_of(0, count, stride, self.solver.lanes)
+        for solved in solve_spans(self.solver, self.path, self.time, spans, (self._store, self.status), pool.map):
+            tell(solved)
         failed = left & (self.status != Status.OK)
         if failed.any():
             for lanes, distance in _levels(left, stride):
@@ -172,18 +152,15 @@ class GridSolver:
             if arrival.status[k] not in PASSABLE:
                 self._rescue(int(lanes[k]))
 
-    def _place_known(self, each: Callable[..., Iterable[None]]) -> None:
+    def _place_known(self) -> None:
         """Put the anchors behind the instants, those solved on the way among them, and zeros where none is reached."""
         count, reached = len(self.time), int(np.count_nonzero(self._reached))
 
-        def place(arrays: tuple[np.ndarray, ...]) -> None:
-            whole, *parts = arrays
+        def place(whole: np.ndarray, *parts: np.ndarray) -> None:
             whole[..., reached:count] = 0
             whole[..., count : len(self._instants)] = np.concatenate(parts, axis=-1)
 
-        states = self._store, *(anchor.state for anchor in self._anchors)
-        for _ in each(place, zip(*map(jax.tree.leaves, states), strict=True)):
-            pass
+        jax.tree.map(place, self._store, *(anchor.state for anchor in self._anchors))
         for lanes, state in self.path.on_the_way:
             self._keep(lanes, state)
 
@@ -261,14 +238,21 @@ def _slice_of(indices: Indices) -> slice | Indices:
     return indices
 
 
-def _stride(left: Bool[np.ndarray, " time"], anchors: int, width: int) -> int:
+def stride_of(solver: Solver, left: int, count: int, anchors: int) -> int:
     """Return how far apart the instants of the first level are, which start from the anchors, a power of two.
 
-    They fill at least one batch. Where few instants are left, they are all of the first level.
+    Parameters
+    ----------
+    solver : Solver
+        What solves them.
+    left, count : int
+        How many of a grid are to be solved, and how many there are.
+    anchors : int
+        From how many. They fill at least one batch. Where few instants are left, they are all of the first level.
     """
-    count, stride = len(left), 1
-    if np.count_nonzero(left) > FEW_BATCHES * width:
-        while count // (2 * stride) >= max(2 * anchors, width):
+    width, stride = solver.width if count > LONG_GRID else SMALL_BATCH, 1
+    if left > FEW_BATCHES * width:
+        while count // (2 * stride) >= max(2 * anchors, width) and 2 * stride <= solver.longest_stride:
             stride *= 2
     return stride
 

@@ -1,15 +1,20 @@
 """Time grids of any length, solved stretch by stretch, so that no more is kept of each than what is asked for."""
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable, Collection, Iterator
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.kinematics.grid import GridSolver, room_for
+from jounce.kinematics.change_points import half_width, spoiled_width
+from jounce.kinematics.grid import LONG_GRID, GridSolver, room_for, stride_of
 from jounce.kinematics.path_following import FollowedPath
 from jounce.kinematics.solver import Solver
+from jounce.kinematics.spans import solve_spans, spans_of
+from jounce.kinematics.status import Status
+from jounce.kinematics.threads import Threads
 from jounce.mechanism.time import Instants
 
 STRETCH = 2**16  # instants
@@ -64,8 +69,10 @@ def solve_grid(
     kept = len(time) <= STRETCH if keep is None else keep
     status, faults = np.empty(len(time), int), {}
     store = None if len(time) <= STRETCH else _Store(path, len(time), kept=kept)
+    tell = None if progress is None else _rising(progress)
+    solved = frozenset() if store is None else _solved_at_once(solver, path, time, tell, threads, (store, status))
     state: Any = None
-    for first, part in stretches(solver, path, time, progress, threads, store):
+    for first, part in stretches(solver, path, time, tell, threads, store, solved):
         status[first : first + len(part.time)] = part.status
         faults |= {first + lane: fault for lane, fault in part.faults.items()}
         state = part.state
@@ -73,6 +80,51 @@ def solve_grid(
     if kept:
         return Solved(coordinates, outputs, status, faults)
     return Solved(lambda: _coordinates(solver, path, time, threads), outputs, status, faults)
+
+
+def _rising(progress: Callable[[int, int], None]) -> Callable[[int, int], None]:
+    """Return what tells the progress, where some instants may be solved twice: it never goes back."""
+    furthest = 0
+
+    def tell(done: int, total: int) -> None:
+        nonlocal furthest
+        furthest = max(furthest, done)
+        progress(furthest, total)
+
+    return tell
+
+
+def _solved_at_once(
+    solver: Solver,
+    path: FollowedPath,
+    time: Float[np.ndarray, " time"],
+    progress: Callable[[int, int], None] | None,
+    threads: int,
+    results: "tuple[_Store, Int[np.ndarray, ' time']]",
+) -> frozenset[int]:
+    """Solve all stretches in which nothing out of the ordinary is known, so that no thread waits at the end of one.
+
+    Returns the first instants of those in which all are OK; the others are still to be solved, one after another.
+    """
+    (store, status), spans = results, {}
+    if not solver.is_compiled or path.on_the_way:
+        return frozenset()
+    points = [(point, half_width(point, solver.order)) for point in path.change_points]
+    points += [(point, spoiled_width(point, solver.order)) for point in path.singular_positions_outside()]
+    for first in range(0, len(time), STRETCH):
+        here = time[first : first + STRETCH]
+        begin, end, count = here[0], here[-1], len(here)
+        near = any(begin - width < point.instant < end + width for point, width in points)
+        if count > LONG_GRID and end < path.ended_at and not near:
+            stride = stride_of(solver, count, count, len(path.anchors_around(begin, end)))
+            spans[first] = spans_of(first, count, stride, solver.lanes)
+    done, wanted = 0, itertools.chain(*spans.values())
+    with Threads(threads, compiled=True) as pool:
+        for solved in solve_spans(solver, path, time, [*wanted], (store.kept, status), pool.map):
+            done += solved
+            if progress is not None:
+                progress(done, len(time))
+    return frozenset(first for first in spans if np.all(status[first : first + STRETCH] == Status.OK))
 
 
 class _Store:
@@ -92,6 +144,12 @@ class _Store:
         begins = first if self._kept else 0, first, 0
         parts = zip(self._arrays, begins, strict=True)
         return tuple(jax.tree.map(lambda x, begin=begin: x[..., begin:], part) for part, begin in parts)
+
+    @property
+    def kept(self) -> Any:
+        """The arrays of all instants: of coordinates, if they are kept, and of outputs; None for what is not kept."""
+        coordinates, outputs, _ = self._arrays
+        return coordinates if self._kept else dict.fromkeys(coordinates), outputs, None
 
     @property
     def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:
@@ -115,12 +173,16 @@ def stretches(
     progress: Callable[[int, int], None] | None,
     threads: int,
     store: _Store | None = None,
+    without: Collection[int] = (),
 ) -> Iterator[tuple[int, GridSolver]]:
     """Yield the stretches of a grid one after another, solved, with the index of their first instant.
 
-    Their states go into a store, unless each has arrays of its own.
+    Their states go into a store, unless each has arrays of its own. Those that are solved already are left out, by
+    their first instants.
     """
     for first in range(0, len(time), STRETCH):
+        if first in without:
+            continue
 
         def told(done: int, _: int, first: int = first) -> None:
             if progress is not None:

@@ -1,7 +1,7 @@
 """The result of a solve: outputs and any point of any body, with their derivatives, at every instant."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from jounce.jet.algebra import stacked
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
 from jounce.kinematics.compilation import compiled
+from jounce.kinematics.on_demand import OnDemand
 from jounce.kinematics.path_following import Passage
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
@@ -226,20 +227,23 @@ class Motion(Displayed):
         return f"<Motion {title}{solved} of {len(self.time)} instants solved, order {self.order}>"
 
     @cached_property
-    def outputs(self) -> dict[str, Any]:
+    def outputs(self) -> Mapping[str, Any]:
         """Outputs by name: arrays of shape (time, order + 1) or (time, order + 1, component), SI.
 
-        The nine components of a rotation matrix stand row by row.
+        The nine components of a rotation matrix stand row by row. An output is computed when it is first asked for.
         """
-        found = {}
-        for (names, coefficients), group in zip(self._groups.items(), self.model.system.outputs, strict=True):
-            coefficients = self._continued(group, coefficients)
-            for k, name in enumerate(names):
-                found[name] = self._derivatives(coefficients[:, :, k])
-        for name, output in self.mechanism.outputs.items():
-            if isinstance(output, AbstractMotionOutput):
-                found[name] = self._derivatives(output.coefficients(self))
-        return {name: found[name] for name in self.mechanism.outputs}
+        found = OnDemand(self.mechanism.outputs, self._outputs_with)
+        return dict(found) if self.traced else found  # what JAX traces is a plain tree
+
+    def _outputs_with(self, name: str) -> dict[str, Any]:
+        """Return an output, and those that are found with it."""
+        output = self.mechanism.outputs[name]
+        if isinstance(output, AbstractMotionOutput):
+            return {name: self._derivatives(output.coefficients(self))}
+        groups = zip(self._groups.items(), self.model.system.outputs, strict=True)
+        ((names, coefficients), group) = next(found for found in groups if name in found[0][0])
+        coefficients = self._continued(group, coefficients)
+        return {other: self._derivatives(coefficients[:, :, k]) for k, other in enumerate(names)}
 
     @cached_property
     def dataset(self) -> "xarray.Dataset":

@@ -50,6 +50,11 @@ class Prepared:
         kept = jax.tree.leaves(results, is_leaf=lambda x: x is None)
         return self.machine_code.relay(self.shared, leaves, kept, sources)
 
+    @property
+    def lanes(self) -> int:
+        """How many instants a vector holds."""
+        return self.machine_code.width
+
     @cached_property
     def name(self) -> str:
         """Name by which other machine code calls it, as `called` has it."""

@@ -1,6 +1,7 @@
 """A mechanism with the settings under which it is solved: what turns known neighbours into solved instants."""
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
@@ -16,6 +17,7 @@ from jounce.kinematics.side_by_side import Prepared
 from jounce.kinematics.status import Status
 from jounce.kinematics.wide_batches import CALL_ENTRIES, advance_in_lots, lot_width, lots_in_a_call
 from jounce.mechanism import Model
+from jounce.mechanism.time import MAX_INSTANTS
 from jounce.native.relays import Relay
 
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
@@ -132,6 +134,19 @@ class Solver:
     def width(self) -> int:
         """How many instants of a long grid are solved side by side at least."""
         return lot_width(self.model.system) if self._native is None else FEWEST_SIDE_BY_SIDE
+
+    @property
+    def lanes(self) -> int:
+        """How many instants the vectors of machine code hold; only where solving `is_compiled`."""
+        assert self._native is not None
+        return self._native.lanes
+
+    @cached_property
+    def longest_stride(self) -> int:
+        """How far apart instants of a long grid that start from anchors are at most: the cache holds what is between."""
+        if self._native is None:
+            return MAX_INSTANTS
+        return 2 ** int(math.log2(max(1, CALL_ENTRIES // (self._entries * self.lanes))))
 
     @cached_property
     def together(self) -> int:

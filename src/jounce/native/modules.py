@@ -21,6 +21,7 @@ from jounce.native.views import Array, Stored, contiguous
 
 MOST_MEMORY = 2**20  # bytes of the stack: threads have little
 MOST_HEAP = 2**30  # bytes elsewhere
+TRIED = (0, 10), (0, 11)  # releases of JAX: another one may say otherwise what an operation is to do
 _thread = threading.local()
 ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
 attributes #2 = { nounwind willreturn memory(none) "min-legal-vector-width"="512" "prefer-vector-width"="512" }
@@ -66,11 +67,16 @@ def object_file(
     Raises
     ------
     UnsupportedOperationError
-        Where there is no code for it, or too much.
+        Where there is no code for it, or too much; or a release of JAX that was not tried writes it otherwise.
     """
     count, options = len(jax.tree.leaves(shared)), {"most_lines": most_lines, "large": large, "alone": alone}
     closed, results = jax.make_jaxpr(function, return_shape=True)(shared, lanes)
-    text = _text(closed, count, known, vector_width(), rows=rows, **options)
+    try:
+        text = _text(closed, count, known, vector_width(), rows=rows, **options)
+    except (AttributeError, KeyError, TypeError) as failure:  # of what JAX says of an operation, under another name
+        if jax.__version_info__[:2] in TRIED:
+            raise
+        raise UnsupportedOperationError(f"JAX {jax.__version__}, which was not tried: {failure!r}") from failure
     getattr(_thread, "written", lambda: None)()
     return compiled(text, hasty=hasty), results
 

@@ -104,7 +104,7 @@ class Program:
         self._lanes = [(x.shape[:-1], x.dtype) for x in lanes]
         leaves, self._structure = jax.tree.flatten(results)
         self._results = [(leaf.shape[:-1], leaf.dtype) for leaf in leaves]
-        self._width, self._rows = vector_width(), rows
+        self.width, self._rows = vector_width(), rows
 
     def __call__(
         self, shared: Sequence[np.ndarray], lanes: Sequence[np.ndarray], parts: int = 1, each: Callable[..., Any] = map
@@ -122,7 +122,7 @@ class Program:
         """
         axis = 0 if self._rows else -1
         count = lanes[0].shape[axis]
-        total = max(count, self._width)
+        total = max(count, self.width)
         self._check(shared, lanes, count)
         if total > count:
             lanes = [_filled(x, total, axis) for x in lanes]
@@ -133,11 +133,11 @@ class Program:
         self._layout.put(memory, shared)
         arrays = [*given, *found]
         addresses = [*(self._layout.places + _address(memory)).tolist(), *map(_address, arrays)]
-        if not self._rows or (vectors := total // self._width) < 2 or parts == 1:
+        if not self._rows or (vectors := total // self.width) < 2 or parts == 1:
             self._run((ctypes.c_void_p * len(addresses))(*addresses), total)
         else:
             steps = [0] * len(shared) + [x.strides[0] for x in arrays]
-            ends = [vectors * k // parts * self._width for k in range(parts)] + [total]
+            ends = [vectors * k // parts * self.width for k in range(parts)] + [total]
 
             def run(part: int) -> None:
                 start, stop = ends[part : part + 2]
@@ -176,7 +176,7 @@ class Program:
         first, second = itertools.accumulate(map(len, lanes[:2]))
         kept = [Column(*kind, x) for kind, x in zip(self._results, results, strict=True)]
         groups = columns[:first], columns[first:second], columns[second:], kept
-        return Relay(self._run.relay, shared, *groups, sources, self._width)
+        return Relay(self._run.relay, shared, *groups, sources, self.width)
 
     def publish(self) -> None:
         """Make it known by its name to machine code, for `in_program`."""
@@ -191,8 +191,8 @@ class Program:
         `calls.call`); XLA does not know the name.
         """
         count = lanes[0].shape[-1]
-        if count < self._width:
-            raise ValueError(f"{count} lanes, where a vector has {self._width}")
+        if count < self.width:
+            raise ValueError(f"{count} lanes, where a vector has {self.width}")
         self._check(shared, lanes, count)
         shapes = [jax.ShapeDtypeStruct((*shape, count), dtype) for shape, dtype in self._results]
         return jax.tree.unflatten(self._structure, jax.ffi.ffi_call(self.name, shapes)(*shared, *lanes))

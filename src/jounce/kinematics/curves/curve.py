@@ -3,6 +3,7 @@
 import bisect
 import dataclasses
 import itertools
+from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -355,7 +356,7 @@ class Curve(Displayed):
         return np.concatenate(found)
 
     @cached_property
-    def outputs(self) -> dict[str, np.ndarray]:
+    def outputs(self) -> Mapping[str, np.ndarray]:
         """Outputs by name and their derivatives with respect to arc length: (point, derivative) or with components."""
         return self._motion.outputs
 

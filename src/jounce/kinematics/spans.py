@@ -1,0 +1,163 @@
+"""Spans of a long grid, each solved by machine code from the anchors of a motion alone: in any order, in any thread.
+
+An instant is predicted from the one whose index is its own with the last binary one set to zero, unless it is a
+multiple of a stride, a power of two, and starts from an anchor; or from the anchor, where that is nearer. So the
+instants from a multiple of the stride up to the next one start from nothing beyond it. A span is as many of these as a
+vector has lanes. Its instants are solved in rounds, of as many as there are lanes, in the memory of a thread, which
+stays in the cache; what is wanted of them is copied out of it.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.kinematics.path_following import Anchor, FollowedPath
+from jounce.kinematics.solver import Solver
+from jounce.mechanism.time import nearest_instants
+
+GROUP = 64  # instants that a lane takes up one after another, once all multiples of so many are solved
+
+
+class Span(NamedTuple):
+    """Instants of a grid that start from nothing but anchors and one another.
+
+    Attributes
+    ----------
+    first, count : int
+        The index of the first one, and how many there are.
+    stride : int
+        How far apart those are that start from anchors.
+    """
+
+    first: int
+    count: int
+    stride: int
+
+    @property
+    def place(self) -> slice:
+        """Where they are in arrays of all instants."""
+        return slice(self.first, self.first + self.count)
+
+
+def spans_of(first: int, count: int, stride: int, width: int) -> list[Span]:
+    """Return the spans of so many instants of a grid from an index on, for vectors of a width."""
+    size = stride * width
+    return [Span(first + k, min(size, count - k), stride) for k in range(0, count, size)]
+
+
+@lru_cache(maxsize=16)
+def rounds(count: int, stride: int, width: int) -> Int[np.ndarray, "round lane"]:
+    """Return the instants of a span in the order in which they are solved, by their indices in it.
+
+    Multiples of `GROUP` come first, as what the others start from. Where lanes lie beyond the span, the first of their
+    round is solved again.
+    """
+    group = min(GROUP, stride)
+    found = [np.empty((0, width), np.int64)]
+    for turns, members, apart in ((range(stride // group), stride // group, group), (range(1, group), group, 1)):
+        lanes = np.arange(width) * (members * apart)
+        block = np.array(turns, np.int64)[:, None] * apart + lanes
+        starts = np.arange(0, count, members * apart * width)
+        found.append((starts[:, None, None] + block).reshape(-1, width))
+    whole = np.concatenate(found)
+    whole = whole[whole[:, 0] < count]
+    return np.where(whole < count, whole, whole[:, :1])
+
+
+@lru_cache(maxsize=16)
+def _neighbours(count: int, stride: int) -> tuple[Int[np.ndarray, " lane"], Bool[np.ndarray, " lane"]]:
+    """Return the neighbour of each instant of a span, and whether it is solved before."""
+    lanes = np.arange(count)
+    return lanes & (lanes - 1), lanes & (stride - 1) > 0
+
+
+class _Room:
+    """The memory of a thread, for one span after another, with the anchors that they start from behind them.
+
+    Parameters
+    ----------
+    solver : Solver
+        Whose machine code solves the instants.
+    like : tuple
+        The state of an anchor.
+    size, anchors : int
+        The most instants and anchors that it is for.
+    """
+
+    def __init__(self, solver: Solver, like: Any, size: int, anchors: int):
+        self.state = jax.tree.map(lambda x: np.empty((*x.shape[:-1], size + anchors)), like)
+        self.status, self._size = np.empty(size, int), size
+        self._time, self._step, self._source = np.empty(size), np.empty(size), np.zeros(size, np.int64)
+        self._relay = solver.relay(self.state, self._step, self._time, self.status, self._source)
+        self.leaves = jax.tree.leaves(self.state)
+
+    def solve(self, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
+        """Solve the instants of a span, s, from the anchors around it."""
+        count = len(time)
+        parts = zip(*(jax.tree.leaves(anchor.state) for anchor in anchors), strict=True)
+        for whole, columns in zip(self.leaves, parts, strict=True):
+            np.concatenate(columns, axis=-1, out=whole[..., self._size : self._size + len(anchors)])
+        neighbour, known = _neighbours(count, stride)
+        instants = np.array([anchor.instant for anchor in anchors])
+        nearest = nearest_instants(instants, time)
+        to_neighbour, to_anchor = time - time[neighbour], time - instants[nearest]
+        near = known & (np.abs(to_neighbour) <= np.abs(to_anchor))
+        self._time[:count] = time
+        self._source[:count] = np.where(near, neighbour, self._size + nearest)
+        self._step[:count] = np.where(near, to_neighbour, to_anchor)
+        self._relay(rounds(count, stride, self._relay.width))
+
+
+def solve_spans(
+    solver: Solver,
+    path: FollowedPath,
+    time: Float[np.ndarray, " time"],
+    spans: Sequence[Span],
+    results: tuple[Any, Int[np.ndarray, " time"]],
+    each: Callable[[Callable[[Span], int], Iterable[Span]], Iterator[int]],
+) -> Iterator[int]:
+    """Solve spans of a grid, and yield how many instants each of them has.
+
+    Nothing is known of an instant that failed but that it did.
+
+    Parameters
+    ----------
+    solver : Solver
+        Whose solving `is_compiled`.
+    path : FollowedPath
+        The motion, followed to all these instants.
+    time : array of shape (time,)
+        All instants, s.
+    spans : sequence of Span
+        Those to solve.
+    results : tuple
+        Where the states go, jets of all instants, time last, as in an anchor's, with None in the place of what nobody
+        wants; and where the outcome of each instant goes.
+    each : callable
+        In the manner of `map`; it may call from several threads at once.
+    """
+    state, status = results
+    wanted = jax.tree.flatten(state, is_leaf=lambda x: x is None)[0]
+    size = max(span.count for span in spans) if spans else 0
+    around = {span: path.anchors_around(time[span.first], time[span.first + span.count - 1]) for span in spans}
+    most = max(map(len, around.values()), default=0)
+    rooms: list[_Room] = []  # those of threads that are between two spans
+
+    def solve(span: Span) -> int:
+        try:
+            room = rooms.pop()
+        except IndexError:
+            room = _Room(solver, path.anchors[0].state, size, most)
+        room.solve(time[span.place], around[span], span.stride)
+        for whole, part in zip(wanted, room.leaves, strict=True):
+            if whole is not None:
+                whole[..., span.place] = part[..., : span.count]
+        status[span.place] = room.status[: span.count]
+        rooms.append(room)
+        return span.count
+
+    return each(solve, spans)

@@ -1,0 +1,157 @@
+"""Spans of a grid: each instant once, after what it starts from; the same motion to the bit as level after level."""
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.kinematics import Status, grid, long_grids, spans
+from jounce.kinematics.spans import rounds, spans_of
+from jounce.native.machine import is_usable
+from tests.problems.small import four_bar, slider_crank
+
+needs_machine_code = pytest.mark.skipif(
+    not is_usable(), reason="there is no compiler, or a system where it was not tried"
+)
+
+
+@pytest.fixture(autouse=True)
+def _wanted(monkeypatch):
+    monkeypatch.delenv("JOUNCE_NATIVE", raising=False)  # as where all tests run without machine code
+
+
+@pytest.mark.parametrize("width", [2, 4, 8])
+@pytest.mark.parametrize("stride", [1, 2, 8, 64, 256])
+@pytest.mark.parametrize("count", [1, 7, 64, 65, 1025, 3000, 20_000])
+def test_each_instant_comes_after_what_it_starts_from(count, stride, width):
+    solved = np.zeros(count, bool)
+    for span in spans_of(0, count, stride, width):
+        seen = np.zeros(count, bool)  # what other spans solve, it cannot count on
+        for lanes in span.first + rounds(span.count, stride, width):
+            sources = (lanes & (lanes - 1))[lanes % stride != 0]
+            assert seen[sources].all()
+            assert not solved[lanes].any()
+            seen[lanes] = True
+        assert seen[span.place].all()
+        assert seen.sum() == span.count
+        solved |= seen
+    assert solved.all()
+
+
+def test_lanes_beyond_a_span_solve_the_first_one_again():
+    np.testing.assert_array_equal(rounds(5, 2, 4), [[0, 2, 4, 0], [1, 3, 1, 1]])
+
+
+def everything(motion):
+    return [*motion.outputs.values(), *(motion.poses[1][name] for name in sorted(motion.poses[1])), motion.status]
+
+
+def assert_same(one, other):
+    for found, expected in zip(everything(one), everything(other), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    assert one.faults == other.faults
+
+
+def level_after_level(monkeypatch, mechanism, time, **given):
+    """The motion of machine code without rounds."""
+    with monkeypatch.context() as patch:
+        patch.setattr(grid.GridSolver, "_in_spans", lambda self, left, *_: left)
+        return jn.solve(mechanism, time, **given, strict=False, threads=1)
+
+
+@needs_machine_code
+@pytest.mark.parametrize("order", [0, 4, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [1025, 4097])
+def test_motions_are_those_of_levels(monkeypatch, count, order):
+    time = np.linspace(0, 2, count)
+    expected = level_after_level(monkeypatch, four_bar(), time, order=order)
+    for threads in (1, 2):
+        assert_same(jn.solve(four_bar(), time, order=order, threads=threads), expected)
+
+
+FAILING = {
+    "a dead point": four_bar(motion="30*deg + 3*t", AB=0.12),
+    "a law out of its range": slider_crank("3.8 - 2*t"),
+    "change points": slider_crank("4 - 0.5*cos(t)**2"),
+    "an output without a derivative": slider_crank("4 - 0.4*abs(t - 1)**2.5"),
+}
+
+
+@needs_machine_code
+@pytest.mark.parametrize("keep", [True, False])
+@pytest.mark.parametrize("name", FAILING)
+def test_failures_are_those_of_levels(monkeypatch, name, keep):
+    time = np.linspace(0, 2, 2049)
+    expected = level_after_level(monkeypatch, FAILING[name], time, order=3, keep=keep)
+    found = jn.solve(FAILING[name], time, order=3, keep=keep, strict=False, threads=2)
+    assert_same(found, expected)
+
+
+@needs_machine_code
+def test_instants_that_start_from_failures_are_solved_again(monkeypatch):
+    """Where machine code tells that some instants failed, they and what starts from them go level after level."""
+    time, again = np.linspace(0, 2, 3001), []
+    expected = jn.solve(four_bar(), time)
+    in_spans, solve = grid.GridSolver._in_spans, spans._Room.solve
+
+    def spoiling(room, instants, *given):
+        solve(room, instants, *given)
+        if instants[0] == 0.0:
+            room.status[64], room.state[0]["angle"][..., 64] = Status.NOT_CONVERGED, np.nan
+
+    def told(self, *given):
+        again.append(in_spans(self, *given))
+        return again[-1]
+
+    monkeypatch.setattr(spans._Room, "solve", spoiling)
+    monkeypatch.setattr(grid.GridSolver, "_in_spans", told)
+    assert_same(jn.solve(four_bar(), time, threads=1), expected)
+    np.testing.assert_array_equal(np.flatnonzero(again[0]), np.arange(64, 96))
+
+
+@needs_machine_code
+def test_progress_never_goes_back_and_ends_with_all():
+    told = []
+    motion = jn.solve(
+        FAILING["a dead point"], np.linspace(0, 2, 5000), strict=False, progress=lambda *x: told.append(x)
+    )
+    assert (motion.status != Status.OK).any()
+    assert told == sorted(told)
+    assert told[-1] == (5000, 5000)
+
+
+@needs_machine_code
+@pytest.mark.parametrize("keep", [True, False])
+@pytest.mark.parametrize("name", ["nothing", *FAILING])
+def test_stretches_solved_at_once_are_those_solved_one_after_another(monkeypatch, name, keep):
+    mechanism, time, solved = FAILING.get(name, four_bar()), np.linspace(0, 2, 5000), []
+    monkeypatch.setattr(long_grids, "STRETCH", 1100)
+    with monkeypatch.context() as patch:
+        patch.setattr(long_grids, "_solved_at_once", lambda *_: frozenset())
+        expected = jn.solve(mechanism, time, order=3, keep=keep, strict=False)
+    at_once = long_grids._solved_at_once
+    monkeypatch.setattr(long_grids, "_solved_at_once", lambda *given: solved.append(at_once(*given)) or solved[-1])
+    assert_same(jn.solve(mechanism, time, order=3, keep=keep, strict=False, threads=2), expected)
+    firsts = range(0, 4400, 1100)  # the last stretch is a short grid
+    fine = {first for first in firsts if np.all(expected.status[first : first + 1100] == Status.OK)}
+    assert solved[0] < fine if name == "change points" else solved[0] == fine
+
+
+@needs_machine_code
+def test_a_stretch_in_which_some_instant_fails_is_solved_again(monkeypatch):
+    """Of what machine code tells to have failed nothing is kept, and progress does not go back."""
+    time, told, spoiled = np.linspace(0, 2, 4400), [], []
+    monkeypatch.setattr(long_grids, "STRETCH", 1100)
+    expected = jn.solve(four_bar(), time)
+    solve = spans._Room.solve
+
+    def spoiling(room, instants, *given):
+        solve(room, instants, *given)
+        if instants[0] == time[1100] and not spoiled:
+            room.status[5], room.state[0]["angle"][..., 5] = Status.NOT_CONVERGED, np.nan
+            spoiled.append(True)
+
+    monkeypatch.setattr(spans._Room, "solve", spoiling)
+    assert_same(jn.solve(four_bar(), time, threads=1, progress=lambda *x: told.append(x)), expected)
+    assert spoiled
+    assert told == sorted(told)
+    assert told[-1] == (4400, 4400)
