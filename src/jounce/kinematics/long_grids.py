@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Collection, Iterator
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import jax
@@ -134,28 +135,31 @@ class _Store:
     """
 
     def __init__(self, path: FollowedPath, count: int, *, kept: bool):
-        self._count, self._kept = count, kept
-        rooms = [count if kept else STRETCH, count, STRETCH]
-        states = zip(path.anchors[0].state, rooms, strict=True)
-        self._arrays: Any = tuple(room_for(part, room + len(path.anchors)) for part, room in states)
+        self._like, self._count, self._anchors = path.anchors[0].state, count, len(path.anchors)
+        self._outputs = room_for(self._like[1], count + self._anchors)
+        self._coordinates = room_for(self._like[0], count + self._anchors) if kept else None
+
+    @cached_property
+    def _of_a_stretch(self) -> Any:
+        """Arrays for the coordinates and signs of one stretch, which most grids do without."""
+        return room_for((self._like[0], self._like[2]), STRETCH + self._anchors)
 
     def of_stretch(self, first: int) -> Any:
         """Return the arrays of a stretch, by its first instant."""
-        begins = first if self._kept else 0, first, 0
-        parts = zip(self._arrays, begins, strict=True)
-        return tuple(jax.tree.map(lambda x, begin=begin: x[..., begin:], part) for part, begin in parts)
+        coordinates, sign = self._of_a_stretch
+        whole = (self._coordinates or {}, self._outputs)
+        kept, outputs = jax.tree.map(lambda x: x[..., first:], whole)
+        return kept or coordinates, outputs, sign
 
     @property
     def kept(self) -> Any:
         """The arrays of all instants: of coordinates, if they are kept, and of outputs; None for what is not kept."""
-        coordinates, outputs, _ = self._arrays
-        return coordinates if self._kept else dict.fromkeys(coordinates), outputs, None
+        return self._coordinates or dict.fromkeys(self._like[0]), self._outputs, None
 
     @property
     def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:
         """Jets of the coordinates, if they are kept, and of the outputs, time last."""
-        coordinates, outputs, _ = jax.tree.map(lambda x: x[..., : self._count], self._arrays)
-        return coordinates, outputs
+        return jax.tree.map(lambda x: x[..., : self._count], (self._coordinates or {}, self._outputs))
 
 
 def _coordinates(

@@ -23,6 +23,9 @@ from jounce.native.relays import Relay
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 LONGEST_LEG = 32  # batches
 LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
+SPAN_ENTRIES = (
+    2**19
+)  # of the coordinates of what a thread solves at once: four megabytes, so that it stays in the cache
 FEWEST_SIDE_BY_SIDE, MOST_SIDE_BY_SIDE = 64, 1024  # instants of a long grid in a call of machine code
 FEW_COLUMNS = 36  # of a Jacobian: of more, machine code of single values alone is too long to be fast
 LARGE = 64  # numbers of an array that stays in memory there
@@ -146,7 +149,7 @@ class Solver:
         """How far apart instants of a long grid that start from anchors are at most: the cache holds what is between."""
         if self._native is None:
             return MAX_INSTANTS
-        return 2 ** int(math.log2(max(1, CALL_ENTRIES // (self._entries * self.lanes))))
+        return 2 ** int(math.log2(max(1, SPAN_ENTRIES // (self._entries * self.lanes))))
 
     @cached_property
     def together(self) -> int:

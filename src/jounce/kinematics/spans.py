@@ -7,6 +7,7 @@ vector has lanes. Its instants are solved in rounds, of as many as there are lan
 stays in the cache; what is wanted of them is copied out of it.
 """
 
+import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -94,9 +95,10 @@ class _Room:
         self._time, self._step, self._source = np.empty(size), np.empty(size), np.zeros(size, np.int64)
         self._relay = solver.relay(self.state, self._step, self._time, self.status, self._source)
         self.leaves = jax.tree.leaves(self.state)
+        self._rounds = rounds(0, 1, self._relay.width)
 
-    def solve(self, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
-        """Solve the instants of a span, s, from the anchors around it."""
+    def begin(self, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
+        """Take up the instants of a span, s, with the anchors around it."""
         count = len(time)
         parts = zip(*(jax.tree.leaves(anchor.state) for anchor in anchors), strict=True)
         for whole, columns in zip(self.leaves, parts, strict=True):
@@ -109,7 +111,11 @@ class _Room:
         self._time[:count] = time
         self._source[:count] = np.where(near, neighbour, self._size + nearest)
         self._step[:count] = np.where(near, to_neighbour, to_anchor)
-        self._relay(rounds(count, stride, self._relay.width))
+        self._rounds = rounds(count, stride, self._relay.width)
+
+    def solve(self) -> None:
+        """Solve the instants that were taken up last."""
+        self._relay(self._rounds)
 
 
 def solve_spans(
@@ -146,13 +152,13 @@ def solve_spans(
     around = {span: path.anchors_around(time[span.first], time[span.first + span.count - 1]) for span in spans}
     most = max(map(len, around.values()), default=0)
     rooms: list[_Room] = []  # those of threads that are between two spans
+    lock = threading.Lock()  # many short operations go faster one thread after another than in turns for Python's lock
 
     def solve(span: Span) -> int:
-        try:
-            room = rooms.pop()
-        except IndexError:
-            room = _Room(solver, path.anchors[0].state, size, most)
-        room.solve(time[span.place], around[span], span.stride)
+        with lock:
+            room = rooms.pop() if rooms else _Room(solver, path.anchors[0].state, size, most)
+            room.begin(time[span.place], around[span], span.stride)
+        room.solve()
         for whole, part in zip(wanted, room.leaves, strict=True):
             if whole is not None:
                 whole[..., span.place] = part[..., : span.count]
