@@ -146,7 +146,7 @@ class Solver:
 
     @cached_property
     def longest_stride(self) -> int:
-        """How far apart instants of a long grid that start from anchors are at most: the cache holds what is between."""
+        """How far apart instants of a long grid that start from anchors are at most, so that the cache holds a span."""
         if self._native is None:
             return MAX_INSTANTS
         return 2 ** int(math.log2(max(1, SPAN_ENTRIES // (self._entries * self.lanes))))

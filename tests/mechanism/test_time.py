@@ -1,0 +1,25 @@
+"""The nearest of some instants, by whichever way it is found."""
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+from jounce.mechanism.time import nearest_instants
+
+MOMENTS = st.lists(st.floats(-10, 10).map(lambda x: round(x, 2)), min_size=1, max_size=12)
+
+
+@given(MOMENTS, MOMENTS, st.booleans())
+def test_the_nearest_is_nearest(known, instants, rising):
+    known, instants = np.array(known), np.array(sorted(instants) if rising else instants)
+    found = nearest_instants(known, instants)
+    away = np.abs(instants[:, None] - known)
+    np.testing.assert_allclose(away[np.arange(len(instants)), found], away.min(axis=1), rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("instants", [np.array([0.5]), np.linspace(-1.0, 3.0, 9), np.linspace(3.0, -1.0, 9)])
+def test_of_two_it_is_the_earlier(instants):
+    """One instant is sought, many rising ones are shared out, others are sought one by one."""
+    known = np.array([2.0, 0.0, 1.0])
+    expected = [1 if t <= 0.5 else 2 if t <= 1.5 else 0 for t in instants]
+    assert nearest_instants(known, instants).tolist() == expected
