@@ -42,7 +42,8 @@ class Prepared:
         if threads == 1:
             return self.machine_code(self.shared, leaves)
         with Threads(threads, compiled=True) as pool:
-            return self.machine_code(self.shared, leaves, threads, pool.map)
+            parts = 4 * threads  # none is to wait long for another
+            return self.machine_code(self.shared, leaves, parts, pool.map)
 
     def relay(self, lanes: tuple[Any, Any, Any], results: Any, sources: np.ndarray) -> Relay:
         """Return what solves instants in rounds, see `Program.relay`; what is None among the results is not wanted."""
