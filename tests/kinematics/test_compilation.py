@@ -168,3 +168,20 @@ def test_brief_programs_are_not_optimised_for_a_command_about_few_instants(shelf
 
 def test_without_a_store_all_programs_are_optimised():
     assert not store_.is_wanted_soon()
+
+
+@pytest.mark.parametrize("unknown", ["xla_cpu_use_fusion_emitters", "xla_backend_optimization_level", "everything"])
+def test_options_that_a_release_of_xla_does_not_know_are_left_out(monkeypatch, unknown):
+    def are_known(options):
+        return not (unknown == "everything" or unknown in options)
+
+    monkeypatch.setattr(compilation, "on_processor", lambda: True)
+    monkeypatch.setattr(compilation, "_level_is_set", lambda: False)
+    monkeypatch.setattr(compilation, "_are_known", are_known)
+    compilation._known_options.cache_clear()
+    try:
+        found = compilation.compiler_options(narrow=True)
+    finally:
+        compilation._known_options.cache_clear()
+    names = {"xla_cpu_use_fusion_emitters", "xla_disable_hlo_passes", "xla_backend_optimization_level"}
+    assert found is None if unknown == "everything" else found.keys() == names - {unknown}

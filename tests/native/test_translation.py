@@ -414,3 +414,15 @@ def test_a_program_has_one_text():
         kept += [Region("", "f", lanes=False) for _ in range(k)]  # so that what is made next lies elsewhere
         texts.add(modules._text(closed, 0, {}, 8, large=3))
     assert len(texts) == 1
+
+
+@pytest.mark.parametrize("tried", [True, False])
+def test_what_another_release_of_jax_says_otherwise_is_left_to_xla(monkeypatch, tried):
+    def renamed(*_, **__):
+        raise KeyError("length")
+
+    monkeypatch.setattr(modules, "translate", renamed)
+    if not tried:
+        monkeypatch.setattr(modules, "TRIED", ())
+    with pytest.raises(KeyError if tried else UnsupportedOperationError, match="length"):
+        modules.object_file(lambda shared, lanes: shared * lanes, np.ones(1), np.ones(1), {})
