@@ -1,5 +1,8 @@
 """A mapping whose values are computed when they are first asked for."""
 
+import gc
+import weakref
+
 import jax
 import numpy as np
 import pytest
@@ -41,3 +44,17 @@ def test_outputs_in_any_order_are_the_same():
     one, other = (jn.solve(four_bar(), np.linspace(0, 1, 7)).outputs for _ in range(2))
     for name in reversed(list(one)):
         np.testing.assert_array_equal(one[name], dict(other)[name])
+
+
+def test_a_motion_goes_with_its_last_reference():
+    """Nothing that refers to it is kept in it: its arrays would stay until the next search for garbage."""
+    motion = jn.solve(four_bar(), np.linspace(0, 1, 7))
+    outputs = motion.outputs["psi"], motion.dataset, motion.outputs
+    gone = weakref.ref(motion)
+    del outputs
+    gc.disable()
+    try:
+        del motion
+        assert gone() is None
+    finally:
+        gc.enable()

@@ -131,6 +131,7 @@ class Motion(Displayed):
         self.model, self.solved_model, self.history = model, model, history
         self._bodies, groups = state
         self._groups = dict(zip(model.outputs, groups, strict=True))
+        self._known_outputs: dict[str, Any] = {}
         self._actuated: Mechanism | None = None  # with laws, where those of drivers follow from outputs
 
     @cached_property
@@ -226,13 +227,14 @@ class Motion(Displayed):
         title = f"{self.mechanism.title}: " if self.mechanism.title else ""
         return f"<Motion {title}{solved} of {len(self.time)} instants solved, order {self.order}>"
 
-    @cached_property
+    @property
     def outputs(self) -> Mapping[str, Any]:
         """Outputs by name: arrays of shape (time, order + 1) or (time, order + 1, component), SI.
 
         The nine components of a rotation matrix stand row by row. An output is computed when it is first asked for.
         """
-        found = OnDemand(self.mechanism.outputs, self._outputs_with)
+        # not kept, as it refers to the motion: its arrays are to go with the last reference, not with the next search
+        found = OnDemand(self.mechanism.outputs, self._outputs_with, self._known_outputs)
         return dict(found) if self.traced else found  # what JAX traces is a plain tree
 
     def _outputs_with(self, name: str) -> dict[str, Any]:

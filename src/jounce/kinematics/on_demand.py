@@ -15,6 +15,8 @@ class OnDemand(Mapping[str, Any]):
         In their order.
     compute : callable
         Returns the value of a name, and those that are found with it, by their names.
+    known : dict, optional
+        Where they are kept.
 
     Examples
     --------
@@ -24,16 +26,18 @@ class OnDemand(Mapping[str, Any]):
     ('bb', ['a', 'b', 'c'], 3)
     """
 
-    def __init__(self, names: Iterable[str], compute: Callable[[str], Mapping[str, Any]]):
+    def __init__(
+        self, names: Iterable[str], compute: Callable[[str], Mapping[str, Any]], known: dict[str, Any] | None = None
+    ):
         self._names, self._compute = dict.fromkeys(names), compute
-        self._known: dict[str, Any] = {}
+        self._known = {} if known is None else known
 
     def __getitem__(self, name: str) -> Any:
         """Return the value of a name."""
         if name not in self._known:
             if name not in self._names:
                 raise KeyError(name)
-            self._known |= self._compute(name)
+            self._known.update(self._compute(name))
         return self._known[name]
 
     def __contains__(self, name: object) -> bool:
