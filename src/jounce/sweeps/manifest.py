@@ -15,7 +15,7 @@ from jounce.errors import OutputError
 from jounce.sweeps.fingerprints import fingerprint
 
 FORMAT = 1
-PACKAGES = ("jounce", "jax", "jaxlib", "numpy")  # other versions may give other last bits
+LIBRARIES = ("jax", "jaxlib", "numpy")  # other versions may give other last bits
 
 
 def manifest_of(
@@ -42,6 +42,8 @@ def manifest_of(
     options : dict
         What was chosen besides.
     """
+    from jounce import __version__
+
     return {
         "format": FORMAT,
         "title": title,
@@ -53,7 +55,7 @@ def manifest_of(
         "time": f"{len(instants)} instants from {float(instants[0])!r} to {float(instants[-1])!r} s, "
         f"digest {fingerprint(instants)[:16]}",
         "options": dict(options),
-        "versions": {name: importlib.metadata.version(name) for name in PACKAGES},
+        "versions": {"jounce": __version__} | {name: importlib.metadata.version(name) for name in LIBRARIES},
         "checksum": None,
     }
 
