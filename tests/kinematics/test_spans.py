@@ -137,21 +137,24 @@ def test_stretches_solved_at_once_are_those_solved_one_after_another(monkeypatch
 
 
 @needs_machine_code
-def test_a_stretch_in_which_some_instant_fails_is_solved_again(monkeypatch):
-    """Of what machine code tells to have failed nothing is kept, and progress does not go back."""
+@pytest.mark.parametrize("keep", [True, False])
+@pytest.mark.parametrize("always", [True, False])
+def test_a_stretch_in_which_some_instant_fails_is_solved_again(monkeypatch, always, keep):
+    """Of what failed nothing is kept, of the stretches beside it everything, and progress does not go back."""
     time, told, spoiled = np.linspace(0, 2, 4400), [], []
     monkeypatch.setattr(long_grids, "STRETCH", 1100)
-    expected = jn.solve(four_bar(), time)
+    expected = jn.solve(four_bar(), time, keep=keep)
     solve = spans._Room.solve
 
     def spoiling(room):
         solve(room)
-        if room._time[0] == time[1100] and not spoiled:
+        if room._time[0] == time[1100] and (always or not spoiled):
             room.status[5], room.state[0]["angle"][..., 5] = Status.NOT_CONVERGED, np.nan
             spoiled.append(True)
 
     monkeypatch.setattr(spans._Room, "solve", spoiling)
-    assert_same(jn.solve(four_bar(), time, threads=1, progress=lambda *x: told.append(x)), expected)
-    assert spoiled
+    found = jn.solve(four_bar(), time, threads=1, keep=keep, progress=lambda *x: told.append(x))
+    assert len(spoiled) == 1 + always
+    assert_same(found, expected)
     assert told == sorted(told)
     assert told[-1] == (4400, 4400)

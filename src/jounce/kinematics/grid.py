@@ -49,7 +49,6 @@ class GridSolver:
         path: FollowedPath,
         time: Float[np.ndarray, " time"],
         span: float,
-        store: SolvedState | None = None,
     ):
         self.solver, self.path, self.time, self.span = solver, path, time, span
         self.status = np.full(len(time), int(Status.NOT_REACHED))
@@ -57,7 +56,7 @@ class GridSolver:
         self._anchors = path.anchors_around(time[0], time[-1])
         self._instants = np.concatenate([time, [anchor.instant for anchor in self._anchors]])
         self._reached = time < path.ended_at
-        self._store = room_for(self._anchors[0].state, len(self._instants)) if store is None else store
+        self._store = room_for(self._anchors[0].state, len(self._instants))
         for lanes, _ in path.on_the_way:
             self.status[lanes] = Status.OK
 

@@ -2,13 +2,13 @@
 
 import itertools
 from collections.abc import Callable, Collection, Iterator
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.kinematics.advance import SolvedState
 from jounce.kinematics.change_points import half_width, spoiled_width
 from jounce.kinematics.grid import LONG_GRID, GridSolver, room_for, stride_of
 from jounce.kinematics.path_following import FollowedPath
@@ -69,14 +69,17 @@ def solve_grid(
     """
     kept = len(time) <= STRETCH if keep is None else keep
     status, faults = np.empty(len(time), int), {}
-    store = None if len(time) <= STRETCH else _Store(path, len(time), kept=kept)
+    store = None if len(time) <= STRETCH else _Store(path.anchors[0].state, len(time), kept=kept)
     tell = None if progress is None else _rising(progress)
     solved = frozenset() if store is None else _solved_at_once(solver, path, time, tell, threads, (store, status))
     state: Any = None
-    for first, part in stretches(solver, path, time, tell, threads, store, solved):
+    for first, part in stretches(solver, path, time, tell, threads, solved):
         status[first : first + len(part.time)] = part.status
         faults |= {first + lane: fault for lane, fault in part.faults.items()}
-        state = part.state
+        if store is None:
+            state = part.state
+        else:
+            store.put(first, part.state)
     coordinates, outputs = state if store is None else store.state
     if kept:
         return Solved(coordinates, outputs, status, faults)
@@ -121,7 +124,7 @@ def _solved_at_once(
             spans[first] = spans_of(first, count, stride, solver.lanes)
     done, wanted = 0, itertools.chain(*spans.values())
     with Threads(threads, compiled=True) as pool:
-        for solved in solve_spans(solver, path, time, [*wanted], (store.kept, status), pool.map):
+        for solved in solve_spans(solver, path, time, [*wanted], (store.wanted, status), pool.map):
             done += solved
             if progress is not None:
                 progress(done, len(time))
@@ -129,37 +132,27 @@ def _solved_at_once(
 
 
 class _Store:
-    """Arrays for the states of a grid of several stretches; of coordinates, unless kept, for one stretch after another.
+    """Arrays for the states of all instants of a grid of several stretches: of outputs and, if kept, of coordinates."""
 
-    Behind those of a stretch are those of its anchors, which make room for those of the next one.
-    """
-
-    def __init__(self, path: FollowedPath, count: int, *, kept: bool):
-        self._like, self._count, self._anchors = path.anchors[0].state, count, len(path.anchors)
-        self._outputs = room_for(self._like[1], count + self._anchors)
-        self._coordinates = room_for(self._like[0], count + self._anchors) if kept else None
-
-    @cached_property
-    def _of_a_stretch(self) -> Any:
-        """Arrays for the coordinates and signs of one stretch, which most grids do without."""
-        return room_for((self._like[0], self._like[2]), STRETCH + self._anchors)
-
-    def of_stretch(self, first: int) -> Any:
-        """Return the arrays of a stretch, by its first instant."""
-        coordinates, sign = self._of_a_stretch
-        whole = (self._coordinates or {}, self._outputs)
-        kept, outputs = jax.tree.map(lambda x: x[..., first:], whole)
-        return kept or coordinates, outputs, sign
+    def __init__(self, like: SolvedState, count: int, *, kept: bool):
+        self.state: Any = room_for((like[0] if kept else {}, like[1]), count)
+        self._nothing = dict.fromkeys(like[0])
 
     @property
-    def kept(self) -> Any:
-        """The arrays of all instants: of coordinates, if they are kept, and of outputs; None for what is not kept."""
-        return self._coordinates or dict.fromkeys(self._like[0]), self._outputs, None
+    def wanted(self) -> Any:
+        """The arrays, in the places of a state; None for what is not kept."""
+        coordinates, outputs = self.state
+        return coordinates or self._nothing, outputs, None
 
-    @property
-    def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:
-        """Jets of the coordinates, if they are kept, and of the outputs, time last."""
-        return jax.tree.map(lambda x: x[..., : self._count], (self._coordinates or {}, self._outputs))
+    def put(self, first: int, state: Any) -> None:
+        """Take over a stretch by its first instant; it has arrays of its own, with anchors behind its instants."""
+        coordinates, outputs = self.state
+        own = state[0] if coordinates else {}
+
+        def copy(whole: np.ndarray, part: np.ndarray) -> None:
+            whole[..., first : first + part.shape[-1]] = part
+
+        jax.tree.map(copy, (coordinates, outputs), (own, state[1]))
 
 
 def _coordinates(
@@ -176,13 +169,11 @@ def stretches(
     time: Instants,
     progress: Callable[[int, int], None] | None,
     threads: int,
-    store: _Store | None = None,
     without: Collection[int] = (),
 ) -> Iterator[tuple[int, GridSolver]]:
     """Yield the stretches of a grid one after another, solved, with the index of their first instant.
 
-    Their states go into a store, unless each has arrays of its own. Those that are solved already are left out, by
-    their first instants.
+    Those that are solved already are left out, by their first instants.
     """
     for first in range(0, len(time), STRETCH):
         if first in without:
@@ -193,7 +184,6 @@ def stretches(
                 progress(first + done, len(time))
 
         before = time[first - 1] if first else -np.inf
-        arrays = None if store is None else store.of_stretch(first)
-        part = GridSolver(solver, path, time[first : first + STRETCH], time[-1] - time[0], arrays)
+        part = GridSolver(solver, path, time[first : first + STRETCH], time[-1] - time[0])
         part.solve(None if progress is None else told, threads, explain=bool(before < path.ended_at))
         yield first, part

@@ -23,9 +23,7 @@ from jounce.native.relays import Relay
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 LONGEST_LEG = 32  # batches
 LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
-SPAN_ENTRIES = (
-    2**19
-)  # of the coordinates of what a thread solves at once: four megabytes, so that it stays in the cache
+SPAN_ENTRIES = 2**19  # of the coordinates of what a thread solves at once: the cache holds them
 FEWEST_SIDE_BY_SIDE, MOST_SIDE_BY_SIDE = 64, 1024  # instants of a long grid in a call of machine code
 FEW_COLUMNS = 36  # of a Jacobian: of more, machine code of single values alone is too long to be fast
 LARGE = 64  # numbers of an array that stays in memory there
