@@ -72,6 +72,35 @@ def test_items_are_mapped_in_order_and_an_error_comes_through():
             list(threads.map(inverse, [2, 1, 0, 3, 4]))
 
 
+def test_errors_come_in_the_order_of_their_items():
+    """Whichever thread has come to one first, that which asks among them."""
+    second = threading.Event()
+
+    def failing(k):
+        if k == 0:
+            second.wait(timeout=20)
+        else:
+            second.set()
+        raise ValueError(k)
+
+    with Threads(2, compiled=True) as threads, pytest.raises(ValueError, match="0"):
+        list(threads.map(failing, range(4)))
+    assert second.is_set()
+
+
+def test_as_many_threads_compute_as_are_asked_for_the_one_that_asks_among_them():
+    meeting, names = threading.Barrier(3), set()
+
+    def meet(_):
+        names.add(threading.current_thread().name)
+        meeting.wait(timeout=20)
+
+    with Threads(3, compiled=True) as threads:
+        list(threads.map(meet, range(6)))
+    assert len(names) == 3
+    assert threading.current_thread().name in names
+
+
 def test_two_items_run_side_by_side_as_soon_as_a_first_one_has_compiled():
     meeting = threading.Barrier(2)
     with Threads(2) as pool:

@@ -12,7 +12,7 @@ from jounce.dynamics.statics import displaced
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.gauss_newton import put_together
-from jounce.kinematics.motion import output_series
+from jounce.kinematics.motion import output_values
 
 
 def mode_motion(
@@ -63,7 +63,7 @@ def mode_motion(
             coordinates = trial.coordinates
         frames.append(coordinates)
     whole = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[None], *frames)
-    groups = tuple(map(np.asarray, output_series(model.system.outputs, whole, model.pose_type)))
+    groups = output_values(model.system.outputs, whole, model.pose_type)
     status = np.full(len(instants), int(Status.OK))
     return Motion(place.mechanism, model, instants, 0, (whole, groups), status, {})
 

@@ -18,7 +18,7 @@ from jounce.dynamics.statics import Found, check_forces, placed, remains, search
 from jounce.errors import MechanismError, SolveError, check_choice, check_name
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly import assemble, freely_moving
-from jounce.kinematics.motion import output_series
+from jounce.kinematics.motion import output_values
 from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
@@ -126,7 +126,7 @@ class Equilibrium(Displayed):
         place, model = self.place, self.place.model
         lost = max((output.lost_orders for output in self.mechanism.outputs.values()), default=0)
         coordinates = {name: _padded(x, lost) for name, x in place.coordinates.items()}
-        groups = tuple(map(np.asarray, output_series(model.system.outputs, coordinates, model.pose_type)))
+        groups = output_values(model.system.outputs, coordinates, model.pose_type)
         status = np.array([int(Status.OK)])
         return Motion(self.mechanism, model, np.array([self.time]), 2, (coordinates, groups), status, {})
 

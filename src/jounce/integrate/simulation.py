@@ -19,6 +19,7 @@ from jounce.integrate.methods import evaluated
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import PLACES, AnglesOfForces, attitudes_along, attitudes_at, followed, measured
 from jounce.jet import Jet, dot
+from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.compilation import Compiled, compiled
@@ -92,7 +93,8 @@ class Simulation(Motion):
         beyond = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
         if ending[0] != Status.OK and beyond.size:
             status[beyond[0]], faults[int(beyond[0])] = int(ending[0]), ending[1]
-        super().__init__(mechanism, start.model, instants, order, (coordinates, groups), status, faults)
+        values = tuple(plain_derivatives(np.asarray(series)) for series in groups)
+        super().__init__(mechanism, start.model, instants, order, (coordinates, values), status, faults)
 
     def __repr__(self) -> str:
         return f"<Simulation{super().__repr__()[7:-1]}, {self.steps} steps>"
@@ -112,7 +114,7 @@ class Simulation(Motion):
         return _steps_of(self.dense_output, instants)[1]
 
     def output_values(self, group: int) -> np.ndarray:
-        """Return the series of the outputs of a group, (order + 1, components, instances, time)."""
+        """Return the derivatives of the outputs of a group, (order + 1, components, instances, time)."""
         return list(self._groups.values())[group]
 
     @property

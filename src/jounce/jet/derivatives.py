@@ -14,7 +14,10 @@ def taylor_coefficients(derivatives: Float[Numbers, "order *shape"]) -> Float[Nu
     return derivatives * scale.reshape(-1, *[1] * (derivatives.ndim - 1))
 
 
-def plain_derivatives(coefficients: Float[Numbers, "order *shape"]) -> Float[Numbers, "order *shape"]:
-    """Return plain derivatives from Taylor coefficients along the leading axis."""
+def plain_derivatives(
+    coefficients: Float[Numbers, "order *shape"], out: Float[np.ndarray, "order *shape"] | None = None
+) -> Float[Numbers, "order *shape"]:
+    """Return plain derivatives from Taylor coefficients along the leading axis, in a given array or a new one."""
     scale = np.array([float(math.factorial(k)) for k in range(coefficients.shape[0])])
-    return coefficients * scale.reshape(-1, *[1] * (coefficients.ndim - 1))
+    scale = scale.reshape(-1, *[1] * (coefficients.ndim - 1))
+    return coefficients * scale if out is None else np.multiply(coefficients, scale, out=out)

@@ -14,6 +14,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.advance import Arrival, SolvedState
 from jounce.kinematics.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
 from jounce.kinematics.path_following import (
@@ -62,9 +63,9 @@ class GridSolver:
 
     @property
     def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:
-        """Jets of the coordinates and of the outputs, time last."""
+        """Jets of the coordinates, and derivatives of the outputs, time last."""
         coordinates, outputs, _ = jax.tree.map(lambda x: x[..., : len(self.time)], self._store)
-        return coordinates, outputs
+        return coordinates, tuple(map(plain_derivatives, outputs))
 
     def solve(self, progress: Callable[[int, int], None] | None, threads: int, *, explain: bool) -> None:
         """Solve level after level; an instant that its neighbour cannot predict is followed to from an anchor.
@@ -118,8 +119,13 @@ class GridSolver:
         Nothing is known of a failure but that there is one, so that these are solved once more, level after level.
         """
         count = int(np.count_nonzero(left))  # a long grid is reached up to some instant, and nothing is solved yet
+
+        def put(place: slice, state: SolvedState, status: Indices) -> None:
+            self._keep(place, state)
+            self.status[place] = status
+
         spans = spans_of(0, count, stride, self.solver.lanes)
-        for solved in solve_spans(self.solver, self.path, self.time, spans, (self._store, self.status), pool.map):
+        for solved in solve_spans(self.solver, self.path, self.time, spans, put, pool.map):
             tell(solved)
         failed = left & (self.status != Status.OK)
         if failed.any():

@@ -1,13 +1,13 @@
 """Time grids of any length, solved stretch by stretch, so that no more is kept of each than what is asked for."""
 
 import itertools
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.advance import SolvedState
 from jounce.kinematics.change_points import half_width, spoiled_width
 from jounce.kinematics.grid import LONG_GRID, GridSolver, room_for, stride_of
@@ -29,7 +29,7 @@ class Solved(NamedTuple):
     coordinates : dict of str to array, or callable
         Jets of the coordinates of all bodies, time last, or what computes them again.
     outputs : tuple of array
-        Jets of the outputs, time last.
+        Derivatives of the outputs, time last.
     status : array of int, shape (time,)
     faults : dict of int to str
     """
@@ -79,7 +79,7 @@ def solve_grid(
         if store is None:
             state = part.state
         else:
-            store.put(first, part.state)
+            store.put(slice(first, first + len(part.time)), *part.state)
     coordinates, outputs = state if store is None else store.state
     if kept:
         return Solved(coordinates, outputs, status, faults)
@@ -122,9 +122,14 @@ def _solved_at_once(
         if count > LONG_GRID and end < path.ended_at and not near:
             stride = stride_of(solver, count, count, len(path.anchors_around(begin, end)))
             spans[first] = spans_of(first, count, stride, solver.lanes)
-    done, wanted = 0, itertools.chain(*spans.values())
+    done, wanted = 0, [*itertools.chain(*spans.values())]
+
+    def put(place: slice, state: SolvedState, outcome: Int[np.ndarray, " lane"]) -> None:
+        store.put(place, *state[:2], series=True)
+        status[place] = outcome
+
     with Threads(threads, compiled=True) as pool:
-        for solved in solve_spans(solver, path, time, [*wanted], (store.wanted, status), pool.map):
+        for solved in solve_spans(solver, path, time, wanted, put, pool.map):
             done += solved
             if progress is not None:
                 progress(done, len(time))
@@ -136,23 +141,23 @@ class _Store:
 
     def __init__(self, like: SolvedState, count: int, *, kept: bool):
         self.state: Any = room_for((like[0] if kept else {}, like[1]), count)
-        self._nothing = dict.fromkeys(like[0])
 
-    @property
-    def wanted(self) -> Any:
-        """The arrays, in the places of a state; None for what is not kept."""
-        coordinates, outputs = self.state
-        return coordinates or self._nothing, outputs, None
+    def put(
+        self, place: slice, coordinates: Mapping[str, Any], outputs: Sequence[Any], *, series: bool = False
+    ) -> None:
+        """Take over some instants: jets of the coordinates, and derivatives of the outputs, or their series.
 
-    def put(self, first: int, state: Any) -> None:
-        """Take over a stretch by its first instant; it has arrays of its own, with anchors behind its instants."""
-        coordinates, outputs = self.state
-        own = state[0] if coordinates else {}
-
-        def copy(whole: np.ndarray, part: np.ndarray) -> None:
-            whole[..., first : first + part.shape[-1]] = part
-
-        jax.tree.map(copy, (coordinates, outputs), (own, state[1]))
+        Series are of any size where an instant failed, which is solved again.
+        """
+        kept, shown = self.state
+        for name, whole in kept.items():
+            whole[..., place] = coordinates[name]
+        for whole, part in zip(shown, outputs, strict=True):
+            if series:
+                with np.errstate(over="ignore"):
+                    plain_derivatives(part, out=whole[..., place])
+            else:
+                whole[..., place] = part
 
 
 def _coordinates(

@@ -55,6 +55,13 @@ def output_series(
     return tuple(stacked(group.evaluate(pose)) for group in groups)
 
 
+def output_values(
+    groups: tuple[Group, ...], coordinates: dict[str, Any], pose_type: type
+) -> tuple[Float[Numbers, "_ _ _ batch"], ...]:
+    """Return the derivatives of outputs, (order + 1, components, instances, batch) for each group."""
+    return tuple(plain_derivatives(np.asarray(x)) for x in output_series(groups, coordinates, pose_type))
+
+
 def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
     """Raise MechanismError unless an output names what the mechanism has, and exists in its space."""
     mechanism.check_fit(output, name)
@@ -107,6 +114,9 @@ class Motion(Displayed):
         The same, each with the radius of the Taylor series of the motion there.
     derived : dict
         What was computed of the motion and may be wanted again, by name: the forces, for one.
+
+    It is put together from the Taylor coefficients of the coordinates of all bodies, or what computes them, and the
+    derivatives of the outputs, (order + 1, components, instances, time) for each group.
     """
 
     traced = False  # by JAX
@@ -243,9 +253,9 @@ class Motion(Displayed):
         if isinstance(output, AbstractMotionOutput):
             return {name: self._derivatives(output.coefficients(self))}
         groups = zip(self._groups.items(), self.model.system.outputs, strict=True)
-        ((names, coefficients), group) = next(found for found in groups if name in found[0][0])
-        coefficients = self._continued(group, coefficients)
-        return {other: self._derivatives(coefficients[:, :, k]) for k, other in enumerate(names)}
+        ((names, values), group) = next(found for found in groups if name in found[0][0])
+        values = self._continued(group, values)
+        return {other: self._shown(values[:, :, k]) for k, other in enumerate(names)}
 
     @cached_property
     def dataset(self) -> "xarray.Dataset":
@@ -326,7 +336,7 @@ class Motion(Displayed):
     def _continued(
         self, group: Group, coefficients: Float[Numbers, "order component instance time"]
     ) -> Float[Numbers, "order component instance time"]:
-        """Return the Taylor coefficients of outputs, of which angles have the turns made along the motion."""
+        """Return Taylor coefficients of outputs, or derivatives, of which angles have the turns made on the way."""
         element = group.element
         if not (measures_angle(group) or getattr(element, "wraps", ())) or (history := self._attitudes) is None:
             return coefficients
@@ -358,9 +368,13 @@ class Motion(Displayed):
         self, coefficients: Float[Numbers, "order component time"]
     ) -> Float[np.ndarray, "time derivative *component"]:
         """Turn Taylor coefficients (order, component, time) into derivatives (time, derivative[, component])."""
-        coefficients = coefficients[: self.order + 1]
-        values = np.moveaxis(np.asarray(plain_derivatives(np.asarray(coefficients))), -1, 0)
-        values[self.status != Status.OK] = np.nan
+        return self._shown(plain_derivatives(np.asarray(coefficients[: self.order + 1])))
+
+    def _shown(self, values: Float[Numbers, "order component time"]) -> Float[np.ndarray, "time derivative *component"]:
+        """Turn derivatives (order, component, time) into those shown (time, derivative[, component]), NaN if failed."""
+        values = np.moveaxis(np.asarray(values[: self.order + 1]), -1, 0)
+        if (failed := self.status != Status.OK).any():
+            values = np.where(failed[:, None, None], np.nan, values)
         return values[..., 0] if values.shape[-1] == 1 else values
 
     def _labelled(

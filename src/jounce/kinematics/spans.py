@@ -94,14 +94,13 @@ class _Room:
         self.status, self._size = np.empty(size, int), size
         self._time, self._step, self._source = np.empty(size), np.empty(size), np.zeros(size, np.int64)
         self._relay = solver.relay(self.state, self._step, self._time, self.status, self._source)
-        self.leaves = jax.tree.leaves(self.state)
         self._rounds = rounds(0, 1, self._relay.width)
 
     def begin(self, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
         """Take up the instants of a span, s, with the anchors around it."""
         count = len(time)
         parts = zip(*(jax.tree.leaves(anchor.state) for anchor in anchors), strict=True)
-        for whole, columns in zip(self.leaves, parts, strict=True):
+        for whole, columns in zip(jax.tree.leaves(self.state), parts, strict=True):
             np.concatenate(columns, axis=-1, out=whole[..., self._size : self._size + len(anchors)])
         neighbour, known = _neighbours(count, stride)
         instants = np.array([anchor.instant for anchor in anchors])
@@ -117,13 +116,17 @@ class _Room:
         """Solve the instants that were taken up last."""
         self._relay(self._rounds)
 
+    def found(self, count: int) -> tuple[Any, Int[np.ndarray, " lane"]]:
+        """Return the states and the outcome of so many of them."""
+        return jax.tree.map(lambda x: x[..., :count], self.state), self.status[:count]
+
 
 def solve_spans(
     solver: Solver,
     path: FollowedPath,
     time: Float[np.ndarray, " time"],
     spans: Sequence[Span],
-    results: tuple[Any, Int[np.ndarray, " time"]],
+    put: Callable[[slice, Any, Int[np.ndarray, " lane"]], None],
     each: Callable[[Callable[[Span], int], Iterable[Span]], Iterator[int]],
 ) -> Iterator[int]:
     """Solve spans of a grid, and yield how many instants each of them has.
@@ -140,14 +143,12 @@ def solve_spans(
         All instants, s.
     spans : sequence of Span
         Those to solve.
-    results : tuple
-        Where the states go, jets of all instants, time last, as in an anchor's, with None in the place of what nobody
-        wants; and where the outcome of each instant goes.
+    put : callable
+        Takes over the instants of a span by where they are among all: their states, as an anchor's, time last, and the
+        outcome of each. It may be called from several threads at once; the arrays are used again after it.
     each : callable
         In the manner of `map`; it may call from several threads at once.
     """
-    state, status = results
-    wanted = jax.tree.flatten(state, is_leaf=lambda x: x is None)[0]
     size = max(span.count for span in spans) if spans else 0
     around = {span: path.anchors_around(time[span.first], time[span.first + span.count - 1]) for span in spans}
     most = max(map(len, around.values()), default=0)
@@ -159,10 +160,7 @@ def solve_spans(
             room = rooms.pop() if rooms else _Room(solver, path.anchors[0].state, size, most)
             room.begin(time[span.place], around[span], span.stride)
         room.solve()
-        for whole, part in zip(wanted, room.leaves, strict=True):
-            if whole is not None:
-                whole[..., span.place] = part[..., : span.count]
-        status[span.place] = room.status[: span.count]
+        put(span.place, *room.found(span.count))
         rooms.append(room)
         return span.count
 

@@ -44,12 +44,12 @@ def callers_device() -> Callable[[], AbstractContextManager[Any]]:
 
 
 class Threads:
-    """Threads that compute one batch each, started when there is more than one to compute; to be closed after use.
+    """Threads that compute one batch each, beside the one that asks, started when there are several; to be closed.
 
     Parameters
     ----------
     count : int
-        1 computes in the thread that asks.
+        Of threads, that which asks among them.
     compiled : bool, default False
         Whether what they are to compute is compiled already, so that none has to go before the others.
     """
@@ -80,15 +80,35 @@ class Threads:
             yield from map(function, items)
             return
         if self._pool is None:
-            self._pool = ThreadPoolExecutor(self.count, thread_name_prefix="jounce")
-        waiting: deque[Future[Result]] = deque()
+            self._pool = ThreadPoolExecutor(self.count - 1, thread_name_prefix="jounce")  # and the one that asks
+        waiting: deque[tuple[Future[Result], Item]] = deque()
         for item in items:
-            waiting.append(self._pool.submit(self._called, function, item))
+            waiting.append((self._pool.submit(self._called, function, item), item))
             if len(waiting) > AHEAD * self.count:
-                yield waiting.popleft().result()
+                yield _first_result(function, waiting)
         while waiting:
-            yield waiting.popleft().result()
+            yield _first_result(function, waiting)
 
     def _called(self, function: Callable[[Item], Result], item: Item) -> Result:
         with self._context():
             return function(item)
+
+
+def _first_result(function: Callable[[Item], Result], waiting: deque[tuple[Future[Result], Item]]) -> Result:
+    """Return the result of the first item; until a thread has found it, compute those that none has taken up."""
+    for k in range(len(waiting)):
+        future, item = waiting[k]
+        if waiting[0][0].done():
+            break
+        if future.cancel():
+            waiting[k] = _computed(function, item), item
+    return waiting.popleft()[0].result()
+
+
+def _computed(function: Callable[[Item], Result], item: Item) -> Future[Result]:
+    future: Future[Result] = Future()
+    try:
+        future.set_result(function(item))
+    except Exception as error:  # noqa: BLE001 - raised in its turn, as those of the other threads
+        future.set_exception(error)
+    return future

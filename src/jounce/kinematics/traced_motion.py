@@ -41,7 +41,8 @@ class TracedMotion(Motion):
                 counted = brought_near(outputs[k][0], next(wrapping))
                 outputs[k] = jnp.concatenate([counted[None], outputs[k][1:]])
         status: Any = solved.status.astype(int)
-        super().__init__(mechanism, model, time, order, (solved.coordinates, tuple(outputs)), status, {})
+        values = tuple(map(plain_derivatives, outputs))
+        super().__init__(mechanism, model, time, order, (solved.coordinates, values), status, {})
         self.solved_model, self.solved = held, solved
 
     def __repr__(self) -> str:
@@ -106,6 +107,9 @@ class TracedMotion(Motion):
     def _derivatives(
         self, coefficients: Float[Numbers, "order component time"]
     ) -> Float[Numbers, "time derivative *component"]:
-        values = jnp.moveaxis(plain_derivatives(coefficients[: self.order + 1]), -1, 0)
+        return self._shown(plain_derivatives(coefficients[: self.order + 1]))
+
+    def _shown(self, values: Float[Numbers, "order component time"]) -> Float[Numbers, "time derivative *component"]:
+        values = jnp.moveaxis(values[: self.order + 1], -1, 0)
         values = jnp.where((self.status == Status.OK)[:, None, None], values, jnp.nan)
         return values[..., 0] if values.shape[-1] == 1 else values

@@ -18,7 +18,7 @@ from jounce.kinematics.curves.limits import LimitPosition, limits_between, value
 from jounce.kinematics.curves.path import End, Path, meets, walk_both_ways
 from jounce.kinematics.curves.start import Freed
 from jounce.kinematics.curves.walker import LANES, Place, Walker, spin
-from jounce.kinematics.motion import Motion, output_series
+from jounce.kinematics.motion import Motion, output_values
 from jounce.kinematics.status import Status
 from jounce.mechanism import AbstractOutput, Mechanism
 from jounce.mechanism.axis_angles import AttitudeHistory
@@ -319,7 +319,7 @@ class Curve(Displayed):
         coordinates = with_angular_velocity({name: c[:levels] for name, c in self._points[0].items()})
         model, instants, history = self._walker.model, self.arc_lengths, self._history
         groups = model.system.outputs if history is None else history.counting(model.system.outputs, instants)
-        series = tuple(map(np.asarray, output_series(groups, coordinates, model.pose_type)))
+        series = output_values(groups, coordinates, model.pose_type)
         status = np.full(len(instants), int(Status.OK))
         return Motion(mechanism, model, instants, self._order, (coordinates, series), status, {}, (), history)
 
