@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.kinematics.pose_outputs import output_series
 from tests.problems.small import crank, four_bar, law, spindle
 
 TIME = np.linspace(0.0, 1.0, 4)
@@ -52,6 +53,19 @@ def test_points_and_angles_asked_for_later_are_the_outputs(planar):
     difference = planar.angle("rocker") - planar.angle("crank")
     np.testing.assert_allclose(planar.outputs["between"], difference, rtol=1e-12)
     assert planar.point("rocker", [0.0, 0.0]).dims == ("time", "derivative", "component")
+
+
+def test_what_is_asked_later_of_another_body_and_at_more_instants_compiles_nothing(planar):
+    """A program is for an output and the order, and knows the ground from bodies that move."""
+
+    def count():
+        return len(output_series._programs) + output_series.jitted._cache_size()
+
+    planar.point("crank", [0.04, 0.0])
+    known, longer = count(), jn.solve(planar.mechanism, np.linspace(0.0, 1.0, 1100))
+    found = longer.point("rocker", [0.2031, 0.0]).values
+    assert count() == known
+    np.testing.assert_allclose(found, longer.outputs["C"], rtol=1e-13, atol=1e-13)
 
 
 def test_distance_of_the_ends_of_a_rod_stays(planar):

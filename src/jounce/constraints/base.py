@@ -86,6 +86,7 @@ class AbstractConstraint(Module):
     body_count: ClassVar[int] = 2
     body_counts: ClassVar[tuple[int, ...]] = ()  # where more than one number is right
     periodic: ClassVar[bool] = False  # whether its residual forgets whole turns, which the law must not skip then
+    law_apart: ClassVar[bool] = False  # of the class that defines `residual`: a function of bodies less one of the law
 
     def __init_subclass__(cls, type: str = "", space: str = "", role: str = "joint", **keywords: Any):  # noqa: A002
         super().__init_subclass__(**keywords)

@@ -28,6 +28,8 @@ class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", ro
     ratio: Scalar = None
     offset: Scalar = 0.0  # rad or m
 
+    law_apart = True
+
     def __check_init__(self):
         check_choice("coordinate", self.coordinate, COORDINATES, MechanismError)
 
@@ -47,6 +49,8 @@ class SlideDriver(AbstractConstraint, type="slide", space="planar", role="driver
     vector_i: Vector  # direction of travel
     motion: MotionLaw  # m
 
+    law_apart = True
+
     def evaluate(self, body_i: Pose, body_j: Pose) -> Jet:
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
 
@@ -60,6 +64,8 @@ class DistanceDriver(AbstractConstraint, type="distance", space="planar", role="
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
     motion: MotionLaw  # m
+
+    law_apart = True
 
     def evaluate(self, body_i: Pose, body_j: Pose) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -97,6 +103,7 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
     datum: Datum | None = eqx.field(default=None, init=False)  # found when the mechanism is put together
 
     periodic = True
+    law_apart = True
 
     __check_init__ = check_vectors
 

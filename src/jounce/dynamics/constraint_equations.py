@@ -18,12 +18,13 @@ from jounce.dynamics.inverse import ElementIndex, MotionForces, element_indices
 from jounce.dynamics.loads import mass_matrices
 from jounce.dynamics.masses import Masses, masses_of
 from jounce.dynamics.mechanism_state import MotionAtState, at_state
-from jounce.dynamics.motion_values import Coordinates, cut, derivatives_along, in_chunks, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, derivatives_along, pose_of
 from jounce.dynamics.saddle_point import Jacobian, MassMatrix, block_diagonal, even_scale, saddle_point
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
+from jounce.kinematics.chunks import in_chunks
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism

@@ -18,12 +18,13 @@ from jounce.dynamics.energies import body_energy
 from jounce.dynamics.forward import Lanes
 from jounce.dynamics.inverse import MotionForces, element_indices
 from jounce.dynamics.masses import Masses, required_masses
-from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, labelled, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, labelled, pose_of
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion
 from jounce.kinematics.change_points import spoiled
+from jounce.kinematics.chunks import in_chunks
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.factors import Factor, factored
 from jounce.mechanism.driver_outputs import is_turning

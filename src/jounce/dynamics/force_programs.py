@@ -71,18 +71,19 @@ def multipliers(
 
 @SideBySide
 def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, Any]:
-    """Return what `multipliers` does for one instant, and which applied forces are finite there.
+    """Return multipliers of one instant for some cases, and which applied forces are finite there.
 
     Parameters
     ----------
     shared : tuple
-        The system, one of its forces alone, masses and gravity.
+        The system, one of its forces alone, masses and gravity; and, where rows are redundant, what `least_multipliers`
+        takes beside the load, else None: then there is one case, that of `multipliers`.
     lanes : tuple
         Of the instant: the coordinates of all bodies, the angles about axes that forces measure, and its time.
     pose_type
         Of the coordinates.
     """
-    (system, loaded, masses, gravity), (bodies, angles, instants) = shared, lanes
+    (system, loaded, masses, gravity, choice), (bodies, angles, instants) = shared, lanes
     levels = len(bodies["position"]) - 2  # accelerations use up two
     loaded = dataclasses.replace(loaded, forces=with_turns(loaded.forces, angles))
     load, finite = body_loads.function(loaded, bodies, instants, masses, gravity, pose_type)
@@ -92,8 +93,10 @@ def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, A
         return element_slopes.function(group.element, poses, instants, pose_type, slot, levels)
 
     blocks = [[slope(group, slot) for slot in group.moving_slots] for group in system.groups]
+    if choice is not None:
+        return least_multipliers.function(system, blocks, load, *choice), finite
     still = None if system.shape[0] == system.shape[1] else part_of(bodies, None, 1)
-    return multipliers.function(system, blocks, load, still, masses, pose_type), finite
+    return multipliers.function(system, blocks, load, still, masses, pose_type)[None], finite
 
 
 def balance_of_instant(shared: Any, lanes: Any, pose_type: type[Pose]) -> Prepared | None:

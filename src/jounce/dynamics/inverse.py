@@ -21,6 +21,7 @@ from jounce.mechanism.axis_angles import at_lanes, measures_angle
 from jounce.mechanism.builder import group_rows
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.redundant_reactions import resolved_reactions
+from jounce.mechanism.system import law_left_out
 from jounce.shapes import Numbers
 
 
@@ -77,6 +78,8 @@ class MotionForces:
         self.gravity = gravity_of(mechanism) * float(gravity)
         self.forces = motion.forces if applied else ()
         self.indices = element_indices(self.model)
+        system = self.model.system  # programs without laws serve all of them, also those that a motion has found
+        self._bare = dataclasses.replace(system, groups=tuple(map(law_left_out, system.groups)))
         self._kept: dict[tuple[Any, ...], Numbers] = {}
 
     @classmethod
@@ -104,16 +107,13 @@ class MotionForces:
     @cached_property
     def _balancing(self) -> Float[Numbers, "case level row time"]:
         """Multipliers that balance the loads; after them some that balance none, where any are looked for."""
-        system = dataclasses.replace(self.model.system, outputs=())
+        system = dataclasses.replace(self._bare, outputs=())
         nothing = Pattern.of((), (), system.pattern.width, system.body_count)
         unjoined = dataclasses.replace(
             system, groups=(), pattern=nothing, row_scale=np.zeros((0, 1)), rank=None, fronts=None
         )
         square = system.shape[0] == system.shape[1]
-        compliance = None if system.rank is None else self.open.compliance
-        cases = [(1.0, np.zeros(len(self.model.rows)))]
-        if self._looks_for_open:
-            cases.append((0.0, self.open.chance()))
+        choice = None if system.rank is None else self._choice
         angles = [group.element.datum.near for group in self.forces if measures_angle(group)]
 
         def lanes_of(lanes: np.ndarray) -> Any:
@@ -122,25 +122,30 @@ class MotionForces:
 
         first = np.zeros(1, int)
         loaded = dataclasses.replace(unjoined, forces=at_lanes(self.forces, first))  # angles come with each instant
-        shared, one = (system, loaded, self.masses, self.gravity), lanes_of(first)
-        code = programs.balance_of_instant(shared, one, self.pose_type) if compliance is None else None
+        shared, one = (system, loaded, self.masses, self.gravity, choice), lanes_of(first)
+        code = programs.balance_of_instant(shared, one, self.pose_type)
 
         def chunk(lanes: np.ndarray) -> Any:
             if code is not None:
                 found, finite = code(lanes_of(lanes))
                 self._check_finite(finite, lanes)
-                return found[None]
+                return found
             blocks, (bodies, _, instants) = self._blocks(lanes), lanes_of(lanes)
             forces = dataclasses.replace(unjoined, forces=at_lanes(self.forces, lanes))
             load, finite = programs.body_loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
             self._check_finite(finite, lanes)
-            if compliance is not None:
-                weights, bent = (np.array(x) for x in zip(*cases, strict=True))
-                return programs.least_multipliers(system, blocks, load, compliance, weights, bent)
+            if choice is not None:
+                return programs.least_multipliers(system, blocks, load, *choice)
             still = None if square else self.coordinates_at(None, lanes, 1)
             return programs.multipliers(system, blocks, load, still, self.masses, self.pose_type)[None]
 
         return self.in_chunks(chunk)
+
+    @property
+    def _choice(self) -> tuple[Numbers, Numbers, Numbers]:
+        """What chooses multipliers of redundant rows: their compliance; of each case, weight of the load and bend."""
+        bends = [np.zeros(len(self.model.rows)), *([self.open.chance()] if self._looks_for_open else [])]
+        return self.open.compliance, np.array([1.0, 0.0][: len(bends)]), np.array(bends)
 
     def unique(self, quantity: Callable[["MotionForces"], Numbers], size: float = 1.0) -> Numbers:
         """Return what is asked of the forces, NaN in components that redundant constraints leave open.
@@ -325,7 +330,7 @@ class MotionForces:
         return tuple(self.coordinates_at(slot, lanes, self.levels) for slot in bodies)
 
     def _slopes(self, index: int, slot: int, lanes: np.ndarray) -> Any:
-        element = self.model.system.groups[index].element
+        element = self._bare.groups[index].element
         poses, instants = self._poses(index, lanes), self.motion.time[lanes]
         return programs.element_slopes(element, poses, instants, self.pose_type, slot, self.levels)
 

@@ -12,7 +12,7 @@ from jounce.dynamics.statics import displaced
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.gauss_newton import put_together
-from jounce.kinematics.motion import output_values
+from jounce.kinematics.pose_outputs import output_values
 
 
 def mode_motion(

@@ -12,8 +12,8 @@ from jounce.errors import MechanismError
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
+from jounce.kinematics.chunks import in_chunks
 from jounce.kinematics.device import on_processor
-from jounce.kinematics.threads import Threads, thread_count
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
@@ -25,46 +25,11 @@ Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]
 
 Found = TypeVar("Found")
 
-WIDTHS = (256,)  # instants: one program serves a motion, its peaks and a long grid
-
 
 def check_motion(motion: object) -> None:
     """Raise MechanismError unless this is a motion."""
     if not isinstance(motion, Motion):
         raise MechanismError("must be a jn.Motion, as jn.solve and jn.simulate give it", name="motion", value=motion)
-
-
-def in_chunks(
-    function: Callable[[Int[np.ndarray, " chunk"]], Found], count: int, widths: tuple[int, ...] = WIDTHS, axis: int = -1
-) -> Found:
-    """Return what a function of indices of instants gives, for all of them; few lengths of chunks are compiled.
-
-    Chunks are computed in several threads at once; the function must let them.
-
-    Parameters
-    ----------
-    function : callable
-        Maps indices to a pytree of arrays with the instants along the axis.
-    count : int
-        How many instants there are, at least one.
-    widths : tuple of int
-        Lengths of chunks, increasing: the first that holds all instants, or else the last. The last chunk is filled up.
-    axis : int, default -1
-        Of the instants in the results.
-    """
-    width = next((width for width in widths if count <= width), widths[-1])
-
-    def computed(first: int) -> Any:
-        return jax.tree.map(np.asarray, function(np.minimum(np.arange(first, first + width), count - 1)))
-
-    with Threads(thread_count()) as threads:
-        parts = list(threads.map(computed, range(0, count, width)))
-
-    def whole(*arrays: np.ndarray) -> np.ndarray:
-        joined = np.concatenate(arrays, axis)
-        return joined[(slice(None),) * (axis % joined.ndim) + (slice(count),)]
-
-    return jax.tree.map(whole, *parts)
 
 
 def along_motion(motion: Motion, function: Callable[[Int[np.ndarray, " chunk"]], Found]) -> Found:

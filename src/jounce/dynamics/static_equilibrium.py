@@ -18,7 +18,7 @@ from jounce.dynamics.statics import Found, check_forces, placed, remains, search
 from jounce.errors import MechanismError, SolveError, check_choice, check_name
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly import assemble, freely_moving
-from jounce.kinematics.motion import output_values
+from jounce.kinematics.pose_outputs import output_values
 from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete

@@ -24,7 +24,7 @@ from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, whole_periods
 from jounce.kinematics import Status
 from jounce.kinematics.families import checked_values
-from jounce.kinematics.motion import output_series
+from jounce.kinematics.pose_outputs import output_series
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
 from jounce.mechanism.axis_angles import measures_angle, raw_angles, with_turns
 from jounce.mechanism.builder import with_reference

@@ -11,10 +11,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.dynamics.forward import State, turns_with_ground, with_ground
-from jounce.dynamics.motion_values import Coordinates, in_chunks
+from jounce.dynamics.motion_values import Coordinates
 from jounce.errors import MechanismError
 from jounce.jet.turns import counted_by_rates
-from jounce.kinematics.motion import output_series
+from jounce.kinematics.chunks import in_chunks
+from jounce.kinematics.pose_outputs import output_series
 from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group
 from jounce.robot.arguments import whole_number

@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.display import Displayed
-from jounce.dynamics.motion_values import in_chunks
 from jounce.integrate.robot_marching import (
     RobotProblem,
     RobotState,
@@ -24,6 +23,7 @@ from jounce.integrate.robot_marching import (
 )
 from jounce.jet import Jet, compose
 from jounce.kinematics import Status
+from jounce.kinematics.chunks import in_chunks
 from jounce.robot.base_motion import BaseMotion
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.robot import Robot

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from jounce.dynamics.energies import body_energy, energy_of_forces
 from jounce.dynamics.forward import Equations, Instants, Lanes, State, expand
-from jounce.dynamics.motion_values import Coordinates, cut, in_chunks, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart
 from jounce.integrate.breaks import breaks
 from jounce.integrate.events import WIDTHS, in_pieces, pose_coordinates, series_of
@@ -22,8 +22,9 @@ from jounce.jet import Jet, dot
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
+from jounce.kinematics.chunks import in_chunks
 from jounce.kinematics.compilation import Compiled, compiled
-from jounce.kinematics.motion import output_series
+from jounce.kinematics.pose_outputs import output_series
 from jounce.kinematics.side_by_side import SideBySide
 from jounce.kinematics.store import is_wanted_soon
 from jounce.mechanism import Mechanism

@@ -3,14 +3,15 @@
 import dataclasses
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.gauss_newton import Displacements
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.status import Status
-from jounce.mechanism import Model, build
+from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import counted_as_in
-from jounce.mechanism.held_outputs import led_outputs
+from jounce.mechanism.held_outputs import led_outputs, with_laws_left_out
 from jounce.modules import with_fields
 from jounce.trajectory import HermiteMotion
 
@@ -28,7 +29,8 @@ def actuated(motion: Motion) -> Motion:
     laws = {name: _law(motion, name) for name in led}
     drivers = {name: dataclasses.replace(mechanism.drivers[name], motion=law) for name, law in laws.items()}
     driven = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **drivers})
-    return motion.moved_by(_counted(build(driven), motion.model, float(motion.time[0])), driven)
+    model = _counted(build(driven), motion.model, _row_scale(mechanism, motion.model, float(motion.time[0])))
+    return motion.moved_by(model, driven)
 
 
 def _law(motion: Motion, name: str) -> HermiteMotion:
@@ -38,15 +40,23 @@ def _law(motion: Motion, name: str) -> HermiteMotion:
     return HermiteMotion(motion.time[solved], derivatives.T[solved])
 
 
-def _counted(model: Model, held: Model, instant: float) -> Model:
+def _row_scale(mechanism: Mechanism, held: Model, instant: float) -> Float[np.ndarray, "row 1"]:
+    """Return the scales of the rows of drivers and joints, where the outputs were held first.
+
+    Laws do not matter to them, and those found have as many pieces as there were instants: a program for each number.
+    """
+    _, _, jacobian = Displacements(build(with_laws_left_out(mechanism)), instant).at(held.reference)
+    return jacobian.row_scale[:, None]
+
+
+def _counted(model: Model, held: Model, row_scale: Float[np.ndarray, "row 1"]) -> Model:
     """Return the model of the drivers with all that was found when the outputs were held."""
-    _, _, jacobian = Displacements(model, instant).at(held.reference)
     system = with_fields(
         model.system,
         groups=counted_as_in(model.system.groups, held),
         forces=held.system.forces,
         outputs=held.system.outputs,
-        row_scale=jacobian.row_scale[:, None],
+        row_scale=row_scale,
         rank=held.system.rank,
     )
     return dataclasses.replace(

@@ -1,6 +1,7 @@
 """The result of a solve: outputs and any point of any body, with their derivatives, at every instant."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,13 +12,12 @@ from jaxtyping import Float
 from jounce.constraints import AbstractConstraint
 from jounce.display import Displayed
 from jounce.errors import MechanismError, check_name
-from jounce.jet import Jet
-from jounce.jet.algebra import stacked
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
-from jounce.kinematics.compilation import compiled
+from jounce.kinematics.chunks import in_chunks
 from jounce.kinematics.on_demand import OnDemand
 from jounce.kinematics.path_following import Passage
+from jounce.kinematics.pose_outputs import output_series
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
     AbstractMotionOutput,
@@ -32,34 +32,20 @@ from jounce.mechanism import (
     PointOutput,
 )
 from jounce.mechanism.attitude_outputs import continued, euler_angles_of
-from jounce.mechanism.axis_angles import AttitudeHistory, attitudes_of, measures_angle
+from jounce.mechanism.axis_angles import AttitudeHistory, at_lanes, attitudes_of, measures_angle
 from jounce.mechanism.builder import counted_as_in
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
+from jounce.modules import with_fields
 from jounce.shapes import ArrayLike, Numbers
 from jounce.trajectory import HermiteMotion
 
 if TYPE_CHECKING:
     import xarray
 
+TOGETHER = 1024  # instants at which an output that was not solved for is evaluated: one program for few and for many
 _UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
-
-
-@compiled("pose_type")
-def output_series(
-    groups: tuple[Group, ...], coordinates: dict[str, Any], pose_type: type
-) -> tuple[Float[Numbers, "_ _ _ batch"], ...]:
-    """Return the Taylor coefficients of outputs, (order + 1, components, instances, batch) for each group."""
-    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
-    return tuple(stacked(group.evaluate(pose)) for group in groups)
-
-
-def output_values(
-    groups: tuple[Group, ...], coordinates: dict[str, Any], pose_type: type
-) -> tuple[Float[Numbers, "_ _ _ batch"], ...]:
-    """Return the derivatives of outputs, (order + 1, components, instances, batch) for each group."""
-    return tuple(plain_derivatives(np.asarray(x)) for x in output_series(groups, coordinates, pose_type))
 
 
 def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
@@ -357,9 +343,21 @@ class Motion(Displayed):
         return self.history
 
     def _coefficients(self, group: Group) -> Float[np.ndarray, "order component instance time"]:
-        """Return the Taylor coefficients of outputs, (order + 1, components, instances, time)."""
-        (series,) = output_series(self._counting((group,)), self._coordinates, self.model.pose_type)
-        return np.asarray(series)
+        """Return the Taylor coefficients of outputs, (order + 1, components, instances, time).
+
+        The program is given the ground, which never moves, and the bodies of the group alone: it serves any others.
+        """
+        moving, index = [body for slot in group.bodies for body in slot if body], itertools.count(1)
+        places = tuple(tuple(next(index) if body else 0 for body in slot) for slot in group.bodies)
+        coordinates = {name: part[..., [0, *moving], :] for name, part in self._coordinates.items()}
+        groups = tuple(with_fields(counted, bodies=places) for counted in self._counting((group,)))
+
+        def chunk(lanes: np.ndarray) -> Any:
+            known = {name: part[..., lanes] for name, part in coordinates.items()}
+            return output_series(at_lanes(groups, lanes), known, self.model.pose_type)
+
+        (series,) = in_chunks(chunk, len(self.time), (TOGETHER,))
+        return series
 
     def _counting(self, groups: tuple[Group, ...]) -> tuple[Group, ...]:
         return groups if self.history is None else self.history.counting(groups, self.time)

@@ -10,7 +10,8 @@ from jaxtyping import Float
 from jounce.errors import UnsupportedError
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
-from jounce.kinematics.motion import Motion, output_series
+from jounce.kinematics.motion import Motion
+from jounce.kinematics.pose_outputs import output_series
 from jounce.kinematics.sensitivities import Solved
 from jounce.kinematics.status import Status
 from jounce.mechanism import AbstractMotionOutput, AbstractOutput, Mechanism, Model

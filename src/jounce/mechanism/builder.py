@@ -29,7 +29,7 @@ from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.outputs import AbstractMotionOutput
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.resolve import along_instances, resolve, resolved
-from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, group_elements, holding
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, group_elements, holding, law_left_out
 from jounce.modules import unchecked, with_fields
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
@@ -319,7 +319,7 @@ def _layout(
 
 
 def _row_count(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> int:
-    leaves, structure = jax.tree.flatten((group, guess))
+    leaves, structure = jax.tree.flatten((law_left_out(group), guess))
     return _row_count_of(structure, tuple(map(np.shape, leaves)), pose_type)
 
 

@@ -139,6 +139,19 @@ def holding(group: Group, name: str, value: Any) -> Group:
     return with_fields(group, element=with_fields(group.element, **{name: value}))
 
 
+class _Still(AbstractMotion):
+    """No motion."""
+
+    def __call__(self, time: Jet) -> Jet:
+        return 0.0 * time
+
+
+def law_left_out(group: Group) -> Group:
+    """Return a group without its law, unless how residuals change with bodies may depend on that."""
+    kind = next(kind for kind in type(group.element).__mro__ if "residual" in vars(kind))
+    return holding(group, "motion", _Still()) if vars(kind).get("law_apart", False) else group
+
+
 def with_rows(jet: Jet) -> Jet:
     """Return a jet of shape (instances, batch) as one of shape (1, instances, batch)."""
     return jet.map(lambda c: c[None]) if len(jet.shape) == 2 else jet

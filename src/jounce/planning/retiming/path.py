@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.motion_values import in_chunks
+from jounce.kinematics.chunks import in_chunks
 from jounce.trajectory import AbstractMotion
 from jounce.trajectory.stacking import law_derivatives
 

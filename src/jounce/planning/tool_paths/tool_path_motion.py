@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.display import Displayed
-from jounce.dynamics.motion_values import in_chunks
 from jounce.errors import TrajectoryError
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Status
+from jounce.kinematics.chunks import in_chunks
 from jounce.kinematics.linear import singular_values
 from jounce.planning.tool_paths.joint_laws import followed_closely
 from jounce.planning.tool_paths.path_equations import PathEquations
