@@ -1,5 +1,8 @@
 """Jacobians as jets, and the factors that solve for multipliers, beside differences and plain linear algebra."""
 
+import dataclasses
+from functools import partial
+
 import jax
 import numpy as np
 import pytest
@@ -11,7 +14,9 @@ from jounce.dynamics.masses import Masses
 from jounce.jet import Jet
 from jounce.kinematics.jacobian_series import slopes
 from jounce.mechanism import build
+from jounce.mechanism.system import law_left_out
 from tests.problems.bank import cases, group_of, pose_of, random_motion
+from tests.problems.massed import arm
 
 STEP = 1e-3
 
@@ -65,6 +70,42 @@ def test_slopes_are_the_jacobian_and_its_rates(case):
         np.testing.assert_allclose(slope[1], first, atol=1e-9 * size)
         if order > 1:
             np.testing.assert_allclose(2 * slope[2], second, atol=1e-6 * size)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [case for case in cases() if case.kind.role == "driver"], ids=str)
+def test_slopes_do_not_depend_on_the_laws_that_are_left_out(case):
+    random = np.random.default_rng(11)
+    group, motion = group_of([case.element(random)], case.space), random_motion(random, case.space, 3)
+    bare, pose = law_left_out(group), pose_of(motion)
+    assert type(bare.element.motion) is not type(group.element.motion)
+
+    @partial(jax.jit, static_argnums=1)
+    def slope(group, slot):
+        poses = [pose.take(bodies) for bodies in group.bodies]
+        return slopes(group.element, poses, Jet.variable(np.full((1, 1), 0.3), 3), slot)
+
+    for slot in range(len(group.bodies)):
+        found, wanted = slope(bare, slot), slope(group, slot)
+        np.testing.assert_allclose(found, wanted, rtol=1e-14, atol=1e-14 * np.abs(wanted).max())
+
+
+class Stretched(jn.drivers.CoordinateDriver):
+    """A driver of one's own: what its law is decides how its residual changes with the body."""
+
+    def residual(self, body_i, body_j, time):
+        law = self.motion(time)
+        return (self.evaluate(body_i, body_j) - law) * (2.0 + law * law)
+
+
+def test_a_law_that_slopes_may_depend_on_is_kept():
+    """The torque is that of an ordinary driver: Jacobian and conjugate of the law are stretched alike."""
+    plain = arm(mass=2.0, inertia=0.3, center_of_mass=[0.5, 0.0])
+    driver = plain.drivers["turn"]
+    own = dataclasses.replace(plain, drivers={"turn": Stretched(driver.bodies, driver.coordinate, driver.motion)})
+    time = np.linspace(0.0, 1.0, 5)
+    found, wanted = (jn.driver_force(jn.solve(mechanism, time), "turn").values for mechanism in (own, plain))
+    np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12 * np.abs(wanted).max())
 
 
 @pytest.mark.slow

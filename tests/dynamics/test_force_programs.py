@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.dynamics import force_programs
 from jounce.dynamics.inverse import MotionForces
 from jounce.native import machine, programs
 
@@ -83,9 +82,14 @@ def test_multipliers_of_free_motions(name, end, monkeypatch):
 
 
 @pytest.mark.slow
-def test_redundant_rows_have_no_machine_code(monkeypatch):
-    asked = []
-    monkeypatch.setattr(force_programs, "balance_of_instant", lambda *a: asked.append(a))
-    motion = jn.solve(dataclasses.replace(jn.load("examples/bennett.yaml"), outputs={}))
-    assert np.isfinite(MotionForces(motion).multipliers).all()
-    assert not asked
+@pytest.mark.parametrize("name", ["bennett", "sarrus", "four_bar_in_space"])
+def test_multipliers_of_redundant_rows(name, monkeypatch):
+    """Those of least norm, and which reactions they leave open."""
+    motion = jn.solve(dataclasses.replace(jn.load(f"examples/{name}.yaml"), outputs={}))
+    agree(*both_ways(motion, monkeypatch))
+    monkeypatch.delenv("JOUNCE_NATIVE")
+    known = np.isfinite(MotionForces(motion).unique_multipliers)
+    monkeypatch.setenv("JOUNCE_NATIVE", "0")
+    np.testing.assert_array_equal(np.isfinite(MotionForces(motion).unique_multipliers), known)
+    assert known.any()
+    assert known.all() == (motion.mechanism.redundant_reactions != "unique")

@@ -280,7 +280,7 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
         for axis in range(array.ndim)
         if axis not in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims)
     ]
-    sizes, named = p["slice_sizes"], {axis: k for k, axis in enumerate(numbers.start_index_map)}
+    sizes, named = p["slice_sizes"], {int(axis): k for k, axis in enumerate(numbers.start_index_map)}
     beyond = stored(code, filled((), [code.constant(filler(p, aval.dtype), found.kind)]))
 
     def window(which: list[int | Value]) -> None:
@@ -321,7 +321,7 @@ def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
     sizes = [1] * found.ndim
     for axis, of in zip(kept, windows, strict=True):
         sizes[axis] = updates.shape[of]
-    named = {axis: k for k, axis in enumerate(numbers.scatter_dims_to_operand_dims)}
+    named = {int(axis): k for k, axis in enumerate(numbers.scatter_dims_to_operand_dims)}
 
     def window(which: list[int | Value]) -> None:
         first, inside = _placed(code, p, found, indices, named, sizes, which)
