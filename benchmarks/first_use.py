@@ -10,8 +10,8 @@ from benchmarks.cases import ROOT, Case, Cases, Contestant, Told
 from benchmarks.processes import command
 
 FILES = {
-    "run": ("four_bar.yaml", "rsur.yaml", "stewart_platform.yaml", "delta_robot.yaml"),
-    "simulate": ("double_pendulum.yaml", "flyball_governor.yaml", "spatial_slider_crank_free.yaml"),
+    "run": ("four_bar.yaml", "rsur.yaml", "stewart_platform.yaml", "delta_robot.yaml", "delta_pick.yaml"),
+    "simulate": ("double_pendulum.yaml", "flyball_governor.yaml", "spatial_slider_crank_free.yaml", "sarrus.yaml"),
 }
 AIM = 2.5  # s, of the second time
 
