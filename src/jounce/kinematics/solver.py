@@ -27,6 +27,7 @@ SPAN_ENTRIES = 2**19  # of the coordinates of what a thread solves at once: the 
 FEWEST_SIDE_BY_SIDE, MOST_SIDE_BY_SIDE = 64, 1024  # instants of a long grid in a call of machine code
 FEW_COLUMNS = 36  # of a Jacobian: of more, machine code of single values alone is too long to be fast
 LARGE = 64  # numbers of an array that stays in memory there
+LARGE_BESIDE_TABLES = 128  # the same in small mechanisms, of which laws through many samples are no single values
 NO_GRID = np.empty(0)
 
 
@@ -166,7 +167,9 @@ class Solver:
         instants = self.needed((still, outputs, nothing)), nothing, nothing, np.zeros(1, bool)
         kind = self.model.pose_type
         small = system.shape[1] <= FEW_COLUMNS and not self.hasty
-        how = {"large": None if small else LARGE, "hasty": self.hasty}
+        laws = [getattr(group.element, "motion", ()) for group in system.groups]
+        tables = max(map(np.size, jax.tree.leaves(laws)), default=0) > LARGE
+        how = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE, "hasty": self.hasty}
         shared = system, tolerance, refine, wanted
         return advance_instant.program(shared, instants, **how, pose_type=kind, order=self.order)
 

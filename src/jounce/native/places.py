@@ -204,16 +204,19 @@ def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Value
     if not moving:
         return [_taken(numbers, at(known))]
     (axis,) = moving
-    size = array.shape[p["dimension_numbers"].start_index_map[axis]]
+    along = p["dimension_numbers"].start_index_map[axis]
+    size, width = array.shape[along], p["slice_sizes"][along]
+    # one beyond each end, too; or while all of a part is inside, so that numbers in memory need not be copied
+    least, most = (-1, size) if p["mode"] == GatherScatterMode.FILL_OR_DROP else (0, size - width)
     tables = []
-    for k in range(-1, size + 1):  # one beyond each end, too
+    for k in range(least, most + 1):
         known[..., axis] = k
         tables.append(at(known))
     found = np.empty(tables[0].shape, object)
     which = [k for k in range(found.ndim) if k not in p["dimension_numbers"].offset_dims]
     for place in np.ndindex(found.shape):
-        index = within(code, indices[(*(place[k] for k in which), axis)], -1, size)
-        index = code.arithmetic("add", index, code.constant(1, index.kind))
+        index = within(code, indices[(*(place[k] for k in which), axis)], least, most)
+        index = code.arithmetic("add", index, code.constant(-least, index.kind))
         found[place] = _element(code, [numbers[table[place]] for table in tables], index)
     return [found]
 

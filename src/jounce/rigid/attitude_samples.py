@@ -6,6 +6,7 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet, cross, dot, sqrt, stack, transpose
+from jounce.jet.pieces import last_begun
 from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.rigid.orientation import angular_velocity, check_rotation
 from jounce.rigid.rotations import rotation_matrix
@@ -135,8 +136,7 @@ class AttitudeSamples:
             )
             raise TrajectoryError(message, name="order", value=time.order)
         self._check_range(instants)
-        piece = jnp.searchsorted(jnp.asarray(self._breakpoints), instants, side="right") - 1
-        piece = jnp.clip(piece, 0, len(self._breakpoints) - 1)
+        piece = last_begun(self._breakpoints, instants)
         local = time - jnp.asarray(self._breakpoints)[piece]
         powers = jnp.asarray(self._coefficients)[..., piece]  # (power, component, ...)
         value = Jet.constant(powers[-1], time.order)

@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, compose
+from jounce.jet.pieces import last_begun
 from jounce.modules import Module
 from jounce.shapes import ArrayLike, Numbers, Real, is_traced
 from jounce.trajectory.expression import Expression
@@ -244,13 +245,12 @@ class SplineMotion(AbstractMotion):
         """Return where the pieces at some instants begin, and their columns of a table of shape (rows, pieces)."""
         breakpoints = jnp.asarray(self.breakpoints)
         if breakpoints.ndim == 1:
-            piece = jnp.searchsorted(breakpoints, instants, side="right") - 1
-            piece = jnp.clip(piece, 0, None)
-            return breakpoints[piece], table[:, piece]
+            piece = last_begun(breakpoints, instants)
+            start, columns = (x.at[..., piece].get(mode="promise_in_bounds") for x in (breakpoints, table))
+            return start, columns
         # several drivers of one kind, stacked along an axis before the batch: (samples, drivers, 1)
         rows = jnp.broadcast_to(instants, (breakpoints.shape[1], instants.shape[-1]))
-        search = jax.vmap(lambda x, row: jnp.searchsorted(x, row, side="right") - 1, in_axes=(1, 0))
-        piece = jnp.clip(search(breakpoints[..., 0], rows), 0, None)
+        piece = jax.vmap(last_begun, in_axes=(1, 0))(breakpoints[..., 0], rows)
         start = jnp.take_along_axis(breakpoints[..., 0], piece.T, axis=0).T
         return start, jnp.swapaxes(jnp.take_along_axis(table[..., 0], piece.T[None], axis=1), 1, 2)
 

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from jounce.errors import TrajectoryError
 from jounce.jet import Jet
+from jounce.jet.pieces import last_begun
 from jounce.shapes import ArrayLike
 from jounce.trajectory import AbstractMotion
 from jounce.trajectory.motion import SLACK
@@ -96,7 +97,7 @@ def _series(instants: Any, begins: Any, pieces: Any, at: Any, order: int) -> tup
     """Return the Taylor coefficients of u at instants."""
     slack = SLACK * instants[-1]
     inside = jnp.clip(at, 0.0, instants[-1])
-    piece = jnp.clip(jnp.searchsorted(instants, inside, side="right") - 1, 0, len(instants) - 2)
+    piece = last_begun(instants[:-1], inside)
     c, begin = pieces[:, piece], begins[piece]
     length, elapsed = begins[piece + 1] - begin, inside - instants[piece]
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
