@@ -55,6 +55,22 @@ def test_motions_are_those_of_xla(mechanism, count, monkeypatch):
     agree(*both_ways(mechanism(), np.linspace(0, 2, count), monkeypatch))
 
 
+@pytest.mark.parametrize("samples", [25, pytest.param(301, marks=pytest.mark.slow)])
+def test_motions_by_laws_through_samples_are_those_of_xla(samples, monkeypatch):
+    """Of many samples, too: their table stays in memory, where single values would be too much code."""
+    made, program = [], side_by_side.SideBySide.program
+    monkeypatch.setattr(
+        side_by_side.SideBySide,
+        "program",
+        lambda *a, **k: made.append(program(*a, **k) is not None) or program(*a, **k),
+    )
+    instants = np.linspace(0, 2, samples)
+    law = jn.trajectory.SplineMotion(instants, 0.5 + np.sin(np.pi * instants), 7)
+    found, wanted = both_ways(four_bar(motion=law), np.linspace(0, 2, 1500), monkeypatch)
+    assert made[0]
+    agree(found, wanted, tolerance=1e-12)
+
+
 @pytest.mark.slow
 def test_motions_of_many_bodies_are_those_of_xla(monkeypatch):
     mechanism = chain(20)
