@@ -26,6 +26,7 @@ LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
 SPAN_ENTRIES = 2**19  # of the coordinates of what a thread solves at once: the cache holds them
 FEWEST_SIDE_BY_SIDE, MOST_SIDE_BY_SIDE = 64, 1024  # instants of a long grid in a call of machine code
 FEW_COLUMNS = 36  # of a Jacobian: of more, machine code of single values alone is too long to be fast
+FEW_OF_REDUNDANT_ROWS = 18  # the same in least squares, whose bases take more code than reflections
 LARGE = 64  # numbers of an array that stays in memory there
 LARGE_BESIDE_TABLES = 128  # the same in small mechanisms, of which laws through many samples are no single values
 NO_GRID = np.empty(0)
@@ -166,7 +167,8 @@ class Solver:
         outputs = tuple(np.zeros((self.order + 1, 1, group.instances, 1)) for group in system.outputs)
         instants = self.needed((still, outputs, nothing)), nothing, nothing, np.zeros(1, bool)
         kind = self.model.pose_type
-        small = system.shape[1] <= FEW_COLUMNS and not self.hasty
+        few = FEW_COLUMNS if system.rank is None else FEW_OF_REDUNDANT_ROWS
+        small = system.shape[1] <= few and not self.hasty
         laws = [getattr(group.element, "motion", ()) for group in system.groups]
         tables = max(map(np.size, jax.tree.leaves(laws)), default=0) > LARGE
         how = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE, "hasty": self.hasty}
