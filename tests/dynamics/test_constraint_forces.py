@@ -108,6 +108,31 @@ def test_a_law_that_slopes_may_depend_on_is_kept():
     np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12 * np.abs(wanted).max())
 
 
+class Renamed(jn.drivers.DistanceDriver):
+    """A driver of one's own that calls something else its coordinate."""
+
+    def evaluate(self, body_i, body_j):
+        return 0.5 * super().evaluate(body_i, body_j)
+
+
+@pytest.mark.parametrize("kind", [jn.drivers.DistanceDriver, Renamed])
+def test_what_a_driver_exerts_by_a_square_of_its_law(kind):
+    """A block on rails, x = 2 + t^2 / 2, pushed from a point beside them: F = m x'' d / x."""
+    block = jn.Mechanism(
+        space="planar",
+        bodies={"block": jn.Body([2, 0], mass=3.0, inertia=1.0)},
+        joints={"rails": jn.planar.Prismatic(("ground", "block"), [0, 0], [0, 0], [1, 0], [1, 0])},
+        drivers={"push": kind(("ground", "block"), [0, 1], [0, 0], "sqrt(1 + (2 + t**2 / 2)**2)")},
+    )
+    time = np.linspace(0.0, 2.0, 5)
+    x, rate = 2 + time**2 / 2, time
+    d = np.sqrt(1 + x**2)
+    force, yank = 3 * d / x, 3 * (rate / d - d * rate / x**2)
+    found = jn.driver_force(jn.solve(block, time, order=3), "push").values
+    np.testing.assert_allclose(found[:, 0], force, rtol=1e-13)
+    np.testing.assert_allclose(found[:, 1], yank, rtol=1e-12, atol=1e-13)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("space", ["planar", "spatial"])
 def test_mass_matrices_give_the_kinetic_energy(space):

@@ -1,6 +1,5 @@
 """Programs that are kept between processes: the same results as without, whatever became of the store."""
 
-import gc
 import threading
 
 import jax
@@ -10,6 +9,7 @@ import pytest
 import jounce as jn
 from jounce.kinematics import compilation, store as store_
 from jounce.kinematics.compilation import Compiled, compiles_anew
+from tests.programs import forget
 
 
 class Shelf(dict):
@@ -133,9 +133,7 @@ def test_a_motion_is_the_same_with_kept_programs(shelf):
     time = np.linspace(0.0, 0.1, 7)
     before = jn.solve(mechanism, time, order=5)
     assert shelf
-    for thing in gc.get_objects():
-        if isinstance(thing, Compiled):
-            thing._programs.clear()  # as in a new process
+    forget()
     count = len(shelf)
     after = jn.solve(mechanism, time, order=5)
     assert len(shelf) == count

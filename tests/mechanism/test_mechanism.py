@@ -98,9 +98,18 @@ def joint(kind, *values, space="planar", bodies=("ground", "crank")):
 ORIGIN = [0, 0, 0]
 
 
+class Misread(jn.SplineMotion):
+    """A law of one's own that cannot be evaluated."""
+
+    def __call__(self, time):
+        return self.coefficients.no_such_thing(time)
+
+
 @pytest.mark.parametrize(
     "wrong, message",
     [
+        (lambda: crank(lambda t: t.no_such_thing), r"drivers\.turn.*law cannot be used.*no_such_thing"),
+        (lambda: crank(Misread(np.arange(6.0), np.zeros(6))), r"drivers\.turn.*law cannot be used.*no_such_thing"),
         (lambda: joint(planar.Revolute, [0, 0, 0], [0, 0]), r"joints\.J\.point_i.*vector of 2 numbers"),
         (lambda: joint(planar.Revolute, [0, 0], 1.0), r"joints\.J\.point_j.*vector of 2 numbers"),
         (lambda: joint(planar.Revolute, [0, np.nan], [0, 0]), r"joints\.J\.point_i.*finite"),

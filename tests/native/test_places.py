@@ -197,3 +197,27 @@ def test_changes_at_known_indices(mode):
     x, y = ordinary(4, 3), ordinary(4, 3, seed=1)
     for shared in ([1, 3], [1, 1], [-1, 7]):
         assert_agree(run, x, y, whole(4, 3), shared=(np.array(shared),), known=(0,))
+
+
+@pytest.mark.parametrize("mode", [*MODES.values(), GatherScatterMode.PROMISE_IN_BOUNDS])
+def test_windows_of_batches(mode):
+    """Each of three tables has four windows of its own, of one row and of two, with their axes among the others.
+
+    No two have a row in common: which of them is put there last is not told.
+    """
+    ends = (0, 7) if mode == GatherScatterMode.PROMISE_IN_BOUNDS else (-3, 12)
+    at = np.random.default_rng(7).permuted([[ends[0], 2, 4, ends[1]]] * 3, axis=1)[..., None]
+    kinds = {"lines": ((2,), (1,), (1,), (0,), (0,)), "parts": ((1, 3), (), (1,), (0,), (0,))}
+    sizes = {"lines": (1, 1, 3), "parts": (1, 2, 3)}
+
+    def run(shared, x, lines, parts):
+        found, x = {}, x[..., 0]
+        for name, new in (("lines", lines[..., 0]), ("parts", parts[..., 0])):
+            numbers = kinds[name]
+            found[name] = lax.gather(x, shared, lax.GatherDimensionNumbers(*numbers), sizes[name], mode=mode)
+            found[f"put {name}"] = lax.scatter(x, shared, new, lax.ScatterDimensionNumbers(*numbers), mode=mode)
+            found[f"added {name}"] = lax.scatter_add(x, shared, new, lax.ScatterDimensionNumbers(*numbers), mode=mode)
+        return [part[..., None] for part in found.values()]
+
+    given = ordinary(3, 9, 3), ordinary(3, 4, 3, seed=1), ordinary(3, 2, 4, 3, seed=2)
+    assert_agree(run, *given, shared=(at,), known=(0,))

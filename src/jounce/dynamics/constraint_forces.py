@@ -30,7 +30,7 @@ from jounce.jet.algebra import stacked, total
 from jounce.kinematics.frontal import FrontalFactor
 from jounce.kinematics.jacobian_series import Slope, solver
 from jounce.kinematics.linear import DenseFactor
-from jounce.mechanism.system import System, with_rows
+from jounce.mechanism.system import LeftOut, System, with_rows
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
@@ -175,11 +175,15 @@ def onto_bodies(
 class _Shifted(AbstractMotion):
     """A law moved by a constant: how the residual of a driver changes with it tells what the driver exerts."""
 
-    law: AbstractMotion
+    law: Callable[[Jet], Jet]
     shift: Any
 
     def __call__(self, time: Jet) -> Jet:
         return self.law(time) + self.shift
+
+
+def _told(value: Jet, _: Jet) -> Jet:
+    return value
 
 
 def exerted(
@@ -192,15 +196,18 @@ def exerted(
     Parameters
     ----------
     driver : AbstractConstraint
-        Its values have shape (..., instances, 1).
+        Its values have shape (..., instances, 1). Where its law is left out, it is what the bodies tell.
     poses, time
         As `slopes` takes them.
     forces : array of shape (levels, rows, instances, batch)
         Coefficients of the multipliers; the order of the poses is one less than the levels.
     """
+    law = driver.motion
+    if isinstance(law, LeftOut):
+        law = partial(_told, driver.evaluate(*poses))
 
     def residual(shift: Any) -> Any:
-        element = eqx.tree_at(lambda e: e.motion, driver, _Shifted(driver.motion, shift))
+        element = eqx.tree_at(lambda e: e.motion, driver, _Shifted(law, shift))
         return stacked(with_rows(element.residual(*poses, time)))
 
     shift = jnp.zeros(forces.shape[2:])

@@ -215,11 +215,11 @@ class MotionForces:
     def driver_force(self, name: str) -> Float[Numbers, "order 1 time"]:
         """Return what a driver exerts along what it prescribes, as Taylor coefficients."""
         place = self.indices[name]
+        driver = law_left_out(self.model.system.groups[place.group], told=True).element
 
         def chunk(lanes: np.ndarray) -> Any:
-            element, poses = self.model.system.groups[place.group].element, self._poses(place.group, lanes)
-            exerting = self._of_group(place)[..., lanes]
-            return programs.exerted(element, poses, self.motion.time[lanes], exerting, self.pose_type)
+            poses, exerting = self._poses(place.group, lanes), self._of_group(place)[..., lanes]
+            return programs.exerted(driver, poses, self.motion.time[lanes], exerting, self.pose_type)
 
         return self._once(chunk, "driver", place.group)[:, place.instance : place.instance + 1]
 

@@ -1,8 +1,8 @@
 """The programs of a run, compiled while its start is looked for."""
 
 import threading
+from collections.abc import Callable
 from contextlib import ExitStack
-from typing import Any
 
 import jax
 import numpy as np
@@ -11,11 +11,13 @@ from jaxtyping import Float
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.masses import gravity_of, required_masses
 from jounce.dynamics.start import ConsistentStart, at_rest, equations_of
+from jounce.integrate.events import pose_coordinates
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.methods import AbstractMethod
-from jounce.integrate.simulation import FEW_INSTANTS, motion_at
+from jounce.integrate.simulation import FEW_INSTANTS, derivatives_of_motion, motion_at
 from jounce.kinematics.alone import is_wanted
 from jounce.kinematics.device import resident
+from jounce.kinematics.forces_at_rest import ask_forces_at_rest
 from jounce.kinematics.rehearsal import first_time, rehearsed
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.builder import released
@@ -34,7 +36,7 @@ class ProgramsAhead(ExitStack):
     instants : array of shape (time,)
         At which the motion is wanted, s.
     order : int
-        Highest derivative of the motion that the outputs need.
+        Highest derivative of the outputs.
     method : AbstractMethod
         How steps are taken.
     tolerance, longest : float
@@ -51,14 +53,15 @@ class ProgramsAhead(ExitStack):
         longest: float,
     ):
         super().__init__()
-        self._mechanism, self._instants, self._order = mechanism, instants, order
+        self._mechanism, self._instants = mechanism, instants
+        self._order, self._highest = order, derivatives_of_motion(mechanism, order)
         self._method, self._limits = method, (tolerance, longest)
         self._expansion = method.expansion_order(tolerance)
         self._wanted = False
 
     def begin(self, model: Model) -> None:
         """Begin with what is built already, if the programs depend on nothing else."""
-        self._wanted = first_time("march", model.system, self._expansion, self._order, self._method)
+        self._wanted = first_time("march", model.system, self._expansion, self._highest, self._method)
         if not self._wanted:
             return
         model = released(model) if self._mechanism.initial else model
@@ -80,27 +83,40 @@ class ProgramsAhead(ExitStack):
         def begun() -> IntegratorState:
             return unexpanded(equations, state, first, order=self._expansion)
 
-        written = threading.Event()  # the march, which takes longer to compile: first of those that Python writes
-        if not is_wanted():
-            written.set()
-
         def arrived() -> None:
             current = begun()
             current = current._replace(outcome=np.full_like(current.outcome, int(Outcome.ARRIVED)))
+            march(equations, current, last, *self._limits, method=self._method, count=STEPS)
+
+        def evaluated() -> None:
+            dense = self._one_step(begun(), last - first[0])
+            outputs, some = model.system.outputs, self._instants[: FEW_INSTANTS + 1]
+            motion_at(equations, outputs, dense, some, np.zeros(len(some), int), self._highest)
+
+        def forces() -> None:
+            still = pose_coordinates(state.map(lambda part: np.asarray(part)[None]))
+            pose = {name: part[0] for name, part in still.items() if len(part)}  # angular velocities begin one later
+            ask_forces_at_rest(self._mechanism, model, pose, self._instants, self._order, self._highest + 1)
+
+        before = None
+        for rehearsal in (arrived, forces, evaluated):  # those that LLVM takes longest for are written first
+            before = self._after(before, rehearsal)
+
+    def _after(self, before: threading.Event | None, rehearsal: Callable[[], None]) -> threading.Event:
+        """Begin with programs as soon as those before are written, which LLVM then compiles; and tell when they are."""
+        written = threading.Event()
+
+        def told() -> None:
+            if before is not None and is_wanted():
+                before.wait()
             try:
                 with telling(written.set):
-                    march(equations, current, last, *self._limits, method=self._method, count=STEPS)
+                    rehearsal()
             finally:
                 written.set()
 
-        def evaluated() -> Any:
-            written.wait()
-            dense = self._one_step(begun(), last - first[0])
-            outputs, some = model.system.outputs, self._instants[: FEW_INSTANTS + 1]
-            return motion_at(equations, outputs, dense, some, np.zeros(len(some), int), self._order)
-
-        self.enter_context(rehearsed(arrived, wanted=True))
-        self.enter_context(rehearsed(evaluated, wanted=True))
+        self.enter_context(rehearsed(told, wanted=True))
+        return written
 
     def _one_step(self, current: IntegratorState, length: float) -> DenseOutput:
         """Return one step, at rest, in the form of those that will be taken."""

@@ -23,7 +23,7 @@ from jounce.integrate.programs_ahead import STEPS, ProgramsAhead
 from jounce.integrate.robot_simulation import RobotSimulation
 from jounce.integrate.sensitivities import traced_simulation
 from jounce.integrate.simulate_robot import RobotOptions, simulate_robot
-from jounce.integrate.simulation import Simulation, derivatives_of_motion
+from jounce.integrate.simulation import Simulation
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.compilation import compiled
@@ -184,8 +184,7 @@ def simulate(
     for event in events:
         _check_event(event, mechanism)
     first = float(instants[0])
-    highest = derivatives_of_motion(mechanism, order)
-    with ProgramsAhead(mechanism, instants, highest, method, float(tolerance), float(longest_step)) as ahead:
+    with ProgramsAhead(mechanism, instants, order, method, float(tolerance), float(longest_step)) as ahead:
         start = consistent_start(mechanism, first, ahead.begin)
         _check_forces(start, first)
         detectors = [_detector_of(event, mechanism, start) for event in events]

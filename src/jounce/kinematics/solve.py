@@ -17,6 +17,7 @@ from jounce.kinematics.assembly import assemble
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.dead_ends import dead_end_words
 from jounce.kinematics.device import resident
+from jounce.kinematics.forces_at_rest import ask_forces_at_rest
 from jounce.kinematics.grid import LONG_GRID
 from jounce.kinematics.long_grids import solve_grid
 from jounce.kinematics.motion import Motion
@@ -30,7 +31,6 @@ from jounce.kinematics.stretches import Stretches
 from jounce.kinematics.threads import thread_count
 from jounce.kinematics.traced_motion import TracedMotion
 from jounce.mechanism import (
-    AbstractMotionOutput,
     Mechanism,
     Model,
     build,
@@ -38,7 +38,6 @@ from jounce.mechanism import (
     time_grid,
     with_outputs_held,
 )
-from jounce.mechanism.axis_angles import AttitudeHistory
 from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete, concrete_or
@@ -48,7 +47,6 @@ LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the us
 HIGHEST_ORDER = 30  # of derivatives of outputs
 HIGHEST_OF_MOTION = HIGHEST_ORDER + 2  # forces are two derivatives shorter than the motion
 LARGEST_TOLERANCE = 1e-2
-REHEARSED = 2  # instants: forces are computed for many at a time, however few there are
 
 
 def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> Motion:
@@ -271,31 +269,13 @@ def _prepare(solver: Solver, instant: float) -> None:
 
 
 def _rehearse(mechanism: Mechanism, solver: Solver, still: SolvedState, instants: Instants) -> None:
-    """Use the programs of wide batches, and those of outputs that are forces, with the bodies at rest where they are.
-
-    What drivers exert that follow from outputs is found with another model, which only the motion tells.
-    """
-    count, known = min(len(instants), REHEARSED), still
+    """Use the programs of wide batches, and those of outputs that are forces, with the bodies at rest."""
     if len(instants) > LONG_GRID:
-        needed = solver.needed(_repeated(known, solver.width))
-        solver(needed, np.zeros(solver.width), np.asarray(instants[: solver.width]))
-    outputs = [x for x in mechanism.outputs.values() if isinstance(x, AbstractMotionOutput) and x.of_forces]
-    if outputs and not led_outputs(mechanism):
-        coordinates, *_ = _repeated(still, count)
-        groups = tuple(np.zeros((solver.order + 1, 1, group.instances, count)) for group in solver.model.system.outputs)
-        history = None
-        if "quaternion" in coordinates:
-            coordinates["angular_velocity"] = np.zeros_like(coordinates["position"][1:])
-            history = AttitudeHistory(coordinates["quaternion"][0, ..., :1], np.zeros(1))
-        state, status = (coordinates, groups), np.zeros(count, int)
-        order, times = solver.order - lost_orders(mechanism), np.asarray(instants[:count])
-        motion = Motion(mechanism, solver.model, times, order, state, status, {}, history=history)
-        for output in outputs:
-            output.coefficients(motion)
-
-
-def _repeated(known: SolvedState, count: int) -> Any:
-    return jax.tree.map(lambda x: np.repeat(x, count, axis=-1), known)
+        known = jax.tree.map(lambda x: np.repeat(x, solver.width, axis=-1), still)
+        solver(solver.needed(known), np.zeros(solver.width), np.asarray(instants[: solver.width]))
+    pose = {name: part[0] for name, part in still[0].items()}
+    order = solver.order - lost_orders(mechanism)
+    ask_forces_at_rest(mechanism, solver.model, pose, instants, order, solver.order + 1)
 
 
 def raise_for_status(motion: Any) -> None:

@@ -122,8 +122,7 @@ def _of_products(
         size = jnp.maximum(jnp.sqrt(jnp.mean(jnp.sum(vectors * vectors, axis=0))), 1e-300)
         return product(vectors / size), grown + jnp.log(size)
 
-    with jax.ensure_compile_time_eval():
-        start = jax.random.normal(jax.random.key(0), (columns, PROBES))
+    start = np.random.default_rng(0).standard_normal((columns, PROBES))
     power = 2**SQUARINGS
     vectors, grown = jax.lax.fori_loop(0, power, multiplied, (start / np.sqrt(columns), np.zeros(())))
     square = jnp.sum(vectors * vectors)

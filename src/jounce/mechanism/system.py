@@ -139,17 +139,30 @@ def holding(group: Group, name: str, value: Any) -> Group:
     return with_fields(group, element=with_fields(group.element, **{name: value}))
 
 
-class _Still(AbstractMotion):
-    """No motion."""
+class LeftOut(AbstractMotion):
+    """No motion, in the place of a law on which nothing depends."""
 
     def __call__(self, time: Jet) -> Jet:
+        """Return zero."""
         return 0.0 * time
 
 
-def law_left_out(group: Group) -> Group:
-    """Return a group without its law, unless how residuals change with bodies may depend on that."""
-    kind = next(kind for kind in type(group.element).__mro__ if "residual" in vars(kind))
-    return holding(group, "motion", _Still()) if vars(kind).get("law_apart", False) else group
+def law_left_out(group: Group, *, told: bool = False) -> Group:
+    """Return a group without its law, unless how residuals change with bodies may depend on that.
+
+    Parameters
+    ----------
+    group : Group
+        Of joints or drivers.
+    told : bool, default False
+        Whether the law is left out only if bodies that move by it tell what it says: by `evaluate`.
+    """
+    element = type(group.element)
+    kind = next(kind for kind in element.__mro__ if "residual" in vars(kind))
+    apart = vars(kind).get("law_apart", False)
+    if apart and told:  # `evaluate` may have been changed by a class that keeps the residual
+        apart = getattr(kind, "evaluate", None) is getattr(element, "evaluate", object)
+    return holding(group, "motion", LeftOut()) if apart else group
 
 
 def with_rows(jet: Jet) -> Jet:

@@ -4,7 +4,6 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import jax
 import numpy as np
 from jax.lax import GatherScatterMode
 
@@ -186,43 +185,91 @@ def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequenc
     return [found]
 
 
+def _places(
+    indices: np.ndarray,
+    shape: Sequence[int],
+    named: Sequence[int],
+    beside: Mapping[int, int],
+    sizes: Sequence[int],
+    *,
+    drop: bool,
+) -> np.ndarray:
+    """Return which elements of an array are in windows of it, -1 for those of a window that is not inside.
+
+    Parameters
+    ----------
+    indices : array of shape (windows..., index)
+        Where windows start.
+    shape : sequence of int
+        Of the array.
+    named : sequence of int
+        The axes of the array that the indices are of.
+    beside : mapping
+        Axes of the array along which there is a window of length one for each element, and the axes of the windows
+        that count them.
+    sizes : sequence of int
+        Of a window.
+    drop : bool
+        Whether windows that are not inside have no elements; otherwise they are moved.
+
+    Returns
+    -------
+    array of shape (windows..., sizes...)
+    """
+    batch = indices.shape[:-1]
+    starts = np.zeros((*batch, len(shape)), int)
+    starts[..., list(named)] = indices
+    for axis, which in beside.items():
+        starts[..., axis] = np.arange(shape[axis]).reshape([-1 if k == which else 1 for k in range(len(batch))])
+    inside = starts.clip(0, np.subtract(shape, sizes))
+    strides = np.array([int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))], int)
+    offsets = np.tensordot(strides, np.indices(sizes), 1)
+    found = (inside @ strides)[(..., *[None] * len(sizes))] + offsets
+    fits = (inside == starts).all(axis=-1)[(..., *[None] * len(sizes))]
+    return np.where(fits, found, -1) if drop else found
+
+
 def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
-    """Return parts of an array at indices: which element an index tells is asked of JAX, with places for numbers."""
+    """Return parts of an array at indices."""
     array, indices = given
-    p, places, dtype = equation.params, np.arange(array.size).reshape(array.shape), equation.outvars[0].aval.dtype
+    p, numbers, dtype = equation.params, equation.params["dimension_numbers"], equation.outvars[0].aval.dtype
     known = np.vectorize(lambda value: 0 if value.constant is None else int(value.constant), otypes=[int])(indices)
     moving = [k for k in range(indices.shape[-1]) if any(value.constant is None for value in flat(indices[..., k]))]
     if len(moving) > 1:
         raise UnsupportedOperationError("indices of which more than one are not known")
+    drop, batches = p["mode"] == GatherScatterMode.FILL_OR_DROP, indices.ndim - 1
+    named = list(map(int, numbers.start_index_map))
+    beside = dict(zip(numbers.operand_batching_dims, numbers.start_indices_batching_dims, strict=True))
+    left_out = tuple(batches + axis for axis in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims))
 
     def at(table: np.ndarray) -> np.ndarray:
-        options = {"dimension_numbers": p["dimension_numbers"], "slice_sizes": p["slice_sizes"], "mode": p["mode"]}
-        with jax.ensure_compile_time_eval():
-            return np.asarray(jax.lax.gather(places, table, fill_value=-1, **options))
+        found = _places(table, array.shape, named, beside, p["slice_sizes"], drop=drop)
+        found = found.squeeze(left_out)
+        return np.moveaxis(found, range(batches, found.ndim), numbers.offset_dims)
 
-    numbers = [*flat(array), code.constant(filler(p, dtype), kind_of(dtype))]
+    values = [*flat(array), code.constant(filler(p, dtype), kind_of(dtype))]
     if not moving:
-        return [_taken(numbers, at(known))]
+        return [_taken(values, at(known))]
     (axis,) = moving
-    along = p["dimension_numbers"].start_index_map[axis]
+    along = named[axis]
     size, width = array.shape[along], p["slice_sizes"][along]
     # one beyond each end, too; or while all of a part is inside, so that numbers in memory need not be copied
-    least, most = (-1, size) if p["mode"] == GatherScatterMode.FILL_OR_DROP else (0, size - width)
+    least, most = (-1, size) if drop else (0, size - width)
     tables = []
     for k in range(least, most + 1):
         known[..., axis] = k
         tables.append(at(known))
     found = np.empty(tables[0].shape, object)
-    which = [k for k in range(found.ndim) if k not in p["dimension_numbers"].offset_dims]
+    which = [k for k in range(found.ndim) if k not in numbers.offset_dims]
     for place in np.ndindex(found.shape):
         index = within(code, indices[(*(place[k] for k in which), axis)], least, most)
         index = code.arithmetic("add", index, code.constant(-least, index.kind))
-        found[place] = _element(code, [numbers[table[place]] for table in tables], index)
+        found[place] = _element(code, [values[table[place]] for table in tables], index)
     return [found]
 
 
-def _taken(numbers: Sequence[Value], table: np.ndarray) -> Values:
-    return filled(table.shape, [numbers[place] for place in table.ravel()])
+def _taken(values: Sequence[Value], table: np.ndarray) -> Values:
+    return filled(table.shape, [values[place] for place in table.ravel()])
 
 
 def filler(params: Mapping[str, Any], dtype: Any) -> Any:
@@ -237,23 +284,26 @@ def filler(params: Mapping[str, Any], dtype: Any) -> Any:
 
 
 def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
-    """Put numbers at indices, or add them to what is there: which place an index tells is asked of JAX."""
+    """Put numbers at indices, or add them to what is there."""
     array, indices, updates = given
     if any(value.constant is None for value in flat(indices)):
         raise UnsupportedOperationError("changing an array at indices that are not known")
     if not updates.size or not array.size:
         return [array]
     p, add = equation.params, equation.primitive.name == "scatter-add"
+    numbers, windows, batches = p["dimension_numbers"], p["dimension_numbers"].update_window_dims, indices.ndim - 1
+    beside = dict(zip(numbers.operand_batching_dims, numbers.scatter_indices_batching_dims, strict=True))
+    left_out = (*numbers.inserted_window_dims, *numbers.operand_batching_dims)
+    kept = dict(zip((axis for axis in range(array.ndim) if axis not in left_out), windows, strict=True))
+    sizes = [updates.shape[kept[axis]] if axis in kept else 1 for axis in range(array.ndim)]
     table = np.vectorize(lambda value: int(value.constant), otypes=[int])(indices)
-
-    def put(unit: np.ndarray) -> jax.Array:
-        options = {"dimension_numbers": p["dimension_numbers"], "mode": p["mode"]}
-        return jax.lax.scatter_add(np.zeros(array.shape), table, unit, **options)
-
-    with jax.ensure_compile_time_eval():
-        hits = np.asarray(jax.vmap(put)(np.eye(updates.size).reshape(-1, *updates.shape)))
+    drop = p["mode"] == GatherScatterMode.FILL_OR_DROP
+    named = list(map(int, numbers.scatter_dims_to_operand_dims))
+    places = _places(table, array.shape, named, beside, sizes, drop=drop)
+    places = places.squeeze(tuple(batches + axis for axis in left_out))
+    places = np.moveaxis(places, range(batches, places.ndim), windows)
     found = flat(array)
-    for k, place in zip(*np.nonzero(hits.reshape(updates.size, array.size)), strict=True):
-        value = updates.item(k)
-        found[place] = code.arithmetic("add", found[place], value) if add else value
+    for place, value in zip(places.ravel().tolist(), flat(updates), strict=True):
+        if place >= 0:
+            found[place] = code.arithmetic("add", found[place], value) if add else value
     return [filled(array.shape, found)]
