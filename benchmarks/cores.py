@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,27 @@ def torques(samples: int, threads: int) -> Callable[[], Any]:
     return _at_once(lambda: jn.inverse_dynamics(robot, q), threads)
 
 
+def roots(times: int, threads: int) -> Callable[[], Any]:
+    """Return what takes square roots of 100,000 numbers so many times, shared among threads; within a worker."""
+    numbers = [np.linspace(1.0, 2.0, 100_000) for _ in range(threads)]
+    found = [np.empty_like(x) for x in numbers]
+
+    def share(k: int) -> None:
+        for _ in range(times // threads):
+            np.sqrt(numbers[k], out=found[k])
+
+    def shared() -> Any:
+        others = [Thread(target=share, args=(k,)) for k in range(1, threads)]
+        for other in others:
+            other.start()
+        share(0)
+        for other in others:
+            other.join()
+        return found[0]
+
+    return shared
+
+
 def _at_once(work: Callable[[], Any], threads: int) -> Callable[[], Any]:
     if threads == 1:
         return work
@@ -45,6 +67,17 @@ def cases(quick: bool) -> Cases:
         f"RSUR to jounce, {instants:,} instants": ("solve", ("rsur", instants), instants),
         f"torque and two rates of the panda, {samples:,} samples": ("torques", (samples,), samples),
     }
+    times = 20 * cores if quick else 400 * cores
+    yield Case(
+        "square roots in the cache, what the machine gives",
+        [
+            Contestant(f"NumPy, {cores} threads", lambda: Worker("benchmarks.cores:roots", times, cores).run),
+            Contestant("NumPy, one core", lambda: Worker("benchmarks.cores:roots", times, 1, cores=1).run),
+        ],
+        count=times,
+        unit="array",
+        clock="wall time",
+    )
     for name, (task, arguments, count) in works.items():
         known: dict[str, Any] = {}
 

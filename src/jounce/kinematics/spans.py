@@ -16,6 +16,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.kinematics.kept_memory import arrays_in, borrow, give_back, room_of
 from jounce.kinematics.path_following import Anchor, FollowedPath
 from jounce.kinematics.solver import Solver
 from jounce.mechanism.time import nearest_instants
@@ -90,9 +91,13 @@ class _Room:
     """
 
     def __init__(self, solver: Solver, like: Any, size: int, anchors: int):
-        self.state = jax.tree.map(lambda x: np.empty((*x.shape[:-1], size + anchors)), like)
-        self.status, self._size = np.empty(size, int), size
-        self._time, self._step, self._source = np.empty(size), np.empty(size), np.zeros(size, np.int64)
+        leaves, form = jax.tree.flatten(like)
+        shapes = [*((*leaf.shape[:-1], size + anchors) for leaf in leaves), *[(size,)] * 4]
+        self.block, self._size = borrow(room_of(shapes)), size
+        kinds = [*[float] * (len(leaves) + 2), *[int] * 2]
+        *state, self._time, self._step, self.status, self._source = arrays_in(self.block, shapes, kinds)
+        self.state = jax.tree.unflatten(form, state)
+        self._source[:] = 0
         self._relay = solver.relay(self.state, self._step, self._time, self.status, self._source)
         self._rounds = rounds(0, 1, self._relay.width)
 
@@ -164,4 +169,8 @@ def solve_spans(
         rooms.append(room)
         return span.count
 
-    return each(solve, spans)
+    try:
+        yield from each(solve, spans)
+    finally:
+        while rooms:  # one that a thread still uses is not among them
+            give_back(rooms.pop().block)

@@ -1,0 +1,49 @@
+"""Memory that is kept from one computation to the next: the system gives it page by page, when it is first touched.
+
+That takes longer than to compute what goes there in a thread of its own, whose pages none of the others has ready.
+"""
+
+import math
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+LARGEST = 2**24  # bytes of a block that is kept
+MOST = os.cpu_count() or 1  # blocks
+LINE = 64  # bytes of the cache's lines, at which arrays begin
+ENTRY = 8  # bytes of a number
+_kept: list[np.ndarray] = []
+
+
+def borrow(size: int) -> np.ndarray:
+    """Return a block of so many bytes or more, whatever is in it."""
+    try:
+        block = _kept.pop()
+    except IndexError:
+        block = np.empty(0, np.uint8)
+    return block if len(block) >= size else np.empty(size, np.uint8)
+
+
+def give_back(block: np.ndarray) -> None:
+    """Keep a block for the next who borrows, unless it is large or there are enough; nobody may use it any more."""
+    if len(block) <= LARGEST and len(_kept) < MOST:
+        _kept.append(block)
+
+
+def room_of(shapes: Sequence[Sequence[int]]) -> int:
+    """Return how many bytes a block needs for arrays of these shapes."""
+    return LINE + sum(_lines(shape) for shape in shapes)
+
+
+def arrays_in(block: np.ndarray, shapes: Sequence[Sequence[int]], kinds: Sequence[type]) -> list[np.ndarray]:
+    """Return arrays of these shapes and types, of eight bytes, one after another in a block."""
+    place, found = -block.ctypes.data % LINE, []
+    for shape, kind in zip(shapes, kinds, strict=True):
+        found.append(block[place : place + math.prod(shape) * ENTRY].view(kind).reshape(shape))
+        place += _lines(shape)
+    return found
+
+
+def _lines(shape: Sequence[int]) -> int:
+    return -(-math.prod(shape) * ENTRY // LINE) * LINE
