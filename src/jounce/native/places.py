@@ -188,8 +188,8 @@ def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequenc
 def _places(
     indices: np.ndarray,
     shape: Sequence[int],
-    named: Sequence[int],
-    beside: Mapping[int, int],
+    named: Sequence[Any],
+    beside: Mapping[Any, Any],
     sizes: Sequence[int],
     *,
     drop: bool,
@@ -238,12 +238,11 @@ def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Value
     if len(moving) > 1:
         raise UnsupportedOperationError("indices of which more than one are not known")
     drop, batches = p["mode"] == GatherScatterMode.FILL_OR_DROP, indices.ndim - 1
-    named = list(map(int, numbers.start_index_map))
     beside = dict(zip(numbers.operand_batching_dims, numbers.start_indices_batching_dims, strict=True))
     left_out = tuple(batches + axis for axis in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims))
 
     def at(table: np.ndarray) -> np.ndarray:
-        found = _places(table, array.shape, named, beside, p["slice_sizes"], drop=drop)
+        found = _places(table, array.shape, numbers.start_index_map, beside, p["slice_sizes"], drop=drop)
         found = found.squeeze(left_out)
         return np.moveaxis(found, range(batches, found.ndim), numbers.offset_dims)
 
@@ -251,7 +250,7 @@ def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Value
     if not moving:
         return [_taken(values, at(known))]
     (axis,) = moving
-    along = named[axis]
+    along = numbers.start_index_map[axis]
     size, width = array.shape[along], p["slice_sizes"][along]
     # one beyond each end, too; or while all of a part is inside, so that numbers in memory need not be copied
     least, most = (-1, size) if drop else (0, size - width)
@@ -298,8 +297,7 @@ def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
     sizes = [updates.shape[kept[axis]] if axis in kept else 1 for axis in range(array.ndim)]
     table = np.vectorize(lambda value: int(value.constant), otypes=[int])(indices)
     drop = p["mode"] == GatherScatterMode.FILL_OR_DROP
-    named = list(map(int, numbers.scatter_dims_to_operand_dims))
-    places = _places(table, array.shape, named, beside, sizes, drop=drop)
+    places = _places(table, array.shape, numbers.scatter_dims_to_operand_dims, beside, sizes, drop=drop)
     places = places.squeeze(tuple(batches + axis for axis in left_out))
     places = np.moveaxis(places, range(batches, places.ndim), windows)
     found = flat(array)
