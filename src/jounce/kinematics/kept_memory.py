@@ -1,16 +1,15 @@
-"""Memory that is kept from one computation to the next: the system gives it page by page, when it is first touched.
+"""Memory that is kept from one computation to the next.
 
-That takes longer than to compute what goes there in a thread of its own, whose pages none of the others has ready.
+The system gives new memory page by page, when each is first touched: a seventh of the time of a long grid in two
+threads, whose memory it takes back after each.
 """
 
 import math
-import os
 from collections.abc import Sequence
 
 import numpy as np
 
-LARGEST = 2**24  # bytes of a block that is kept
-MOST = os.cpu_count() or 1  # blocks
+MOST = 2**26  # bytes that are kept
 LINE = 64  # bytes of the cache's lines, at which arrays begin
 ENTRY = 8  # bytes of a number
 _kept: list[np.ndarray] = []
@@ -26,8 +25,8 @@ def borrow(size: int) -> np.ndarray:
 
 
 def give_back(block: np.ndarray) -> None:
-    """Keep a block for the next who borrows, unless it is large or there are enough; nobody may use it any more."""
-    if len(block) <= LARGEST and len(_kept) < MOST:
+    """Keep a block for the next who borrows, unless there is enough; nobody may use it any more."""
+    if sum(map(len, _kept)) + len(block) <= MOST:
         _kept.append(block)
 
 
