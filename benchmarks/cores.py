@@ -1,5 +1,6 @@
 """All cores of the machine beside one, each in a process of its own; and several threads of one process."""
 
+import hashlib
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -29,23 +30,19 @@ def torques(samples: int, threads: int) -> Callable[[], Any]:
     return _at_once(lambda: jn.inverse_dynamics(robot, q), threads)
 
 
-def roots(times: int, threads: int) -> Callable[[], Any]:
-    """Return what takes square roots of 100,000 numbers so many times, shared among threads; within a worker."""
-    numbers = [np.linspace(1.0, 2.0, 100_000) for _ in range(threads)]
-    found = [np.empty_like(x) for x in numbers]
+def derivation(rounds: int, threads: int) -> Callable[[], Any]:
+    """Return what derives keys in so many rounds shared among threads, without memory or locks; within a worker."""
 
-    def share(k: int) -> None:
-        for _ in range(times // threads):
-            np.sqrt(numbers[k], out=found[k])
+    def share(_: int) -> bytes:
+        return hashlib.pbkdf2_hmac("sha256", b"jounce", b"jerk", rounds // threads)
 
-    def shared() -> Any:
+    def shared() -> None:
         others = [Thread(target=share, args=(k,)) for k in range(1, threads)]
         for other in others:
             other.start()
         share(0)
         for other in others:
             other.join()
-        return found[0]
 
     return shared
 
@@ -55,6 +52,19 @@ def _at_once(work: Callable[[], Any], threads: int) -> Callable[[], Any]:
         return work
     pool = ThreadPoolExecutor(threads)
     return lambda: [future.result() for future in [pool.submit(work) for _ in range(threads)]].pop()
+
+
+def _machine(rounds: int, cores: int) -> Case:
+    """Return what the machine gives at most, which begins a second thread on the core of the first after a pause."""
+
+    def deriving(threads: int, given: int | None) -> Callable[[], Any]:
+        return lambda: Worker("benchmarks.cores:derivation", rounds, threads, cores=given).run
+
+    contestants = [
+        Contestant(f"OpenSSL, {cores} threads", deriving(cores, None)),
+        Contestant("OpenSSL, one core", deriving(1, 1)),
+    ]
+    return Case(f"key derivation, {rounds:,} rounds", contestants, count=rounds, unit="round", clock="wall time")
 
 
 def cases(quick: bool) -> Cases:
@@ -67,17 +77,8 @@ def cases(quick: bool) -> Cases:
         f"RSUR to jounce, {instants:,} instants": ("solve", ("rsur", instants), instants),
         f"torque and two rates of the panda, {samples:,} samples": ("torques", (samples,), samples),
     }
-    times = 20 * cores if quick else 400 * cores
-    yield Case(
-        "square roots in the cache, what the machine gives",
-        [
-            Contestant(f"NumPy, {cores} threads", lambda: Worker("benchmarks.cores:roots", times, cores).run),
-            Contestant("NumPy, one core", lambda: Worker("benchmarks.cores:roots", times, 1, cores=1).run),
-        ],
-        count=times,
-        unit="array",
-        clock="wall time",
-    )
+    for rounds in (1_000,) if quick else (115_000, 275_000):  # about as long as the panda's and the four-bar's
+        yield _machine(rounds, cores)
     for name, (task, arguments, count) in works.items():
         known: dict[str, Any] = {}
 

@@ -16,6 +16,7 @@ import jounce as jn
 from benchmarks.cases import EXAMPLES, Case, Cases, Contestant, ready
 from benchmarks.four_bar import rocker
 from benchmarks.references import KINEMATIC, error_of
+from tests.programs import forget
 
 ORDERS = (2, 3, 4, 6, 8, 10)
 HIGHEST_NESTED = 8  # each further order takes two to three times as long to compile
@@ -59,6 +60,7 @@ def cases(quick: bool) -> Cases:
 
             def compiled_and_solved(solve: Callable[[], Any] = solve) -> Any:
                 jax.clear_caches()
+                forget()
                 return solve()
 
             def of_motion(motion: Any, error: Callable[[Any], float] = error) -> float:
