@@ -240,8 +240,11 @@ class Motion(Displayed):
             return {name: self._derivatives(output.coefficients(self))}
         groups = zip(self._groups.items(), self.model.system.outputs, strict=True)
         ((names, values), group) = next(found for found in groups if name in found[0][0])
-        values = self._continued(group, values)
-        return {other: self._shown(values[:, :, k]) for k, other in enumerate(names)}
+        return dict(zip(names, self._each_shown(self._continued(group, values)), strict=True))
+
+    def _each_shown(self, values: Float[Numbers, "order component instance time"]) -> Sequence[Any]:
+        """Return each output of a group as `outputs` has it."""
+        return [self._shown(values[:, :, k]) for k in range(values.shape[2])]
 
     @cached_property
     def dataset(self) -> "xarray.Dataset":

@@ -1,15 +1,17 @@
 """The motion of a mechanism that JAX differentiates, maps or compiles: the same questions, answered as its arrays."""
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jounce.errors import UnsupportedError
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
+from jounce.kinematics.compilation import compiled
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.pose_outputs import output_series
 from jounce.kinematics.sensitivities import Solved
@@ -111,6 +113,17 @@ class TracedMotion(Motion):
         return self._shown(plain_derivatives(coefficients[: self.order + 1]))
 
     def _shown(self, values: Float[Numbers, "order component time"]) -> Float[Numbers, "time derivative *component"]:
-        values = jnp.moveaxis(values[: self.order + 1], -1, 0)
-        values = jnp.where((self.status == Status.OK)[:, None, None], values, jnp.nan)
-        return values[..., 0] if values.shape[-1] == 1 else values
+        (found,) = self._each_shown(values[:, :, None])
+        return found
+
+    def _each_shown(self, values: Float[Numbers, "order component instance time"]) -> Sequence[Any]:
+        return _each_shown(values[: self.order + 1], self.status == Status.OK)
+
+
+@compiled()
+def _each_shown(
+    values: Float[Numbers, "derivative component instance time"], solved: Bool[Numbers, " time"]
+) -> list[Float[Numbers, "time derivative *component"]]:
+    """Return each output of a group; JAX takes longer for an operation that it differentiates than for a program."""
+    values = jnp.where(solved[:, None, None], jnp.transpose(values, (2, 3, 0, 1)), jnp.nan)
+    return list(values[..., 0] if values.shape[-1] == 1 else values)
