@@ -37,13 +37,7 @@ jax.config.update("jax_include_full_tracebacks_in_locations", False)
 jax.config.update("jax_traceback_in_locations_limit", 0)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
-hypothesis.settings.register_profile(
-    "jounce",
-    deadline=None,
-    max_examples=15,
-    derandomize=True,
-    suppress_health_check=[hypothesis.HealthCheck.too_slow],  # a machine that is busy is no fault of a test
-)
+hypothesis.settings.register_profile("jounce", deadline=None, max_examples=15, derandomize=True)
 hypothesis.settings.load_profile("jounce")
 for _name in ("SIGINT", "SIGHUP"):  # ignored in what runs in the background; the children of tests would inherit that
     _number = getattr(signal, _name, None)
