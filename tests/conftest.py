@@ -6,6 +6,7 @@ import os
 import pathlib
 import shutil
 import signal
+import threading
 
 import hypothesis
 import jax
@@ -15,6 +16,7 @@ import tests.type_checks  # isort: skip # noqa: F401 - before jounce
 from jounce.cli import main
 from jounce.cli.compiled_programs import keep_programs
 from jounce.constraints import base  # importing jounce switches on double precision
+from jounce.kinematics.rehearsal import NAME
 from tests.shares_of_tests import pytest_addoption, pytest_collection_modifyitems  # noqa: F401 - found here by pytest
 
 # Most of the time of the tests goes into compiling. It is halved without XLA's last optimisations, without its passes
@@ -125,3 +127,13 @@ def run(capsys, monkeypatch):
         return status, captured.out, captured.err
 
     return call
+
+
+def pytest_runtest_teardown():
+    """Wait for what a refused motion has left compiling.
+
+    Types are checked there with random numbers, which Hypothesis takes to be drawn by the test that it runs beside.
+    """
+    for thread in threading.enumerate():
+        if thread.name == NAME:
+            thread.join()
