@@ -1,6 +1,7 @@
 """Programs of a run that are made while its start is looked for: those that the run then needs, and no others."""
 
 import dataclasses
+import threading
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import jounce as jn
 from jounce.integrate.marching import march
 from jounce.integrate.simulation import expanded
 from jounce.kinematics.alone import Alone
+from jounce.kinematics.rehearsal import NAME
 from jounce.kinematics.side_by_side import SideBySide
 from jounce.native import machine
 from tests.problems.dynamics import simple_pendulum
@@ -70,9 +72,13 @@ def test_those_with_redundant_rows_begin_with_the_start(made, monkeypatch):
     assert sorted(made) == ["_expanded", "march"]
 
 
-def test_a_start_that_is_refused_is_told(made, monkeypatch):
+def test_a_start_that_is_refused_is_told_and_no_further_program_is_begun(made, monkeypatch):
     monkeypatch.setenv("JOUNCE_THREADS", "2")
     pendulum = simple_pendulum(0.3, 1.0)
     other = jn.drivers.CoordinateDriver(("ground", "bob"), "angle", "angle + 1")
     with pytest.raises(jn.AssemblyError, match="contradict each other"):
         swing(dataclasses.replace(pendulum, initial=pendulum.initial | {"other": other}), 1e-9)
+    for thread in threading.enumerate():
+        if thread.name == NAME:
+            thread.join()
+    assert "_expanded" not in made

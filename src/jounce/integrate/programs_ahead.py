@@ -16,6 +16,7 @@ from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, mar
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulation import FEW_INSTANTS, derivatives_of_motion, motion_at
 from jounce.kinematics.alone import is_wanted
+from jounce.kinematics.compilation import check_wanted
 from jounce.kinematics.device import resident
 from jounce.kinematics.forces_at_rest import ask_forces_at_rest
 from jounce.kinematics.rehearsal import first_time, rehearsed
@@ -110,6 +111,7 @@ class ProgramsAhead(ExitStack):
             if before is not None and is_wanted():
                 before.wait()
             try:
+                check_wanted()  # the start may have been refused meanwhile
                 with telling(written.set):
                     rehearsal()
             finally:

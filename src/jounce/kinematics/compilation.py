@@ -51,6 +51,12 @@ class StoppedError(Exception):
     """What this thread compiles is of no use any more."""
 
 
+def check_wanted() -> None:
+    """Raise StoppedError where what this thread compiles is of no use any more."""
+    if (enough := getattr(_thread, "enough", None)) is not None and enough.is_set():
+        raise StoppedError
+
+
 @contextmanager
 def stopped_by(event: threading.Event) -> Iterator[None]:
     """Have this thread raise StoppedError in the place of a program that it wants after an event."""
@@ -168,8 +174,7 @@ class Compiled:
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         """Call the compiled function."""
         check_process()
-        if (enough := getattr(_thread, "enough", None)) is not None and enough.is_set():
-            raise StoppedError
+        check_wanted()
         keywords |= zip(self._names[self._traced :], arguments[self._traced :], strict=False)
         arguments = arguments[: self._traced]
         static = {name: keywords.pop(name) for name in self.static if name in keywords}
