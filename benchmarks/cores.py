@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from threading import Thread
@@ -12,13 +13,15 @@ import numpy as np
 from benchmarks.cases import EXAMPLES, Case, Cases, Contestant
 from benchmarks.processes import Worker
 
+LOOP = 8  # times
+
 
 def solve(name: str, instants: int, threads: int) -> Callable[[], Any]:
     """Return what solves a mechanism in so many threads at once; within a worker."""
     import jounce as jn
 
-    mechanism, time = jn.load(EXAMPLES / f"{name}.yaml"), np.linspace(0.0, 2.0, instants)
-    return _at_once(lambda: jn.solve(mechanism, time).outputs["psi"], threads)
+    mechanism, grid = jn.load(EXAMPLES / f"{name}.yaml"), np.linspace(0.0, 2.0, instants)
+    return _at_once(lambda: jn.solve(mechanism, grid).outputs["psi"], threads)
 
 
 def torques(samples: int, threads: int) -> Callable[[], Any]:
@@ -54,17 +57,54 @@ def _at_once(work: Callable[[], Any], threads: int) -> Callable[[], Any]:
     return lambda: [future.result() for future in [pool.submit(work) for _ in range(threads)]].pop()
 
 
-def _machine(rounds: int, cores: int) -> Case:
-    """Return what the machine gives at most, which begins a second thread on the core of the first after a pause."""
+def in_a_loop(task: str, arguments: tuple[Any, ...]) -> Callable[[], Any]:
+    """Return what does a work several times without a pause; within a worker."""
+    work = globals()[task](*arguments, 1)
+
+    def looping() -> Any:
+        for _ in range(LOOP - 1):
+            work()  # what it returns is not kept, as the memory of it would have to be found anew
+        return work()
+
+    return looping
+
+
+def _machine(rounds: int, cores: int, pause: float) -> Case:
+    """Return what the machine gives at most: it may begin a second thread on the core of the first after a pause, s."""
 
     def deriving(threads: int, given: int | None) -> Callable[[], Any]:
-        return lambda: Worker("benchmarks.cores:derivation", rounds, threads, cores=given).run
+        def build() -> Callable[[], Any]:
+            worker = Worker("benchmarks.cores:derivation", rounds, threads, cores=given)
+
+            def run() -> Any:
+                time.sleep(pause)  # before the worker begins to measure
+                return worker.run()
+
+            return run
+
+        return build
 
     contestants = [
         Contestant(f"OpenSSL, {cores} threads", deriving(cores, None)),
         Contestant("OpenSSL, one core", deriving(1, 1)),
     ]
-    return Case(f"key derivation, {rounds:,} rounds", contestants, count=rounds, unit="round", clock="wall time")
+    name = f"key derivation, {rounds:,} rounds" + (f", after {pause:g} s of pause" if pause else "")
+    return Case(name, contestants, count=rounds, unit="round", clock="wall time")
+
+
+def _looping(name: str, work: tuple[str, tuple[Any, ...], int], cores: int) -> Case:
+    """Return a work that takes little time, done several times without a pause."""
+    task, arguments, count = work
+
+    def looping(given: int | None) -> Callable[[], Any]:
+        return lambda: Worker("benchmarks.cores:in_a_loop", task, arguments, cores=given).run
+
+    contestants = [
+        Contestant(f"jounce, {cores} cores", looping(None)),
+        Contestant("jounce, one core", looping(1)),
+    ]
+    unit = "sample" if task == "torques" else "instant"
+    return Case(f"{name}, {LOOP} in a loop", contestants, count=LOOP * count, unit=unit, clock="wall time")
 
 
 def cases(quick: bool) -> Cases:
@@ -77,8 +117,11 @@ def cases(quick: bool) -> Cases:
         f"RSUR to jounce, {instants:,} instants": ("solve", ("rsur", instants), instants),
         f"torque and two rates of the panda, {samples:,} samples": ("torques", (samples,), samples),
     }
+    first, *_, last = works
+    short = first, last  # so short that a pause before them matters
     for rounds in (1_000,) if quick else (115_000, 275_000):  # about as long as the panda's and the four-bar's
-        yield _machine(rounds, cores)
+        yield _machine(rounds, cores, 0.0)
+        yield _machine(rounds, cores, 0.2)
     for name, (task, arguments, count) in works.items():
         known: dict[str, Any] = {}
 
@@ -109,3 +152,5 @@ def cases(quick: bool) -> Cases:
             reference="the first row's results, the largest difference",
             clock="wall time",
         )
+        if name in short:
+            yield _looping(name, (task, arguments, count), cores)
