@@ -14,7 +14,7 @@ import numpy as np
 from jounce.errors import OutputError
 from jounce.io.files.column_units import heading, is_si, name_and_unit
 from jounce.io.files.netcdf_parts import NetcdfParts
-from jounce.io.files.reading import known_name, read_file, reason_of, written_name
+from jounce.io.files.reading import is_result, known_name, read_file, reason_of, written_name
 from jounce.io.files.writing import check_target, replacing
 from jounce.io.hdf5_check import check_readable
 from jounce.io.result_columns import AXES, column_units, columns, dataset_of
@@ -271,7 +271,8 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
         raise OutputError(f"the kind of results is given by the extension; valid: {', '.join(SUFFIXES)}", path=name)
     content = read_file(name, None, error=OutputError, is_input=False)
     if suffix == ".nc":
-        check_readable(content, name)
+        if not is_result(name):
+            check_readable(content, name)
         return xarray.load_dataset(io.BytesIO(content), engine="h5netcdf")
     try:
         lines = csv.reader(io.StringIO(content.decode(), newline=""))
