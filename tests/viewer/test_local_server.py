@@ -105,12 +105,11 @@ def test_a_long_path_is_refused_in_words(page, bare, length):
 )
 def test_what_is_no_request_prints_nothing_and_harms_nothing(page, bare, sent, capfd, caplog):
     host, _, port = bare.removeprefix("http://").partition(":")
-    with socket.create_connection((host, int(port)), timeout=20) as stream:
-        with contextlib.suppress(OSError):
-            stream.sendall(sent)
-            stream.shutdown(socket.SHUT_WR)
-            while stream.recv(4096):
-                pass
+    with socket.create_connection((host, int(port)), timeout=20) as stream, contextlib.suppress(OSError):
+        stream.sendall(sent)
+        stream.shutdown(socket.SHUT_WR)
+        while stream.recv(4096):
+            pass
     assert fetched(page.url)[0] == 200
     assert capfd.readouterr() == ("", "")
     assert caplog.records == []  # the root logger would print them
