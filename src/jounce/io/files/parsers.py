@@ -251,10 +251,8 @@ class _TomlLines:
             elif token == "[" and not self.parts and not self.open:
                 header = 1
             elif token == "=":
-                self.place, self.parts = (
-                    self._note((*(self.open[-1] if self.open else self.table), *self.parts), line),
-                    None,
-                )
+                around = self.open[-1] if self.open else self.table
+                self.place, self.parts = self._note((*around, *self.parts), line), None
             elif token == "}":
                 self._close()
             elif token != ".":
@@ -285,17 +283,16 @@ class _TomlLines:
             self._close()
             return
         if token == ",":
-            self.place = (*self.open[-1], self.place[-1] + 1) if self._in_array else self.open[-1]
-            self.parts = None if self._in_array else []
+            around, last = self.open[-1], self.place[-1]
+            if len(self.place) > len(around) and isinstance(last, int):  # in an array
+                self.place = (*around, last + 1)
+            else:
+                self.parts = []
             return
         self.lines.setdefault(self.place, line)
         if token in ("[", "{"):
             self.open.append(self.place)
             self.place, self.parts = ((*self.place, 0), None) if token == "[" else (self.place, [])
-
-    @property
-    def _in_array(self) -> bool:
-        return len(self.place) == len(self.open[-1]) + 1 and isinstance(self.place[-1], int)
 
     def _close(self) -> None:
         self.place, self.parts = self.open.pop(), None
