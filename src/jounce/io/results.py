@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from os import PathLike, fspath
 from pathlib import Path
@@ -282,7 +283,7 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
         raise OutputError(f"cannot be read: {reason_of(error)}", path=name) from None
     if header[:1] != ["time"] or not rows:
         raise OutputError("is not a table of results, whose first column is time", path=name)
-    if repeated := [column for column in header if header.count(column) > 1]:
+    if repeated := [column for column, count in Counter(header).items() if count > 1]:
         raise OutputError("names a column twice", path=name, value=repeated[0])
     for line, row in enumerate(rows, start=2):
         if len(row) != len(header):
