@@ -1,5 +1,6 @@
 """The regime of all tests: float64, strict promotion of types and ranks; warnings are errors by pyproject.toml."""
 
+import contextlib
 import ctypes
 import gc
 import os
@@ -16,7 +17,9 @@ import tests.type_checks  # isort: skip # noqa: F401 - before jounce
 from jounce.cli import main
 from jounce.cli.compiled_programs import keep_programs
 from jounce.constraints import base  # importing jounce switches on double precision
+from jounce.errors import OutputError
 from jounce.kinematics.rehearsal import NAME
+from jounce.private_folder import PrivateFolder
 from tests.shares_of_tests import pytest_addoption, pytest_collection_modifyitems  # noqa: F401 - found here by pytest
 
 # Most of the time of the tests goes into compiling. It is halved without XLA's last optimisations, without its passes
@@ -58,7 +61,8 @@ def pytest_configure(config):
     if not hasattr(config, "workerinput") and sum(file.stat().st_size for file in folder.iterdir()) > LARGEST_STORE:
         shutil.rmtree(folder)
         folder.mkdir()
-    keep_programs(folder)
+    with contextlib.suppress(OutputError):  # a checkout that others may write
+        keep_programs(PrivateFolder(folder))
 
 
 def pytest_collection_finish():

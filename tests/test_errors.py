@@ -1,13 +1,24 @@
 """The wording of messages, and what errors carry."""
 
 import pickle
+import warnings
 
 import numpy as np
 import pytest
 
 import jounce as jn
 from jounce import errors
-from jounce.errors import JounceError, MechanismError, MechanismFileError, SolveError, did_you_mean, flag, show_value
+from jounce.errors import (
+    ExpressionError,
+    JounceError,
+    MechanismError,
+    MechanismFileError,
+    RobotWarning,
+    SolveError,
+    did_you_mean,
+    flag,
+    show_value,
+)
 
 
 def test_message_puts_place_problem_value_and_advice_in_order():
@@ -77,3 +88,23 @@ def test_a_flag_is_true_or_false_and_nothing_that_only_counts_as_one():
     for value in ("no", 2, 0, None, np.array([True]), np.float64(1.0)):
         with pytest.raises(jn.RobotError, match=r"drives.*True or False"):
             flag("drives", value, error=jn.RobotError)
+
+
+def test_messages_are_bounded_whatever_a_file_says():
+    long = "x" * 100_000
+    for error in (
+        JounceError(long, path=long, name=long, value=long),
+        ExpressionError(f"{long}; do this"),
+        SolveError(long),
+        JounceError(did_you_mean(long, [f"{long}{k}" for k in range(3)])),
+    ):
+        assert len(str(error)) < 12_000
+    with pytest.warns(RobotWarning) as told:
+        warnings.warn(long, RobotWarning, stacklevel=1)
+    assert len(str(told[0].message)) < 5000
+
+
+def test_of_very_many_names_none_is_likened():
+    names = [f"joint_{k:06d}" for k in range(100_000)]
+    assert did_you_mean("joint_00000x", names) == ""
+    assert did_you_mean("joint_000001", names[:1000]) == "did you mean 'joint_000001'?"

@@ -54,6 +54,22 @@ class _Unset:
 
 
 UNSET = _Unset()
+LONGEST = 4000
+"""Characters of a message; of what a file's own names and texts make longer, the middle is left out."""
+MOST_LIKENED = 2000
+"""Names among which one that is nearly the given one is looked for."""
+
+
+def shortened(text: str, limit: int = LONGEST) -> str:
+    """Return a text of at most a few more characters than a limit, without its middle if it is longer.
+
+    Examples
+    --------
+    >>> shortened("abcdefghijklmnop", limit=8)
+    'abcd ... (8 characters) ... mnop'
+    """
+    half, left_out = limit // 2, len(text) - limit
+    return text if left_out <= 0 else f"{text[:half]} ... ({left_out} characters) ... {text[-half:]}"
 
 
 def show_value(value: object, limit: int = 80) -> str:
@@ -173,7 +189,8 @@ def did_you_mean(name: object, valid: Iterable[str], limit: int = 20) -> str:
     names = sorted(set(valid))
     words = [ascii(candidate[:80])[1:-1] for candidate in names]
     parts = []
-    near = difflib.get_close_matches(str(name)[:100], names, n=1, cutoff=0.6)
+    likened = names if len(names) <= MOST_LIKENED else []
+    near = difflib.get_close_matches(str(name)[:100], likened, n=1, cutoff=0.6)
     if not near:
         near = [candidate for candidate in names if candidate.lower() == str(name).lower()]
     if near:
@@ -216,6 +233,7 @@ class JounceError(Exception):
         name: str | None = None,
         value: Any = UNSET,
     ) -> None:
+        message = shortened(message)
         super().__init__(message)
         self.message = message
         self.path = path
@@ -224,11 +242,11 @@ class JounceError(Exception):
         self.value = value
 
     def __str__(self) -> str:
-        place = [] if self.path is None else [_printable(str(self.path))]
+        place = [] if self.path is None else [_printable(shortened(str(self.path)))]
         if self.line is not None:
             place.append(f"line {self.line}")
         if self.name:
-            place.append(_printable(self.name))
+            place.append(_printable(shortened(self.name, 400)))
         message = "\n".join(map(_printable, self.message.split("\n")))
         if self.value is not UNSET:  # what is wrong, got this; what to do about it
             problem, semicolon, advice = message.partition("; ")
@@ -295,23 +313,30 @@ class SingularityError(JounceError):
     """An orientation or a configuration is singular: what was asked for does not exist or is not unique there."""
 
 
-class RobotWarning(UserWarning):
+class _BoundedWarning(UserWarning):
+    """A warning whose text is bounded like that of an error."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*(shortened(x) if isinstance(x, str) else x for x in arguments))
+
+
+class RobotWarning(_BoundedWarning):
     """A robot file holds what no real robot has, or forces that are left out; it is read all the same."""
 
 
-class SampleWarning(UserWarning):
+class SampleWarning(_BoundedWarning):
     """Samples do not determine the derivatives asked for to a useful accuracy."""
 
 
-class UnitWarning(UserWarning):
+class UnitWarning(_BoundedWarning):
     """A number without a unit is likely meant in another unit than that of SI."""
 
 
-class AssemblyWarning(UserWarning):
+class AssemblyWarning(_BoundedWarning):
     """Bodies were put together with a part turned over in its joint, unlike in the starting guess."""
 
 
-class DamageWarning(UserWarning):
+class DamageWarning(_BoundedWarning):
     """Files of a result were lost or changed after they were written; what they held is computed again."""
 
 

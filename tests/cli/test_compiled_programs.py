@@ -3,14 +3,17 @@
 import itertools
 import os
 import pathlib
+import pickle
 import subprocess
 import sys
+import zlib
 
 import pytest
 
 from jounce.cli import compiled_programs
 from jounce.cli.compiled_programs import CheckedEntries, JaxEntries
-from jounce.kinematics import compilation
+from jounce.kinematics import compilation, store
+from jounce.private_folder import PrivateFolder
 
 FOUR_BAR = pathlib.Path(__file__).resolve().parents[2] / "examples" / "four_bar.yaml"
 PROGRAM = bytes(range(256)) * 40
@@ -27,7 +30,7 @@ DAMAGES = {
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_what_is_damaged_is_absent_and_then_replaced(tmp_path, damage):
-    entries = CheckedEntries(tmp_path)
+    entries = CheckedEntries(PrivateFolder(tmp_path))
     assert entries.get("key") is None
     entries.put("key", PROGRAM)
     assert entries.get("key") == PROGRAM
@@ -41,27 +44,31 @@ def test_what_is_damaged_is_absent_and_then_replaced(tmp_path, damage):
 
 
 def test_an_entry_that_cannot_be_replaced_is_compiled_each_time(tmp_path):
-    entries = CheckedEntries(tmp_path)
+    entries = CheckedEntries(PrivateFolder(tmp_path))
     (tmp_path / "key.program").mkdir()
     entries.put("key", PROGRAM)
     assert entries.get("key") is None
-    CheckedEntries(tmp_path / "gone").put("key", PROGRAM)
+    gone = tmp_path / "gone"
+    entries = CheckedEntries(PrivateFolder(gone))
+    gone.rmdir()
+    entries.put("key", PROGRAM)
+    assert entries.get("key") is None
 
 
 def test_those_that_were_not_used_for_longest_go_first(tmp_path, monkeypatch):
     monkeypatch.setattr(compiled_programs, "LARGEST", 3 * (len(PROGRAM) + 32))
     for key in "abcde":
-        CheckedEntries(tmp_path).put(key, PROGRAM)
+        CheckedEntries(PrivateFolder(tmp_path)).put(key, PROGRAM)
         for file in tmp_path.iterdir():
             os.utime(file, (1e9 + "abcde".index(file.stem),) * 2)
     assert sorted(file.stem for file in tmp_path.iterdir()) == ["c", "d", "e"]
-    assert CheckedEntries(tmp_path).get("c") == PROGRAM
-    CheckedEntries(tmp_path).put("f", PROGRAM)
+    assert CheckedEntries(PrivateFolder(tmp_path)).get("c") == PROGRAM
+    CheckedEntries(PrivateFolder(tmp_path)).put("f", PROGRAM)
     assert sorted(file.stem for file in tmp_path.iterdir()) == ["c", "e", "f"]
 
 
 def test_jax_takes_nothing_from_its_own_store_where_a_program_is_to_be_kept(tmp_path):
-    entries = JaxEntries(tmp_path)
+    entries = JaxEntries(PrivateFolder(tmp_path))
     entries.put("key", PROGRAM)
     with compilation.compiling_anew():
         assert entries.get("key") is None
@@ -74,6 +81,41 @@ def started(cache):
     environment = {name: value for name, value in os.environ.items() if not name.startswith("JAX_")}
     environment["JOUNCE_CACHE_DIR"] = cache
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+
+
+MARK = "planted"
+
+
+class Planted:
+    """What leaves a mark where it is read by `pickle`."""
+
+    def __reduce__(self):
+        return os.mkdir, (MARK,)
+
+
+def test_what_is_no_description_is_not_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(pickle.UnpicklingError, match="is no part of a program"):
+        store.unpacked(zlib.compress(pickle.dumps((b"", Planted()))))
+    with pytest.raises(pickle.UnpicklingError, match="is no part of a program"):
+        compilation._unpacked(store.packed((pickle.dumps(Planted()), None)), None)
+    assert not pathlib.Path(MARK).exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", [0o1777, 0o770])
+def test_a_folder_that_others_may_write_is_not_used_and_said_once(tmp_path, mode):
+    folder = tmp_path / "programs"
+    folder.mkdir()
+    folder.chmod(mode)
+    process = started(str(folder))
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 0
+    assert "psi" in out
+    assert len(err.splitlines()) == 1
+    assert "compiled programs are not kept" in err
+    assert "may be written by others" in err
+    assert list(folder.iterdir()) == []
 
 
 @pytest.mark.slow
@@ -91,4 +133,4 @@ def test_two_commands_with_a_cold_cache_and_one_with_a_damaged_one(tmp_path):
     assert process.returncode == 0
     kept = {file: file.read_bytes() for file in tmp_path.iterdir()}  # but those that compile too fast to be kept
     assert kept
-    assert all(CheckedEntries(tmp_path).get(file.name.removesuffix(".program")) for file in kept)
+    assert all(CheckedEntries(PrivateFolder(tmp_path)).get(file.name.removesuffix(".program")) for file in kept)

@@ -31,10 +31,15 @@ def main() -> int:
     parser.add_argument("--reader", help="this one only")
     parser.add_argument("--case", type=int, help="show what becomes of one case")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="begin no case after this time")
+    parser.add_argument("--growth", type=int, metavar="SIZE", help="time texts of a size, and of four times it")
     parser.add_argument("--worker", type=int, nargs=2, metavar=("FIRST", "COUNT"), help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.worker:
         return work(given.reader, given.seed, *given.worker)
+    if given.growth:
+        from tests.fuzz.growth import report
+
+        return report(given.growth)
     if given.case is not None:
         return show(given.reader, given.seed, given.case)
     return drive(given.cases, given.seed, given.reader, given.seconds)

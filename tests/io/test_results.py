@@ -263,7 +263,7 @@ def test_names_that_netcdf_cannot_hold(tmp_path):
         ("a.csv", b"time,a\n1,2\n3\n", "line 3: must have 2 entries, got 1"),
         ("a.csv", b"time,a\n1,x\n", "cannot be read: could not convert string to float: 'x'"),
         ("a.csv", b"\xff\xfe\x00", "cannot be read"),
-        ("a.nc", b"\xff\xfe\x00" * 99, "cannot be read"),
+        ("a.nc", b"\xff\xfe\x00" * 99, "is damaged, or no file of results"),
     ],
 )
 def test_what_is_no_file_of_results(tmp_path, name, content, words):

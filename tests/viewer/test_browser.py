@@ -1,5 +1,6 @@
 """The page in a real browser: it asks nothing of the network, moves, follows its sliders, and gives its exports."""
 
+import dataclasses
 import shutil
 
 import numpy as np
@@ -153,3 +154,16 @@ def test_exports_arrive(opened, browser, tmp_path):
     assert alone.screenshot() != first  # it plays by itself
     assert [address for address in asked if address.startswith(("http", "ws"))] == []
     alone.close()
+
+
+def test_a_title_is_text_and_no_markup(browser):
+    mechanism = dataclasses.replace(
+        jn.load("examples/four_bar.yaml"), title="<script>window.marked = 1</script><b id='marked'>M</b>"
+    )
+    with view(mechanism, open_page=False, playing=False) as shown:
+        page = browser.new_page()
+        page.goto(shown.url)
+        page.get_by_text("window.marked").first.wait_for(timeout=PATIENCE)
+        assert page.evaluate("window.marked") is None
+        assert page.evaluate("document.getElementById('marked')") is None
+        page.close()

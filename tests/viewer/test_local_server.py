@@ -1,13 +1,16 @@
 """Who is let in: the right host, no other origin, and the token; for pages and for WebSockets, and no uploads."""
 
+import contextlib
+import gc
 import re
+import socket
 import urllib.error
 import urllib.request
 
 import msgspec
 import pytest
 import viser
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 import jounce as jn
@@ -72,6 +75,44 @@ def test_without_the_token_nothing_is_shown(page, bare, path):
 def test_a_token_in_part_or_twice_is_none(page):
     assert fetched(page.url[:-1])[0] == 403
     assert fetched(page.url + "&token=" + page.url.rpartition("=")[2])[0] == 403
+
+
+@pytest.mark.parametrize("message", [b"\x00\xff" * 50, b"\x81\xa4type\xa7Unknown", "text", b""])
+def test_what_is_no_message_of_the_page_prints_nothing(page, bare, message, capfd, caplog):
+    given = {"origin": bare, "subprotocols": [f"viser-v{viser.__version__}"], "max_size": None}
+    with connect(page.url.replace("http", "ws", 1), **given) as stream:
+        stream.recv(timeout=20)
+        stream.send(message)
+        with contextlib.suppress(ConnectionClosed, TimeoutError):
+            while stream.recv(timeout=1.0):
+                pass
+    gc.collect()  # tasks that failed are told when they are gone
+    assert fetched(page.url)[0] == 200
+    assert capfd.readouterr() == ("", "")
+    assert caplog.records == []  # the root logger would print them
+
+
+@pytest.mark.parametrize("length", [2000, 7000])
+def test_a_long_path_is_refused_in_words(page, bare, length):
+    token = page.url.removeprefix(bare)[1:]
+    status, body = fetched(f"{bare}/{'a' * length}{token}")
+    assert status == 414
+    assert b"too long" in body
+
+
+@pytest.mark.parametrize(
+    "sent", [b"\x00\xff" * 500, b"GET / HTTP/9.9\r\n\r\n", b"\r\n\r\n", b"GET /" + b"a" * 70000, b""]
+)
+def test_what_is_no_request_prints_nothing_and_harms_nothing(page, bare, sent, capfd, caplog):
+    host, _, port = bare.removeprefix("http://").partition(":")
+    with socket.create_connection((host, int(port)), timeout=20) as stream, contextlib.suppress(OSError):
+        stream.sendall(sent)
+        stream.shutdown(socket.SHUT_WR)
+        while stream.recv(4096):
+            pass
+    assert fetched(page.url)[0] == 200
+    assert capfd.readouterr() == ("", "")
+    assert caplog.records == []  # the root logger would print them
 
 
 @pytest.mark.parametrize(

@@ -5,15 +5,15 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from jounce.errors import OutputError
-from jounce.io.files.writing import replacing
 from jounce.kinematics import store
 from jounce.kinematics.compilation import compiles_anew
+from jounce.private_folder import PrivateFolder
 
+ENDING = ".program"
 LARGEST = 2**29  # bytes of programs in a folder, looked at when the first one of a process is added
 
 
@@ -39,59 +39,43 @@ class CheckedEntries:
 
     Parameters
     ----------
-    path : str or Path
-        The folder.
+    folder : PrivateFolder
+        Programs run with the rights of who reads them.
     """
 
-    def __init__(self, path: str | Path):
-        self._path = Path(path)  # the name by which JAX asks for it
+    def __init__(self, folder: PrivateFolder):
+        self._folder = folder
+        self._path = folder.path  # the name by which JAX asks for it
         self._bounded = False  # whether this process has looked at how much is kept
 
     def get(self, key: str) -> bytes | None:
         """Return the program of this key, or None."""
-        file, size = self._file(key), hashlib.sha256().digest_size
-        with suppress(OSError):
-            if not file.is_file():
-                return None
-            whole = file.read_bytes()
-            if hashlib.sha256(whole[size:]).digest() == whole[:size]:
-                with suppress(OSError):
-                    os.utime(file)  # those that are not used for long go first
-                return whole[size:]
+        whole, size = self._folder.read(key + ENDING), hashlib.sha256().digest_size
+        if whole is not None and hashlib.sha256(whole[size:]).digest() == whole[:size]:
+            return whole[size:]
         self.drop(key)
         return None
 
     def put(self, key: str, value: bytes) -> None:
         """Keep a program, in one step: other processes find all of it or nothing."""
-        # a full disk, or a folder in the place of the file: compiled again next time
-        with suppress(OutputError), replacing(self._file(key)) as new:
-            new.write_bytes(hashlib.sha256(value).digest() + value)
+        self._folder.write(key + ENDING, hashlib.sha256(value).digest() + value)
         if not self._bounded:
             self._bounded = True
             self._remove_oldest()
 
     def drop(self, key: str) -> None:
         """Remove a program that is of no use."""
-        with suppress(OSError):
-            self._file(key).unlink()
+        self._folder.remove(key + ENDING)
 
     def _remove_oldest(self) -> None:
         """Remove the programs that were not used for longest, until no more is kept than is allowed."""
-        found = []
-        for file in self._path.glob("*.program"):
-            with suppress(OSError):  # another process removes them too
-                status = file.stat()
-                found.append((status.st_mtime, status.st_size, file))
+        found = sorted(self._folder.files(ENDING))
         total = sum(size for _, size, _ in found)
-        for _, size, file in sorted(found):
+        for _, size, name in found:
             if total <= LARGEST:
                 break
             total -= size
-            with suppress(OSError):
-                file.unlink()
-
-    def _file(self, key: str) -> Path:
-        return self._path / f"{key}.program"
+            self._folder.remove(name)
 
 
 class JaxEntries(CheckedEntries):
@@ -107,7 +91,7 @@ class JaxEntries(CheckedEntries):
             super().put(key, value)
 
 
-def keep_programs(directory: Path) -> bool:
+def keep_programs(folder: PrivateFolder) -> bool:
     """Have JAX keep its programs in checked files; a release of JAX that works otherwise keeps them in its own.
 
     Returns whether they are in checked files.
@@ -116,19 +100,22 @@ def keep_programs(directory: Path) -> bool:
     from jax._src import compilation_cache
 
     def file_cache(path: str) -> Any:
-        return JaxEntries(path), path
+        return JaxEntries(folder), path
 
     if known := hasattr(compilation_cache, "get_file_cache"):
         compilation_cache.get_file_cache = file_cache
-    jax.config.update("jax_compilation_cache_dir", str(directory))
+    jax.config.update("jax_compilation_cache_dir", str(folder.path))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.01)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
     jax.config.update("jax_persistent_cache_enable_xla_caches", "none")  # those are for GPUs
     return known
 
 
-def use_compilation_cache() -> None:
-    """Keep compiled programs between calls of the command, unless JAX was told where or the folder is out of reach."""
+def use_compilation_cache(*, quiet: bool = False) -> None:
+    """Keep compiled programs between calls of the command, unless JAX was told where or the folder is out of reach.
+
+    A folder in which others may write is not used, and a line on standard error says so, unless that is to be `quiet`.
+    """
     import warnings
 
     import jax
@@ -139,11 +126,13 @@ def use_compilation_cache() -> None:
         directory = cache_directory()
         if directory is None:
             return
-        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-    except (OSError, RuntimeError, ValueError):  # RuntimeError: there is no home
+        folder = PrivateFolder(directory)
+    except OutputError as error:
+        if not quiet:
+            sys.stderr.write(f"compiled programs are not kept: {error}\n")
         return
-    if not os.access(directory, os.W_OK | os.X_OK):
+    except (RuntimeError, ValueError):  # there is no home, or a name that no file can have
         return
-    if keep_programs(directory):
-        store.keep_programs(CheckedEntries(directory))
+    if keep_programs(folder):
+        store.keep_programs(CheckedEntries(folder))
     warnings.filterwarnings("ignore", message="Error (reading|writing) persistent compilation cache")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -119,7 +120,7 @@ def sweep(
                 timeout=timeout,
                 progress=bar,
                 user_files=user_files,
-                prepare_worker=use_compilation_cache,
+                prepare_worker=partial(use_compilation_cache, quiet=True),
             )
     facts = sweep_facts(plan)
     if json:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from os import PathLike, fspath
 from pathlib import Path
@@ -14,8 +15,9 @@ import numpy as np
 from jounce.errors import OutputError
 from jounce.io.files.column_units import heading, is_si, name_and_unit
 from jounce.io.files.netcdf_parts import NetcdfParts
-from jounce.io.files.reading import known_name, read_file, reason_of, written_name
+from jounce.io.files.reading import is_result, known_name, read_file, reason_of, written_name
 from jounce.io.files.writing import check_target, replacing
+from jounce.io.hdf5_check import check_readable
 from jounce.io.result_columns import AXES, column_units, columns, dataset_of
 
 if TYPE_CHECKING:
@@ -269,9 +271,11 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
     if suffix not in SUFFIXES:
         raise OutputError(f"the kind of results is given by the extension; valid: {', '.join(SUFFIXES)}", path=name)
     content = read_file(name, None, error=OutputError, is_input=False)
+    if suffix == ".nc":
+        if not is_result(name):
+            check_readable(content, name)
+        return xarray.load_dataset(io.BytesIO(content), engine="h5netcdf")
     try:
-        if suffix == ".nc":
-            return xarray.load_dataset(io.BytesIO(content), engine="h5netcdf")
         lines = csv.reader(io.StringIO(content.decode(), newline=""))
         header, units = _named_columns(next(lines, []))
         rows = [[float(entry) for entry in row] for row in lines]
@@ -279,6 +283,8 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
         raise OutputError(f"cannot be read: {reason_of(error)}", path=name) from None
     if header[:1] != ["time"] or not rows:
         raise OutputError("is not a table of results, whose first column is time", path=name)
+    if repeated := [column for column, count in Counter(header).items() if count > 1]:
+        raise OutputError("names a column twice", path=name, value=repeated[0])
     for line, row in enumerate(rows, start=2):
         if len(row) != len(header):
             raise OutputError(f"must have {len(header)} entries", path=name, line=line, value=len(row))

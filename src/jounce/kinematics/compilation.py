@@ -6,10 +6,10 @@ everything.
 """
 
 import inspect
+import io
 import os
 import pickle
 import threading
-import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache, cached_property, partial, update_wrapper
@@ -22,7 +22,7 @@ from jax.experimental import serialize_executable
 
 from jounce.kinematics.alone import Alone
 from jounce.kinematics.device import on_processor
-from jounce.kinematics.store import Store, current_store, is_wanted_soon
+from jounce.kinematics.store import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
 from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
 from jounce.mechanism.preconditions import check_process
 
@@ -228,8 +228,8 @@ class Compiled:
             lowered = self.jitted.lower(*arguments, **keywords, **static)
             _forget_sources(lowered.compiler_ir())
             program = lowered.compile(None if level is None else {"xla_backend_optimization_level": level})
-        if (packed := _packed(program, tree)) is not None:
-            store.put(key, packed)
+        if (content := _packed(program, tree)) is not None:
+            store.put(key, content)
         return program, program(*arguments, **keywords)
 
 
@@ -257,14 +257,23 @@ def _packed(program: Any, tree: Any) -> bytes | None:
     """
     try:
         payload, in_tree, out_tree = serialize_executable.serialize(program)
-        packed = zlib.compress(pickle.dumps((payload, out_tree)), level=1)
+        content = packed((payload, out_tree))
     except (RuntimeError, TypeError, ValueError, pickle.PicklingError):  # those of XLA are RuntimeErrors
         return None
-    return packed if in_tree == tree else None
+    return content if in_tree == tree else None
 
 
-def _unpacked(packed: bytes, tree: Any) -> Callable[..., Any]:
-    payload, out_tree = pickle.loads(zlib.decompress(packed))
+class _Description(Descriptions, serialize_executable._JaxPjrtUnpickler):
+    """Reads what JAX writes beside the code of a program, and no code."""
+
+    def persistent_load(self, pid: Any) -> Any:
+        """Return a device or a client, and nothing in the place of code."""
+        return None if pid[0] == "exec" else super().persistent_load(pid)
+
+
+def _unpacked(content: bytes, tree: Any) -> Callable[..., Any]:
+    payload, out_tree = unpacked(content)
+    _Description(io.BytesIO(payload), jax.devices()[0].client).load()  # or JAX would run whatever is named there
     return serialize_executable.deserialize_and_load(payload, tree, out_tree)
 
 

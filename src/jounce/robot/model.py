@@ -87,21 +87,26 @@ class Mimic:
         for field in ("multiplier", "offset"):
             object.__setattr__(self, field, float(finite_numbers(f"mimic.{field}", getattr(self, field), ())))
 
+    def after(self, leader: "Mimic") -> "Mimic":
+        """Return how the joint follows the leader of the one that it follows."""
+        return Mimic(leader.joint, self.multiplier * leader.multiplier, self.multiplier * leader.offset + self.offset)
+
 
 def leaders(mimics: Mapping[str, Mimic]) -> dict[str, Mimic]:
     """Return what joints follow, by name: those that follow a follower made to follow its leader.
 
     Circles are left as they are, for the robot to refuse.
     """
-    found = {}
-    for name, mimic in mimics.items():
-        passed = {name}
-        while mimic.joint in mimics and mimic.joint not in passed:
-            passed.add(mimic.joint)
-            leader = mimics[mimic.joint]
-            offset = mimic.multiplier * leader.offset + mimic.offset
-            mimic = Mimic(leader.joint, mimic.multiplier * leader.multiplier, offset)
-        found[name] = mimics[name] if mimic.joint in passed else mimic
+    found: dict[str, Mimic] = {}
+    for name in mimics:
+        chain: dict[str, Mimic] = {}  # from a follower to the first joint that is known, or leads
+        while name in mimics and name not in found and name not in chain:
+            chain[name] = mimics[name]
+            name = mimics[name].joint
+        circle = name in chain
+        for follower, mimic in reversed(chain.items()):
+            leader = None if circle else found.get(mimic.joint)
+            found[follower] = mimic if leader is None else mimic.after(leader)
     return found
 
 

@@ -370,9 +370,9 @@ def _names(names: Iterable[str]) -> tuple[str, ...]:
     found = (names,) if isinstance(names, str) else tuple(names)
     if not found or not all(isinstance(name, str) for name in found):
         raise TrajectoryError("names of joints are needed, as a list of text", name="names", value=list(found))
-    for name in found:
-        if found.count(name) > 1:
-            raise TrajectoryError("a joint is named twice", name="names", value=name)
+    if len(set(found)) < len(found):
+        twice = next(name for k, name in enumerate(found) if name in found[:k])
+        raise TrajectoryError("a joint is named twice", name="names", value=twice)
     return found
 
 

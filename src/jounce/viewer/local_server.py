@@ -10,6 +10,7 @@ the token.
 from __future__ import annotations
 
 import io
+import logging
 import re
 import secrets
 import socket
@@ -24,6 +25,7 @@ from jounce.errors import JounceError
 __all__ = ["AccessControl", "check_installed", "check_port", "quiet_server", "quiet_stop"]
 
 HOSTS = ("127.0.0.1", "localhost", "[::1]")  # of any port, as a tunnel may have another one at its other end
+LONGEST_PATH = 1000  # characters; those of the page are far shorter
 REFUSED = "This page is opened by the whole address that jounce view prints, with its token.\n"
 HEADERS = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"}
 # The page of viser connects to its own address without what stands behind the question mark, unless told another one.
@@ -35,6 +37,8 @@ if (!given.has("websocket")) {
 }
 }</script>"""
 _starting = threading.Lock()
+_quiet = logging.getLogger(__name__)  # what strangers send is no trouble of the user's
+_quiet.setLevel(logging.CRITICAL + 1)
 
 
 class AccessControl:
@@ -79,6 +83,7 @@ class AccessControl:
             if getattr(process_request, "__module__", "").startswith("viser."):  # any other server is left alone
                 guarded.append(True)
                 process_request = self._before(process_request)
+                options["logger"] = _quiet
             return serve(*arguments, process_request=process_request, **options)
 
         with _starting:
@@ -96,6 +101,8 @@ class AccessControl:
         def guarded(connection: Any, request: Any) -> Any:
             if not self.allows(request):
                 return connection.respond(403, REFUSED)
+            if len(request.path) > LONGEST_PATH:
+                return connection.respond(414, "This address is too long.\n")
             if "Accept-Encoding" in request.headers:
                 del request.headers["Accept-Encoding"]  # so that the page comes as it is
             response = process_request(connection, request)

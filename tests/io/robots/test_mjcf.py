@@ -500,3 +500,17 @@ def test_closures_stay_where_the_base_is_set_free(tmp_path):
     tie = '<equality><connect name="tie" body1="a" body2="b" anchor="0 0 -1"/></equality>'
     path.write_text(f'<mujoco><worldbody><body name="trunk">{INERTIAL}{legs}</body></worldbody>{tie}</mujoco>')
     assert list(load_robot(path, floating_base=True).closures) == ["tie"]
+
+
+@pytest.mark.parametrize("count, within", [("3000", 1), ("50", 50), ("1e9", 0)])
+def test_repeated_bodies_are_counted_before_they_are_made(tmp_path, count, within):
+    body = '<body><joint/><geom size="0.1"/></body>'
+    inner = f'<replicate count="{within}" offset="1 0 0">{body}</replicate>' if within else body
+    path = written(tmp_path, f'<replicate count="{count}" offset="0 1 0">{inner}</replicate>')
+    with pytest.raises(RobotFileError, match="more than 2000 bodies"):
+        load_robot(path)
+
+
+def test_a_few_repeated_bodies_are_a_robot(tmp_path):
+    text = '<replicate count="3" offset="0 1 0"><body name="b"><joint/><geom size="0.1"/></body></replicate>'
+    assert len(load_robot(written(tmp_path, text)).joint_names) == 3

@@ -12,9 +12,10 @@ from jounce.io.files.reading import named_file
 from jounce.trajectory.dimensions import Dimension
 from jounce.trajectory.units import Value, parse_value
 
-MAX_VALUES = 1_000_000
+MAX_VALUES = 100_000
 MAX_DEPTH = 50
 TOO_DEEP = f"nested more than {MAX_DEPTH} deep; 6 are enough for any file"
+TOO_MANY = "more than {} entries; long tables of samples belong in a CSV file"
 
 Location = tuple[str | int, ...]
 """Where an entry is: keys and indices from the top, such as ``("joints", "BC", "points", 1)``."""
@@ -190,7 +191,7 @@ class Builder:
     def _put(self, value: Any, line: int) -> None:
         self._count += 1
         if self._count > MAX_VALUES:
-            raise MechanismFileError(f"more than {MAX_VALUES} values", path=self.source.path, line=line)
+            raise MechanismFileError(TOO_MANY.format(MAX_VALUES), path=self.source.path, line=line)
         location = self._here()
         self.source.lines.setdefault(location, line)
         if not self._stack:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from typing import Any
 
 from jounce.errors import MechanismFileError
-from jounce.io.files.located_data import MAX_DEPTH, TOO_DEEP, Builder, Location, Source
+from jounce.io.files.located_data import MAX_DEPTH, MAX_VALUES, TOO_DEEP, TOO_MANY, Builder, Location, Source
 
 # The core schema of YAML 1.2 (section 10.3.2 of its specification).
 _NULL = {"", "~", "null", "Null", "NULL"}
@@ -111,7 +112,7 @@ _TOKEN = re.compile(r'"(?:[^"\\]|\\.)*"|[{}\[\]:,]|[^\s{}\[\]:,"]+')
 
 def read_json(path: str, text: str) -> Source:
     """Read JSON; its syntax is checked by the standard library, lines and duplicates by a walk over its tokens."""
-    _check_depth(path, text, quotes='"')
+    _check_depth(path, text)
     try:
         json.loads(text)
     except json.JSONDecodeError as error:
@@ -141,10 +142,10 @@ def read_json(path: str, text: str) -> Source:
     return builder.source
 
 
-def _check_depth(path: str, text: str, quotes: str) -> None:
+def _check_depth(path: str, text: str) -> None:
     """Bound the nesting of brackets outside strings, before a recursive parser sees them."""
     depth = 0
-    for bracket in re.finditer(rf"[\[\]{{}}\n]|[{quotes}](?:\\.|[^{quotes}\\\n])*[{quotes}]?", text):
+    for bracket in re.finditer(r'[\[\]{}]|"(?:\\.|[^"\\\n])*+"?', text):
         if bracket.group() in "[{":
             depth += 1
             if depth > MAX_DEPTH:
@@ -154,19 +155,26 @@ def _check_depth(path: str, text: str, quotes: str) -> None:
             depth -= 1
 
 
-_BARE_OR_QUOTED = r"""(?:[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*')"""
-_TOML_KEY = re.compile(rf"\s*({_BARE_OR_QUOTED}(?:\s*\.\s*{_BARE_OR_QUOTED})*)\s*")
-_TOML_PART = re.compile(_BARE_OR_QUOTED)
+# Strings that do not end are tokens, too, so that no place of the text is looked at twice.
+_TOML_TOKEN = re.compile(
+    r"""
+    "{3}(?:[^"\\]|\\.|"(?!""))*+(?:"{3,5})?   # strings of several lines
+    |'{3}(?:[^']|'(?!''))*+(?:'{3,5})?
+    |"(?:[^"\\\n]|\\.)*+"?                    # strings of one line
+    |'[^'\n]*+'?
+    |\#[^\n]*+
+    |[][{}=,.\n]
+    |[^][{}=,.\s"'#]++
+    """,
+    re.DOTALL | re.VERBOSE,
+)
 
 
 def read_toml(path: str, text: str) -> Source:
-    """Read TOML through the standard library; lines come from a scan of the keys, exact for one key a line."""
+    """Read TOML through the standard library; lines come from one pass over the tokens of the text."""
     import tomllib
 
-    _check_depth(path, text, quotes="\"'")
-    for number, row in enumerate(text.split("\n"), start=1):
-        if row.count(".") > MAX_DEPTH and len(_TOML_PART.findall(row.partition("=")[0])) > MAX_DEPTH:
-            raise MechanismFileError(TOO_DEEP, path=path, line=number)
+    _check_nesting(path, text)
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -177,47 +185,124 @@ def read_toml(path: str, text: str) -> Source:
         raise MechanismFileError(f"the TOML cannot be read: {reason}", path=path, line=line) from None
     except (RecursionError, ValueError) as error:
         raise MechanismFileError(f"the TOML cannot be read: {error}", path=path) from None
-    _check_plain(path, data)
-    return Source(path, data, _toml_lines(text))
+    _check_size(path, data)
+    return Source(path, data, _TomlLines().found(text))
 
 
-def _check_plain(path: str, data: Any) -> None:
-    """Bound the nesting that dotted keys can make; dates are refused later, where a value is expected."""
-    pending = [(data, 0)]
+def _toml_tokens(text: str) -> Iterator[tuple[str, int]]:
+    """Give the tokens of a text but for comments, each with its line."""
+    line = position = 0
+    for token in _TOML_TOKEN.finditer(text):
+        line += text.count("\n", position, token.start())
+        position = token.start()
+        if text[position] != "#":
+            yield token.group(), line + 1
+
+
+def _check_nesting(path: str, text: str) -> None:
+    """Bound brackets within brackets, and the parts of dotted keys."""
+    depth = dots = 0
+    for token, line in _toml_tokens(text):
+        if token in ("[", "{"):
+            depth += 1
+        elif token in ("]", "}"):
+            depth -= 1
+        dots = dots + 1 if token == "." else 0 if token in ("\n", "=", ",") else dots
+        if max(depth, dots) > MAX_DEPTH:
+            raise MechanismFileError(TOO_DEEP, path=path, line=line)
+
+
+def _check_size(path: str, data: Any) -> None:
+    """Bound the number of entries, and the nesting that tables within tables make."""
+    pending, count = [(data, 0)], 0
     while pending:
         value, depth = pending.pop()
+        count += 1
         if depth > MAX_DEPTH:
             raise MechanismFileError(TOO_DEEP, path=path)
+        if count > MAX_VALUES:
+            raise MechanismFileError(TOO_MANY.format(MAX_VALUES), path=path)
         if isinstance(value, (dict, list)):
             pending.extend((item, depth + 1) for item in (value.values() if isinstance(value, dict) else value))
 
 
-def _toml_lines(text: str) -> dict[Location, int]:
-    """Find the line of every table and key, best effort: inline tables count from the line of their key."""
-    lines: dict[Location, int] = {(): 1}
-    table: Location = ()
-    depth = 0
-    for number, row in enumerate(text.split("\n"), start=1):
-        stripped = row.strip()
-        if depth == 0 and stripped.startswith("[") and (key := _TOML_KEY.match(stripped.lstrip("["))):
-            table = _toml_parts(key[1])
-            _note(lines, table, number)
-            continue
-        if depth == 0 and (key := _TOML_KEY.match(row)) and row[key.end() : key.end() + 1] == "=":
-            location = table + _toml_parts(key[1])
-            _note(lines, location, number)
-            for inner in re.finditer(rf"[{{,]\s*({_BARE_OR_QUOTED})\s*=", row[key.end() :]):
-                lines.setdefault((*location, *_toml_parts(inner[1])), number)
-        bare = re.sub(r""""(?:[^"\\]|\\.)*"|'[^']*'|#.*""", "", row)
-        depth = max(0, depth + bare.count("[") + bare.count("{") - bare.count("]") - bare.count("}"))
-    return lines
+class _TomlLines:
+    """Finds the line of every table, key and entry of an array of a text that is TOML."""
+
+    def __init__(self) -> None:
+        self.lines: dict[Location, int] = {(): 1}
+        self.counts: dict[Location, int] = {}  # of tables in an array
+        self.table: Location = ()  # whose keys come
+        self.open: list[Location] = []  # arrays and inline tables around the place, where they are
+        self.parts: list[str] | None = []  # of the key that is read; None within a value
+        self.place: Location = ()  # of the value that is read
+
+    def found(self, text: str) -> dict[Location, int]:
+        """Return the lines."""
+        header = 0  # brackets of the header of a table
+        for token, line in _toml_tokens(text):
+            if token == "\n":
+                if not self.open:
+                    self.parts, header = [], 0
+            elif header:
+                header = self._in_header(token, header, line)
+            elif self.parts is None:
+                self._in_value(token, line)
+            elif token == "[" and not self.parts and not self.open:
+                header = 1
+            elif token == "=":
+                around = self.open[-1] if self.open else self.table
+                self.place, self.parts = self._note((*around, *self.parts), line), None
+            elif token == "}":
+                self._close()
+            elif token != ".":
+                self.parts.append(_unquoted(token))
+        return self.lines
+
+    def _in_header(self, token: str, brackets: int, line: int) -> int:
+        assert self.parts is not None
+        if token == "[":
+            return 2
+        if token == "]" and self.parts:
+            location: Location = ()
+            for part in self.parts:  # a table within the last one of an array
+                location = (*location, part)
+                if location in self.counts and (brackets == 1 or location != tuple(self.parts)):
+                    location = (*location, self.counts[location] - 1)
+            if brackets == 2:
+                self.counts[location] = self.counts.get(location, 0) + 1
+                self.lines.setdefault(location, line)
+                location = (*location, self.counts[location] - 1)
+            self.table, self.parts = self._note(location, line), []
+        elif token not in ("]", "."):
+            self.parts.append(_unquoted(token))
+        return brackets
+
+    def _in_value(self, token: str, line: int) -> None:
+        if token in ("]", "}"):
+            self._close()
+            return
+        if token == ",":
+            around, last = self.open[-1], self.place[-1]
+            if len(self.place) > len(around) and isinstance(last, int):  # in an array
+                self.place = (*around, last + 1)
+            else:
+                self.parts = []
+            return
+        self.lines.setdefault(self.place, line)
+        if token in ("[", "{"):
+            self.open.append(self.place)
+            self.place, self.parts = ((*self.place, 0), None) if token == "[" else (self.place, [])
+
+    def _close(self) -> None:
+        self.place, self.parts = self.open.pop(), None
+
+    def _note(self, location: Location, line: int) -> Location:
+        for length in range(1, len(location)):
+            self.lines.setdefault(location[:length], line)
+        self.lines[location] = line
+        return location
 
 
-def _toml_parts(key: str) -> Location:
-    return tuple(part.strip("\"'") for part in _TOML_PART.findall(key))
-
-
-def _note(lines: dict[Location, int], location: Location, number: int) -> None:
-    for length in range(1, len(location)):
-        lines.setdefault(location[:length], number)
-    lines[location] = number
+def _unquoted(key: str) -> str:
+    return key.strip("\"'")

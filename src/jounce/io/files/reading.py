@@ -268,6 +268,15 @@ def note_result(path: str | PathLike[str]) -> None:
     _results[real] = _identity(Path(real).stat())
 
 
+def is_result(path: str | PathLike[str]) -> bool:
+    """Tell whether this process wrote a file that nobody has changed since."""
+    real = os.path.realpath(path)
+    try:
+        return _results.get(real) == _identity(Path(real).stat())
+    except OSError:
+        return False
+
+
 def _identity(status: os.stat_result) -> tuple[int, ...]:
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 

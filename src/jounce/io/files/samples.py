@@ -123,7 +123,7 @@ def read_columns(
         what = "repeats" if times[k + 1] == times[k] else "comes before"
         message = f"times must increase; this one {what} that of line {table.rows[k][0]}"
         raise table.error(message, line=table.rows[k + 1][0], name="time", value=float(times[k + 1]))
-    return times, found, {name: table.unit(header.index(name))[1] for name in found if table.units[header.index(name)]}
+    return times, found, {name: table.unit(k)[1] for k, name in enumerate(header) if name in found and table.units[k]}
 
 
 def column_names(path: str | Path, error_type: type[JounceError] = MechanismFileError) -> list[str]:
@@ -181,11 +181,13 @@ def _check_named(table: _Table) -> int:
     if line is None:
         message = "the first row holds the names of the columns: time, then the joints"
         raise table.error(message, line=table.rows[0][0], value=", ".join(table.rows[0][1]))
+    known: set[str] = set()
     for k, name in enumerate(header):
         if not name:
             raise table.error(f"column {k + 1} has no name", line=line)
-        if name in header[:k]:
+        if name in known:
             raise table.error("two columns have this name", line=line, value=name)
+        known.add(name)
     for row_line, row in table.rows:
         if len(row) != len(header):
             message = f"each row has one value for each of the {len(header)} columns; this one has another number"

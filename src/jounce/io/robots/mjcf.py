@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError, RobotError, RobotFileError
 from jounce.io.robots.faults import Faults, left_out
-from jounce.io.robots.mjcf_files import check_assets, included, line_of, quiet_mujoco
+from jounce.io.robots.mjcf_files import check_assets, check_copies, included, line_of, quiet_mujoco
 from jounce.io.robots.mjcf_left_out import LeftOut, left_out_of_model, left_out_of_spec
 from jounce.io.robots.mjcf_ties import NO_CLOSURE, Ties, tied_tendons
 from jounce.io.robots.xml_elements import Element
@@ -75,6 +75,7 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
     parts = [root, *included(root, allow)]
     for part in parts:
         _check_numbers(part)
+    check_copies(parts)
     try:
         with quiet_mujoco(mujoco):
             spec = mujoco.MjSpec.from_file(root.path)

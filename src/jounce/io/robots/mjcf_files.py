@@ -15,6 +15,9 @@ from jounce.errors import RobotFileError
 from jounce.io.files.reading import MAX_SAMPLES, named_file, read_file
 from jounce.io.robots.xml_elements import Element, read_markup
 
+MOST_BODIES = 2000
+"""Of a robot, with those that are repeated; MuJoCo's own time grows with their square."""
+
 
 @contextmanager
 def quiet_mujoco(mujoco: Any) -> Iterator[None]:
@@ -55,6 +58,38 @@ def included(root: Element, allow: Iterable[str | PathLike[str]] = ()) -> list[E
                         waiting.append(found[path])
                     break
     return list(found.values())
+
+
+def check_copies(parts: Iterable[Element]) -> None:
+    """Refuse more bodies than a robot has, which few lines of an MJCF file can ask for, before MuJoCo makes them.
+
+    Raises
+    ------
+    RobotFileError
+        Repeated parts hold too many bodies together.
+    """
+    roots = list(parts)
+    models = {Path(root.path).name: root for root in roots}
+    total = 0
+    for root in roots:
+        named = {element.attributes.get("name"): element for element in root.walk() if element.tag == "model"}
+        waiting = [(root, 1)]
+        while waiting:
+            element, copies = waiting.pop()
+            if element.tag == "replicate":
+                copies *= max(1, int(element.number("count", "replicate", "count")))
+            elif element.tag in ("body", "attach"):
+                total += copies * _bodies(element, named, models)
+            if total > MOST_BODIES or copies > MOST_BODIES:
+                raise element.error(f"more than {MOST_BODIES} bodies with all that is repeated", "replicate")
+            waiting.extend((child, copies) for child in element.children)
+
+
+def _bodies(element: Element, named: dict[str | None, Element], models: dict[str, Element]) -> int:
+    """Return how many bodies an element stands for: those of the model that it attaches, else itself."""
+    model = named.get(element.attributes.get("model"))
+    root = None if model is None else models.get(Path(model.attributes.get("file", "")).name)
+    return 1 if element.tag == "body" or root is None else sum(part.tag == "body" for part in root.walk())
 
 
 def _named(

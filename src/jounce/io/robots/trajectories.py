@@ -116,7 +116,8 @@ def _check_no_names(joints: object, path: str) -> None:
 def _read_csv(path: str, degree: int, joints: object) -> JointTrajectory:
     _check_no_names(joints, path)
     times, columns, units = read_columns(path, TrajectoryError)
-    names = [name for name in columns if _DERIVATIVE.sub("", name) not in columns.keys() - {name}]
+    bare = {name: _DERIVATIVE.sub("", name) for name in columns}  # of what a column is a derivative
+    names = [name for name in columns if bare[name] == name or bare[name] not in columns]
     measures = {name: found for name in names if (found := _measured(units.get(name)))}
     try:
         found = JointTrajectory.from_samples(times, np.stack([columns[n] for n in names], axis=1), names, degree)

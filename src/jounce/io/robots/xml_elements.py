@@ -24,7 +24,12 @@ class Element:
     path: str
     line: int
     children: list[Element] = field(default_factory=list)
-    content: str = ""  # the text within, but for that of the children
+    pieces: list[str] = field(default_factory=list)  # of the text within, but for that of the children
+
+    @property
+    def content(self) -> str:
+        """The text within, but for that of the children."""
+        return "".join(self.pieces)
 
     def first(self, tag: str) -> Element | None:
         """Return the first child of a tag, None if there is none."""
@@ -172,7 +177,7 @@ class _Reader:
         self.open.pop()
 
     def characters(self, text: str) -> None:
-        self.open[-1].content += text
+        self.open[-1].pieces.append(text)
 
     def entity(self, name: str, *_rest: object) -> None:
         message = "declares an entity, which robot files have no use for; write its text where it is used"

@@ -1,0 +1,134 @@
+"""A folder in which nobody but this user may write: what is read from it, this user put there.
+
+Code that is kept in files runs with the rights of who reads it. So the folder, and each file in it, must belong to this
+user and be closed to the writing of others; names are looked up in the folder that was checked, whatever takes its
+place meanwhile, and links are not followed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import stat
+import sys
+import weakref
+from collections.abc import Iterator
+from pathlib import Path
+
+from jounce.errors import OutputError
+
+_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+_READ = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
+_WRITE = (
+    os.O_WRONLY | os.O_CREAT | os.O_EXCL | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_CLOEXEC", "O_BINARY"))
+)
+_POSIX = sys.platform != "win32"
+
+
+class PrivateFolder:
+    """A folder of this user, made if it is not there.
+
+    On Windows, where a folder of the user's profile is closed to others by its access list, only links are refused.
+
+    Parameters
+    ----------
+    path : str or Path
+        The folder.
+
+    Raises
+    ------
+    OutputError
+        It belongs to another user, others may write in it or in a folder that it is in, or it cannot be opened.
+    """
+
+    def __init__(self, path: str | Path):
+        self.path = Path(os.path.realpath(path))
+        try:
+            self.path.mkdir(mode=0o700, parents=True, exist_ok=True)
+            self._check_above()
+            self._descriptor: int | None = None
+            if _POSIX:
+                self._descriptor = os.open(self.path, _READ | os.O_DIRECTORY)
+                weakref.finalize(self, os.close, self._descriptor)
+                self._check(os.fstat(self._descriptor))
+                if not os.access(self.path, os.W_OK | os.X_OK):
+                    raise OutputError("may not be written", path=self.path)
+        except OSError as error:
+            raise OutputError(f"cannot be used: {error.strerror}", path=self.path) from None
+
+    def read(self, name: str) -> bytes | None:
+        """Return the content of a file, None if there is none that only this user may have written."""
+        try:
+            with open(self._opened(name, _READ), "rb") as stream:  # noqa: PTH123 - of a descriptor
+                status = os.fstat(stream.fileno())
+                if not stat.S_ISREG(status.st_mode) or _fault(status):
+                    return None
+                with contextlib.suppress(OSError):
+                    os.utime(stream.fileno() if os.utime in os.supports_fd else self.path / name)
+                return stream.read()
+        except OSError:
+            return None
+
+    def write(self, name: str, content: bytes) -> None:
+        """Put a file in the place of one of this name, or of a link, in one step; leave it if that fails."""
+        scratch = f".{secrets.token_hex(8)}.part"
+        try:
+            with open(self._opened(scratch, _WRITE), "wb") as stream:  # noqa: PTH123 - of a descriptor
+                stream.write(content)
+            self._replace(scratch, name)
+        except OSError:  # a full disk, or a folder in the place of the file
+            self.remove(scratch)
+
+    def remove(self, name: str) -> None:
+        """Remove a file, or a link, where that is possible."""
+        with contextlib.suppress(OSError):
+            os.unlink(*self._at(name), **self._here())
+
+    def files(self, ending: str) -> Iterator[tuple[float, int, str]]:
+        """Give when each file of an ending was used last, its bytes and its name."""
+        with contextlib.suppress(OSError):
+            for name in os.listdir(self.path if self._descriptor is None else self._descriptor):  # noqa: PTH208
+                with contextlib.suppress(OSError):  # another process removes some, too
+                    if name.endswith(ending):
+                        status = os.stat(*self._at(name), follow_symlinks=False, **self._here())
+                        yield status.st_mtime, status.st_size, name
+
+    def _opened(self, name: str, flags: int) -> int:
+        return os.open(*self._at(name), flags, 0o600, **self._here())
+
+    def _replace(self, old: str, new: str) -> None:
+        if self._descriptor is None:
+            (self.path / old).replace(self.path / new)
+        else:
+            os.replace(old, new, src_dir_fd=self._descriptor, dst_dir_fd=self._descriptor)
+
+    def _at(self, name: str) -> tuple[str | Path]:
+        return (self.path / name,) if self._descriptor is None else (name,)
+
+    def _here(self) -> dict[str, int]:
+        return {} if self._descriptor is None else {"dir_fd": self._descriptor}
+
+    def _check(self, status: os.stat_result) -> None:
+        if fault := _fault(status):
+            message = f"{fault}: what is in it may be another's; use a folder of your own that only you may write"
+            raise OutputError(message, path=self.path)
+
+    def _check_above(self) -> None:
+        """Refuse folders above in which others may put another one in the place of this."""
+        for folder in self.path.parents if _POSIX else ():
+            status = folder.stat()
+            writable = stat.S_IWOTH if status.st_gid == os.getegid() else _OTHERS
+            if status.st_uid not in (0, os.geteuid()) or (
+                status.st_mode & writable and not status.st_mode & stat.S_ISVTX
+            ):
+                raise OutputError(f"is in the folder {folder}, in which others may write", path=self.path)
+
+
+def _fault(status: os.stat_result) -> str:
+    """Say why a folder or a file may hold what another has put there; nothing where it does not."""
+    if not _POSIX:
+        return ""
+    if status.st_uid != os.geteuid():
+        return "belongs to another user"
+    return "may be written by others" if status.st_mode & _OTHERS else ""

@@ -1,0 +1,59 @@
+import zlib
+
+import numpy as np
+import pytest
+import xarray
+
+from jounce import io
+from jounce.errors import OutputError
+from jounce.io import hdf5_check
+
+
+@pytest.fixture
+def content(tmp_path):
+    """Return the bytes of a small file of results."""
+    time = np.linspace(0.0, 1.0, 5)
+    values = ("time", "derivative"), np.stack([time, np.ones(5)], axis=1)
+    io.write(xarray.Dataset({"psi": values}, {"time": time, "derivative": [0, 1]}), tmp_path / "good.nc")
+    return (tmp_path / "good.nc").read_bytes()
+
+
+@pytest.mark.parametrize("damage", [lambda x: x[: len(x) // 2], lambda x: x[:64] + bytes(512) + x[576:]])
+def test_a_damaged_file_is_an_error_with_its_name(tmp_path, content, damage, capfd):
+    path = tmp_path / "damaged.nc"
+    path.write_bytes(damage(content))
+    with pytest.raises(OutputError, match=r"damaged\.nc.*is damaged"):
+        io.read(path)
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    "program, words",
+    [("while True: pass", "does not come to an end"), ("import os; os.abort()", "ends the process")],
+)
+def test_a_library_that_hangs_or_ends_its_process(monkeypatch, content, program, words):
+    monkeypatch.setattr(hdf5_check, "_PROGRAM", program)
+    monkeypatch.setattr(hdf5_check, "SECONDS", 2.0)
+    with pytest.raises(OutputError, match=words):
+        hdf5_check.check_readable(content, "result.nc")
+
+
+def test_the_messages_of_a_library_are_bounded(monkeypatch, content):
+    program = "import sys; print('x' * int(sys.argv[2])); sys.exit(3)"
+    monkeypatch.setattr(hdf5_check, "_PROGRAM", program)
+    with pytest.raises(OutputError) as raised:
+        hdf5_check.check_readable(content, "result.nc")
+    assert len(str(raised.value)) < 2 * hdf5_check.LONGEST
+
+
+def test_a_file_that_is_whole_is_read_to_the_bit(tmp_path, content):
+    path = tmp_path / "good.nc"
+    read = io.read(path)
+    np.testing.assert_array_equal(read["psi"][:, 0], np.linspace(0.0, 1.0, 5))
+    assert zlib.crc32(path.read_bytes()) == zlib.crc32(content)
+
+
+def test_a_column_that_is_named_twice_is_refused(tmp_path):
+    (tmp_path / "twice.csv").write_text("time,psi,psi\n0,1,2\n")
+    with pytest.raises(OutputError, match="names a column twice"):
+        io.read(tmp_path / "twice.csv")
