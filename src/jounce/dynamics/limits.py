@@ -14,7 +14,7 @@ from jounce.dynamics.trajectories import FollowedTrajectory, why_not
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, real_numbers
+from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 FIELDS = ("position", "velocity", "acceleration", "jerk", "effort", "effort_rate")
@@ -380,7 +380,7 @@ def _grid(trajectory: JointTrajectory) -> Float[np.ndarray, " time"]:
 
 
 def _checked_times(times: ArrayLike) -> Float[np.ndarray, " time"]:
-    found = np.array(real_numbers("times", times, TrajectoryError))
+    found = np.array(seconds("times", times, TrajectoryError))
     if found.ndim != 1 or not found.size or not np.isfinite(found).all() or (np.diff(found) <= 0).any():
         raise TrajectoryError("must be finite instants that increase, at least one", name="times", value=found.tolist())
     return found

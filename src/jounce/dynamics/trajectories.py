@@ -13,7 +13,7 @@ from jounce.robot.arguments import joints_of, whole_number
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ def trajectory_torques(
 
     rates, drives = whole_number("rates", rates), flag("drives", drives, error=RobotError)
     followed = FollowedTrajectory(robot, trajectory)
-    instants = trajectory.times if times is None else np.atleast_1d(np.asarray(times, float))
+    instants = trajectory.times if times is None else np.atleast_1d(seconds("times", times, TrajectoryError))
     values = followed.torques(followed.coordinates(instants, rates + 2), instants, drives)
     for message in followed.doubts:
         warnings.warn(SampleWarning(message), stacklevel=2)

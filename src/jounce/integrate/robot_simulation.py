@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.display import Displayed
+from jounce.errors import RobotError
 from jounce.integrate.robot_marching import (
     RobotProblem,
     RobotState,
@@ -29,7 +30,7 @@ from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.robot import Robot
 from jounce.robot.wrench_laws import STATE
 from jounce.robot.wrenches import Wrench
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, seconds
 
 if TYPE_CHECKING:
     import xarray
@@ -215,7 +216,7 @@ class RobotSimulation(Displayed):
         order : int, optional
             Highest derivative; that of this simulation unless given.
         """
-        instants = np.atleast_1d(np.asarray(time, float))
+        instants = np.atleast_1d(seconds("time", time, RobotError))
         order = self.order if order is None else order
         return RobotSimulation(
             self.robot, self._problem, self.steps, instants, order, self._ending, self.events, self._wrenches

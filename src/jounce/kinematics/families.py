@@ -29,7 +29,7 @@ from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, real_numbers
 
 if TYPE_CHECKING:
     import xarray
@@ -50,14 +50,10 @@ def checked_values(mechanism: Mechanism, parameters: Mapping[str, Any], each: st
     values, count = {}, None
     for name, given in parameters.items():
         check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
-        try:
-            array = np.asarray(given, float)
-        except (TypeError, ValueError):
-            array = np.zeros(0)
+        wanted = f"a list of finite numbers, one for each {each}"
+        array = real_numbers(f"parameters.{name}", given, MechanismError, wanted)
         if array.ndim != 1 or not array.size or not np.isfinite(array).all():
-            raise MechanismError(
-                f"must be a list of finite numbers, one for each {each}", name=f"parameters.{name}", value=given
-            )
+            raise MechanismError(f"must be {wanted}", name=f"parameters.{name}", value=given)
         if count is not None and len(array) != count:
             message = f"must have one value for each {each}, {count} as those before"
             raise MechanismError(message, name=f"parameters.{name}", value=len(array))

@@ -18,7 +18,7 @@ from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.cams.followers import AbstractFollower, Follower, across, rotated, unit
 from jounce.kinematics.cams.results import Extreme, Geometry, Numbers1, Undercut
 from jounce.kinematics.cams.undercut import Cutter, runs
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory import (
     AbstractMotion,
     Continuity,
@@ -79,7 +79,7 @@ class PlateCam:
 
     def at(self, angle: ArrayLike) -> Geometry:
         """Return the cam at any cam angles, rad: exact but for rounding."""
-        return _geometry(self, np.atleast_1d(np.asarray(angle, float)))
+        return _geometry(self, np.atleast_1d(real_numbers("angle", angle, MechanismError)))
 
     @cached_property
     def table(self) -> Geometry:

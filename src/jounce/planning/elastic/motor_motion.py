@@ -13,7 +13,7 @@ from jounce.planning.elastic.driven_systems import DrivenSystem
 from jounce.planning.elastic.drives import DriveArrays
 from jounce.planning.elastic.pieces import resolved
 from jounce.planning.elastic.spring_deflection import SpringDeflection
-from jounce.shapes import ArrayLike, real_numbers
+from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.motion import AbstractMotion
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ class Feedforward(MotorMotion):
         TrajectoryError
             If one lies outside of it.
         """
-        instants, known = np.atleast_1d(real_numbers("times", times, TrajectoryError)), self.system.instants
+        instants, known = np.atleast_1d(seconds("times", times, TrajectoryError)), self.system.instants
         if not (instants.ndim == 1 and ((instants >= known[0]) & (instants <= known[-1])).all()):
             message = f"must be instants from {known[0]:.9g} to {known[-1]:.9g} s, where the motion is known"
             raise TrajectoryError(message, name="times", value=instants.tolist()[:5])
