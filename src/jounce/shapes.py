@@ -41,7 +41,9 @@ def is_traced(values: Any) -> bool:
     return any(isinstance(x, Tracer) for x in jax.tree.leaves(values))
 
 
-def real_numbers(name: str, values: Any, error: Callable[..., Exception], wanted: str = "real numbers") -> np.ndarray:
+def real_numbers(
+    name: str | None, values: Any, error: Callable[..., Exception], wanted: str = "real numbers"
+) -> np.ndarray:
     """Return values as an array of double precision, the same one if they are one.
 
     Raises
@@ -53,7 +55,7 @@ def real_numbers(name: str, values: Any, error: Callable[..., Exception], wanted
     return _checked(name, values, error, wanted, timed=False)
 
 
-def seconds(name: str, values: Any, error: Callable[..., Exception], wanted: str = "real numbers") -> np.ndarray:
+def seconds(name: str | None, values: Any, error: Callable[..., Exception], wanted: str = "real numbers") -> np.ndarray:
     """Return instants as `real_numbers` does, durations and quantities of time converted to seconds.
 
     Dates are refused: which of them is time zero is for the user to say.
@@ -66,7 +68,7 @@ def seconds(name: str, values: Any, error: Callable[..., Exception], wanted: str
     return _checked(name, values, error, wanted, timed=True)
 
 
-def _checked(name: str, values: Any, error: Callable[..., Exception], wanted: str, *, timed: bool) -> np.ndarray:
+def _checked(name: str | None, values: Any, error: Callable[..., Exception], wanted: str, *, timed: bool) -> np.ndarray:
     try:
         return _numbers(values, timed)
     except _NoNumbersError as reason:
@@ -88,29 +90,29 @@ def _numbers(values: Any, timed: bool) -> np.ndarray:
         if set(map(type, values)) <= _PLAIN:
             return np.array(values, float)
         return np.array([_numbers(entry, timed) for entry in values], float)
-    if isinstance(values, datetime.timedelta) and not timed:
-        raise _NoNumbersError(_DURATIONS)
-    if isinstance(values, datetime.timedelta):
+    if isinstance(values, datetime.timedelta) and timed:
         return np.array(values / datetime.timedelta(seconds=1))
-    if isinstance(values, datetime.date):
-        raise _NoNumbersError(_DATES)
-    if isinstance(values, np.ma.MaskedArray):
-        if hidden := np.ma.count_masked(values):
-            raise _NoNumbersError(f"{hidden} of {values.size} are masked: leave them out, or fill them in")
-        values = values.data
+    if isinstance(values, datetime.timedelta | datetime.date):
+        raise _NoNumbersError(_DATES if isinstance(values, datetime.date) else _DURATIONS)
+    if hidden := np.ma.count_masked(values) if isinstance(values, np.ma.MaskedArray) else 0:
+        raise _NoNumbersError(f"{hidden} of {np.size(values)} are masked: leave them out, or fill them in")
     array = np.asarray(_unit_free(values, timed))
     kind = array.dtype.kind
     if kind in "fiu" or jnp.issubdtype(array.dtype, np.floating):
         return np.asarray(array, float)
-    if kind == "m" and timed and np.datetime_data(array.dtype)[0] != "generic":
-        if np.isnat(array).any():
-            raise _NoNumbersError("a duration is missing (NaT)")
-        return np.asarray(array / np.timedelta64(1, "s"))
+    if kind == "m" and timed:
+        return _seconds_of(array)
     if kind == "O" and array.ndim:
         return np.array([_numbers(entry, timed) for entry in array.ravel()], float).reshape(array.shape)
     if kind == "O" and not isinstance(array.item(), str | bytes):
         return np.array(float(array.item()))  # a fraction, say
     raise _NoNumbersError(_MEANT[kind]) if kind in _MEANT else ValueError
+
+
+def _seconds_of(durations: np.ndarray) -> np.ndarray:
+    if np.datetime_data(durations.dtype)[0] == "generic" or np.isnat(durations).any():
+        raise _NoNumbersError("these are durations, of which one has no unit, or is missing (NaT)")
+    return np.asarray(durations / np.timedelta64(1, "s"))
 
 
 def _unit_free(values: Any, timed: bool) -> Any:
@@ -119,15 +121,14 @@ def _unit_free(values: Any, timed: bool) -> Any:
     if isinstance(unit, str) and not _SI.fullmatch(unit.strip()):
         raise _NoNumbersError(f"these are in {unit}: convert them to SI units")
     bare = getattr(values, "data", values) if unit is not None or hasattr(values, "coords") else values
-    to = getattr(bare, "to", None)
-    own = getattr(bare, "units", getattr(bare, "unit", None)) if callable(to) else None
+    own = getattr(bare, "units", getattr(bare, "unit", None)) if hasattr(bare, "to") else None
     if own is None or not hasattr(bare, "magnitude" if hasattr(bare, "units") else "value"):
         return bare
     if not timed:
         raise _NoNumbersError(f"these have the unit {own or 1}: convert them to SI units, and give plain numbers")
     try:
-        found: Any = to("s")
-    except Exception:  # the errors of libraries of units have no common base
+        found: Any = bare.to("s")
+    except Exception:  # noqa: BLE001 - the errors of libraries of units have no common base
         raise _NoNumbersError(f"these have the unit {own or 1}, which is none of time") from None
     return found.magnitude if hasattr(found, "magnitude") else found.value
 
@@ -139,11 +140,6 @@ _MEANT = {
     "m": _DURATIONS,
     "M": _DATES,
     "b": "these are truth values",
-    "U": "these are text",
-    "S": "these are text",
-    "T": "these are text",
-    "O": "these are text",
-    "c": "these are complex",
     "V": "these are records: take one of their fields",
 }
 _UNIT = r"(?:m|kg|s|rad|N|J|W|Hz|Pa|K|1|met(?:er|re)s?|seconds?|radians?|newtons?)(?:(?:\^|\*\*)?-?\d+)?"
@@ -153,12 +149,12 @@ _SI = re.compile(rf"|dimensionless|{_UNIT}(?: ?[*/ ] ?{_UNIT})*")
 def real_derivatives(derivatives: Iterable[Any]) -> list[Any]:
     """Return derivatives as a list of arrays; a ValueError if one is not of real numbers, as `real_numbers` says."""
 
-    def error(message: str, name: str, value: object) -> ValueError:  # noqa: ARG001 - named by the message
+    def error(message: str, name: str, value: object) -> ValueError:
         return ValueError(f"{name} {message}, got {type(value).__name__}")
 
     return [x if is_real(x) else real_numbers("derivatives", x, error) for x in derivatives]
 
 
-def is_real(x: object) -> TypeGuard[jax.Array]:
+def is_real(x: Any) -> TypeGuard[jax.Array]:
     """Tell whether a value is an array of JAX, traced or not, of real numbers."""
     return isinstance(x, jax.Array) and x.dtype.kind in "fiu"

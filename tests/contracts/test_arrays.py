@@ -101,7 +101,7 @@ def test_what_is_no_array_of_numbers_is_refused(door, kind):
     values = NO_NUMBERS[kind]
     if door in NUMBER_DOORS and kind in ("masked", "objects"):
         values = values[::-1]  # some doors take the first few
-    with pytest.raises((jn.JounceError, ValueError), match="must be|durations|text|waypoints"):
+    with pytest.raises((jn.JounceError, ValueError), match=r"must be|durations"):
         enter(values)
 
 
@@ -141,11 +141,12 @@ def test_numbers_of_every_kind_are_taken(read):
     for given in ([1, 2.0], (np.float32(1), 2), np.array([1, 2]), np.ma.array([1, 2]), np.array([1, 2.0], object),
                   xarray.DataArray([1.0, 2.0], attrs={"units": "m s-1"}), range(1, 3)):  # fmt: skip
         found = read("x", given, ValueError)
-        assert found.dtype == float and found.tolist() == [1.0, 2.0]
+        assert found.dtype == float
+        assert found.tolist() == [1.0, 2.0]
 
 
 def test_a_missing_duration_is_told():
-    with pytest.raises(jn.MechanismError, match="a duration is missing"):
+    with pytest.raises(jn.MechanismError, match="or is missing"):
         jn.solve(MECHANISM, np.array([0, "NaT"], "timedelta64[s]"), order=0)
 
 

@@ -205,14 +205,14 @@ def _from_numbers(form: Any) -> Variation:
             raise MechanismError("must be (low, high), (low, high, count), or a list of values", value=form)
         return _interval(*(_number(bound) for bound in form[:2]), *form[2:])
     wanted = "(low, high), (low, high, count), or a list of finite numbers"
-    values = np.array(real_numbers("", form, MechanismError, wanted))
+    values = np.array(real_numbers(None, form, MechanismError, wanted))
     if values.ndim != 1 or not values.size or not np.isfinite(values).all():
         raise MechanismError(f"must be {wanted}", value=form)
     return Values(values)
 
 
 def _number(value: Any) -> float:
-    number = real_numbers("", value, MechanismError, "a finite number")
+    number = real_numbers(None, value, MechanismError, "a finite number")
     if number.ndim or not np.isfinite(number):
         raise MechanismError("a bound must be a finite number", value=value)
     return float(number)

@@ -184,6 +184,11 @@ class Mechanism(Displayed):
         self._check_columns()
         _ = self.shown_units
 
+    def __repr__(self) -> str:
+        kinds = {"bodies": self.bodies, **self.elements}
+        counts = ", ".join(f"{kind} {len(found)}" for kind, found in kinds.items() if found)
+        return f"<Mechanism {self.title}{': ' if self.title else ''}{self.space}; {counts}>"
+
     @property
     def shown_units(self) -> ShownUnits:
         """The units in which results are shown and written."""

@@ -45,12 +45,12 @@ def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
     if isinstance(value, numbers.Real):
         return _number(value)
     if isinstance(value, np.ndarray | jax.Array) and not isinstance(value, Tracer):
-        return real_numbers("", value, MechanismError) if value.dtype.kind in "fiu" else value
+        return real_numbers(None, value, MechanismError) if value.dtype.kind in "fiu" else value
     return value
 
 
 def _number(value: Any) -> float:
-    return float(real_numbers("", value, MechanismError, "one number"))
+    return float(real_numbers(None, value, MechanismError, "one number"))
 
 
 def _are_numbers(entries: list[Any]) -> bool:

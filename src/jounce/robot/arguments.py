@@ -4,7 +4,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -15,7 +14,7 @@ from jounce.shapes import Numbers, is_real, real_numbers
 from jounce.trajectory.joint_trajectory import MAX_ORDER
 
 
-def floats(name: str, values: object, read: Callable[..., np.ndarray] = real_numbers) -> Float[Numbers, "..."]:
+def floats(name: str, values: Any, read: Callable[..., np.ndarray] = real_numbers) -> Float[Numbers, "..."]:
     """Return values as an array of double precision, of NumPy unless it is one of JAX.
 
     Raises

@@ -20,7 +20,7 @@ Read = Callable[..., np.ndarray]
 """How numbers are read: as they are, `real_numbers`, or as times, `seconds`."""
 
 
-def finite(name: str, value: Any, read: Read = real_numbers) -> float:
+def finite(name: str | None, value: Any, read: Read = real_numbers) -> float:
     """Return a finite number."""
     number = read(name, value, TrajectoryError, "a finite number")
     if number.ndim or not np.isfinite(number):

@@ -71,6 +71,11 @@ class PlateCam:
     title: str = ""
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        title = f"{self.title}: " if self.title else ""
+        follower = f"{type(self.follower).__name__}, base radius {self.base_radius:g} m"
+        return f"<PlateCam {title}{type(self.law).__name__}, {follower}, {len(self.angle)} angles>"
+
     @property
     def shown_units(self) -> ShownUnits:
         """The units in which the cam is shown and written."""

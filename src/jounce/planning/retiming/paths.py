@@ -200,7 +200,7 @@ def _law(name: str, law: Any) -> AbstractMotion:
     if isinstance(law, AbstractMotion):
         return law
     try:
-        expression = Expression(law if isinstance(law, str) else repr(finite("", law)))
+        expression = Expression(law if isinstance(law, str) else repr(finite(None, law)))
         expression.check({"s"})
         return PathExpression(expression)
     except JounceError as error:
