@@ -15,6 +15,7 @@ from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.joint_trajectory import JointTrajectory
+from jounce.trajectory.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray
@@ -156,11 +157,11 @@ def trajectory_torques(
     values = followed.torques(followed.coordinates(instants, rates + 2), instants, drives)
     for message in followed.doubts:
         warnings.warn(SampleWarning(message), stacklevel=2)
-    variables = {
-        name: (("time", "derivative"), values[..., k], {"units": "N*m" if robot.joints[name].turning else "N"})
-        for k, name in enumerate(robot.joint_names)
-    }
-    axes = {"time": ("time", instants, {"units": "s", "long_name": "time"}), "derivative": np.arange(rates + 1)}
+    variables = {}
+    for k, name in enumerate(robot.joint_names):
+        told = {"units": "N*m" if robot.joints[name].turning else "N", "long_name": derivatives_of(name)}
+        variables[name] = (("time", "derivative"), values[..., k], told)
+    axes = time_axes(instants, rates + 1)
     return xarray.Dataset(variables, coords=axes, attrs={"title": robot.name, "source": "jounce"})
 
 

@@ -30,6 +30,7 @@ from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
 from jounce.shapes import ArrayLike, real_numbers
+from jounce.trajectory.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray
@@ -180,8 +181,7 @@ class _Family:
         """Return the results, labelled."""
         import xarray
 
-        coordinates: dict[str, Any] = {"design": np.arange(len(self.rows)), "time": self.instants}
-        coordinates["derivative"] = np.arange(self.order + 1)
+        coordinates: dict[str, Any] = {"design": np.arange(len(self.rows)), **time_axes(self.instants, self.order + 1)}
         variables = {}
         for name, output in self.mechanism.outputs.items():
             found = self.outputs.get(name)
@@ -193,17 +193,14 @@ class _Family:
                 coordinates |= {axis: list(labels) for axis, labels in axes}
                 found = found.reshape(*found.shape[:3], *(len(labels) for _, labels in axes))
                 dims += [axis for axis, _ in axes]
-            variables[name] = (dims, found, {"units": output.unit, "long_name": name})
+            variables[name] = (dims, found, {"units": output.unit, "long_name": derivatives_of(name)})
         words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": _flags()}
         variables["status"] = (("design", "time"), self.status, words)
         taken = {*variables, *coordinates}
         named = {name: name if name not in taken else f"parameter_{name}" for name in values}
         coordinates |= {named[name]: ("design", value, {"long_name": name}) for name, value in values.items()}
         attributes = {"title": self.mechanism.title or "designs of a mechanism", "source": "jounce"}
-        dataset = xarray.Dataset(variables, coordinates, attributes)
-        dataset["time"].attrs = {"units": "s", "long_name": "time"}
-        dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
-        return dataset
+        return xarray.Dataset(variables, coordinates, attributes)
 
     def _of_whole_motions(self) -> bool:
         """Tell whether outputs are asked for that follow from whole motions, not from one instant."""

@@ -15,6 +15,7 @@ from jounce.planning.elastic.pieces import resolved
 from jounce.planning.elastic.spring_deflection import SpringDeflection
 from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.motion import AbstractMotion
+from jounce.trajectory.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray
@@ -238,7 +239,7 @@ class Feedforward(MotorMotion):
         import xarray
 
         count = self._levels - 2
-        axes = {"time": ("time", self.time, {"units": "s", "long_name": "time"}), "derivative": np.arange(count)}
+        axes = time_axes(self.time, count)
         variables: dict[str, Any] = {}
         for k, name in enumerate(self.names):
             place, force = (("m", "N"), ("rad", "N*m"))[self._arrays.turning[k]]
@@ -254,7 +255,8 @@ class Feedforward(MotorMotion):
                 "spring_torque": (self.spring_torque, force),
             }
             for word, (values, unit) in table.items():
-                variables[f"{name}_{word}"] = (("time", "derivative"), values[:, :count, k], {"units": unit})
+                told = {"units": unit, "long_name": derivatives_of(f"{name}_{word}")}
+                variables[f"{name}_{word}"] = (("time", "derivative"), values[:, :count, k], told)
         return xarray.Dataset(variables, coords=axes, attrs={"title": self.title, "source": "jounce"})
 
 
