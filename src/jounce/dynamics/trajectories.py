@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag, no_such
+from jounce.errors import RobotError, SampleWarning, TrajectoryError, UnitWarning, flag, no_such
 from jounce.kinematics.chunks import in_chunks
 from jounce.robot.arguments import joints_of, whole_number
 from jounce.robot.inverse_dynamics import inverse_dynamics
@@ -16,6 +16,7 @@ from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.joint_trajectory import JointTrajectory
 from jounce.trajectory.shown_units import derivatives_of, time_axes
+from jounce.trajectory.unit_doubts import trajectory_doubt
 
 if TYPE_CHECKING:
     import xarray
@@ -34,6 +35,8 @@ class FollowedTrajectory:
         The robot.
     trajectory : JointTrajectory
         Of some or all of its joints.
+    given : bool, default True
+        Whether a user gave it: then a warning says where angles are likely in degrees.
 
     Attributes
     ----------
@@ -49,7 +52,7 @@ class FollowedTrajectory:
         If the robot has no joints, or the trajectory names one that it does not have, or that moves otherwise.
     """
 
-    def __init__(self, robot: Robot, trajectory: JointTrajectory):
+    def __init__(self, robot: Robot, trajectory: JointTrajectory, *, given: bool = True):
         if not joints_of(robot):
             raise RobotError("the robot has no moving joint; nothing can follow the trajectory", name="joints")
         for name in trajectory.names:
@@ -62,6 +65,8 @@ class FollowedTrajectory:
         limits = robot.limits if still else {}
         self.held = {name: _rest(limits[name]) for name in still}
         self.doubts: list[str] = []
+        if given:
+            warn_of_degrees(robot, trajectory)
 
     def coordinates(self, times: Float[np.ndarray, " time"], order: int) -> Float[np.ndarray, "time {order}+1 joint"]:
         """Return coordinates and derivatives.
@@ -102,6 +107,24 @@ class FollowedTrajectory:
             quantity = names[level] if level < len(names) else f"derivative {level} of the {names[0]}"
             message = f"the {quantity} of this joint is not finite at t = {times[instant]:g} s"
             raise TrajectoryError(f"{message}; choose another law there", name=self.robot.joint_names[joint])
+
+
+def warn_of_degrees(robot: Robot, trajectory: JointTrajectory) -> None:
+    """Warn of joints that turn and whose values are likely meant in degrees, unless they came with a unit.
+
+    Warns
+    -----
+    UnitWarning
+    """
+    laws = {
+        name: law
+        for name, law in trajectory.laws.items()
+        if robot.joints[name].turning and name not in trajectory.measures
+    }
+    if why := trajectory_doubt(
+        laws, trajectory.start, trajectory.stop, {name: robot.joints[name].limits for name in laws}
+    ):
+        warnings.warn(UnitWarning(why), stacklevel=3)
 
 
 def trajectory_torques(
