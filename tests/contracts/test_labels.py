@@ -1,4 +1,4 @@
-"""Labels of datasets: the time has its unit, and a plot of a derivative does not claim to be in that of the quantity."""
+"""Labels of datasets: the time has its unit, and a plot of a derivative does not claim that of the quantity."""
 
 import matplotlib as mpl
 import numpy as np
@@ -12,6 +12,7 @@ mpl.use("Agg")
 ROD = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
 ROBOT = jn.Robot("one", [jn.Link("base"), jn.Link("rod", ROD)], [jn.Joint("a", "base", "rod")])
 TRAJECTORY = jn.JointTrajectory({"a": "t**2"}, 0.0, 1.0, np.linspace(0.0, 1.0, 11))
+DRIVE = jn.Drive(stiffness=100.0, rotor_inertia=0.1)
 U = [0.0, 0.1, 0.2]
 
 
@@ -27,7 +28,7 @@ LABELLED = {
     "batch": lambda: jn.solve_batch(four_bar(), {"BC": [0.142, 0.143]}, U, order=3),
     "torques": lambda: jn.dynamics.trajectory_torques(ROBOT, TRAJECTORY, rates=3),
     "simulation of a robot": lambda: jn.simulate(ROBOT, U, state=[[0.0], [0.0]], order=3).dataset,
-    "feedforward": lambda: jn.feedforward(ROBOT, TRAJECTORY, {"a": jn.Drive(stiffness=100.0, rotor_inertia=0.1)}).dataset,
+    "feedforward": lambda: jn.feedforward(ROBOT, TRAJECTORY, {"a": DRIVE}).dataset,
 }  # fmt: skip
 
 

@@ -118,7 +118,7 @@ def test_commands_tell_degrees_on_standard_error_and_in_json(tmp_path, capsys, c
     told = [json.loads(line)["warning"] for line in capsys.readouterr().err.splitlines()]
     words = [line["message"] for line in told if line["kind"] == "UnitWarning"]
     assert len(words) == 1
-    assert "panda_joint1 goes from -10 to 70 rad, 13 turns: degrees? (and 1 joint like it)" in words[0]
+    assert "panda_joint1 goes from -0.2721 to 70 rad, 11 turns: degrees? (and 1 joint like it)" in words[0]
     assert shown == (0 if command == "torques" else 1)
 
 

@@ -66,9 +66,9 @@ def _values(law: AbstractMotion, grid: Values) -> Values:
         return np.array([law.expression.evaluate({**parameters, "t": t}) for t in grid.tolist()], float)
     if isinstance(law, FollowingMotion) and law.parts:
         own, leader = law.parts
-        if not isinstance(leader, ExpressionMotion | FollowingMotion) and not _is_polynomial(leader):
-            if _is_polynomial(own):  # it is followed from its beginning to its end, at some pace
-                return _spline_values(own, np.linspace(float(own.breakpoints[0]), float(own.stop), len(grid)))
+        plain = isinstance(leader, ExpressionMotion | FollowingMotion) or _is_polynomial(leader)
+        if not plain and _is_polynomial(own):  # it is followed from its beginning to its end, at some pace
+            return _spline_values(own, np.linspace(float(own.breakpoints[0]), float(own.stop), len(grid)))
         return _values(own, _values(leader, grid))
     if isinstance(law, PiecewiseMotion) and law.parts:
         piece = np.searchsorted(np.array(law.until, float), grid, side="right")
@@ -83,8 +83,10 @@ def _values(law: AbstractMotion, grid: Values) -> Values:
 
 
 def _is_polynomial(law: AbstractMotion) -> TypeGuard[SplineMotion]:
-    own = isinstance(law, SplineMotion) and type(law)._within in (SplineMotion._within, SegmentedMotion._within)
-    return own and type(law)._evaluated is SplineMotion._evaluated and np.ndim(law.stop) == 0
+    if not isinstance(law, SplineMotion) or np.ndim(law.stop):
+        return False
+    known = type(law)._within in (SplineMotion._within, SegmentedMotion._within)
+    return known and type(law)._evaluated is SplineMotion._evaluated
 
 
 def _spline_values(law: SplineMotion, grid: Values) -> Values:

@@ -165,10 +165,11 @@ def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[_Law])
         if _is_thousandfold(value, usual):
             times = float(f"{value / usual:.1g}")
             _warn(source, location, f"{value:g} m is {times:g} times the others: {value:g} mm?")
-    if len(lengths) >= TO_COMPARE and in_order[-1] >= LARGE and all(plain for *_, plain in lengths):
-        if (why := _too_large(mechanism, in_order[-1], laws)) and not _any_unit(source.data, mechanism):
-            location = max(lengths, key=lambda x: x[1])[0]
-            _warn(source, location, f"the lengths of this file go up to {in_order[-1]:g} m, {why}: millimetres?")
+    if len(lengths) < TO_COMPARE or in_order[-1] < LARGE or not all(plain for *_, plain in lengths):
+        return
+    if (why := _too_large(mechanism, in_order[-1], laws)) and not _any_unit(source.data, mechanism):
+        location = max(lengths, key=lambda x: x[1])[0]
+        _warn(source, location, f"the lengths of this file go up to {in_order[-1]:g} m, {why}: millimetres?")
 
 
 def _too_large(mechanism: Mechanism, size: float, laws: Iterable[_Law]) -> str:
