@@ -55,7 +55,7 @@ def optimise(
     mechanism : Mechanism
         As for `jounce.solve`; constraints must not be redundant.
     minimise : str
-        What is to be least.
+        What is to be least; what is to be largest has a minus before it, as ``"-span(psi)"``.
     vary : dict of str to (low, high)
         Bounds of the parameters that may be changed, SI or text with a unit; ``"12cm:16cm"`` holds both.
     subject_to : sequence of str, optional

@@ -119,7 +119,7 @@ def warn_of_degrees(robot: Robot, trajectory: JointTrajectory) -> None:
     laws = {
         name: law
         for name, law in trajectory.laws.items()
-        if robot.joints[name].turning and name not in trajectory.measures
+        if name in robot.joint_names and robot.joints[name].turning and name not in trajectory.measures
     }
     if why := trajectory_doubt(
         laws, trajectory.start, trajectory.stop, {name: robot.joints[name].limits for name in laws}

@@ -354,7 +354,9 @@ def check_output_name(given: object, error: type[JounceError], **place: Any) -> 
     if not isinstance(given, str) or not given:
         raise error("the name of an output is text that is not empty", value=given, **place)
     if names_column(given):
-        raise error(f"the name '{given}' is reserved for columns of the results; give another one", **place)
+        rate = RATE_COLUMN.fullmatch(given) is not None
+        why = f", where '_d' and a number mean a derivative of '{given.rpartition('_d')[0]}'" if rate else ""
+        raise error(f"the name '{given}' is reserved for columns of the results{why}; give another one", **place)
 
 
 def check_mechanism(given: object) -> None:
