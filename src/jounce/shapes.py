@@ -5,17 +5,28 @@ everywhere: within the library `order` first, components next, `*batch` last; at
 then `derivative`, then `joint`, `row`, `column` or a component. An axis `order` or `derivative` counts from zero.
 """
 
+import datetime
+import re
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
 Numbers = jax.Array | np.ndarray
 """An array of JAX or NumPy."""
 
-ArrayLike = Numbers | Sequence | np.floating | np.integer | float | int
+
+@runtime_checkable
+class Labelled(Protocol):
+    """What NumPy makes an array of: a column of a table, an array with labels, a quantity with a unit."""
+
+    def __array__(self, *args: Any, **options: Any) -> np.ndarray: ...
+
+
+ArrayLike = Numbers | Sequence | np.floating | np.integer | float | int | Labelled
 """What becomes an array of numbers: an array, lists or tuples of numbers in any nesting, a number."""
 
 Real = Numbers | np.floating | np.integer | float | int
@@ -30,26 +41,120 @@ def is_traced(values: Any) -> bool:
     return any(isinstance(x, Tracer) for x in jax.tree.leaves(values))
 
 
-def real_numbers(name: str, values: Any, error: Callable[..., Exception]) -> np.ndarray:
+def real_numbers(
+    name: str | None, values: Any, error: Callable[..., Exception], wanted: str = "real numbers"
+) -> np.ndarray:
     """Return values as an array of double precision, the same one if they are one.
 
     Raises
     ------
     Exception
-        That given, if they are no numbers in one rectangular array, or complex ones: NumPy would drop the imaginary
-        parts with no more than a warning.
+        That given, if they are no real numbers in one rectangular array: text, truth values, dates, durations, records,
+        complex numbers, masked values, or quantities with a unit that is not of SI. NumPy would take most for numbers.
     """
+    return _checked(name, values, error, wanted, timed=False)
+
+
+def seconds(name: str | None, values: Any, error: Callable[..., Exception], wanted: str = "real numbers") -> np.ndarray:
+    """Return instants as `real_numbers` does, durations and quantities of time converted to seconds.
+
+    Dates are refused: which of them is time zero is for the user to say.
+
+    Examples
+    --------
+    >>> seconds("time", np.array([0, 500], "timedelta64[ms]"), ValueError).tolist()
+    [0.0, 0.5]
+    """
+    return _checked(name, values, error, wanted, timed=True)
+
+
+def _checked(name: str | None, values: Any, error: Callable[..., Exception], wanted: str, *, timed: bool) -> np.ndarray:
     try:
-        if not np.iscomplexobj(values):
-            return np.asarray(values, float)
-    except (TypeError, ValueError):
-        pass
-    raise error("must be real numbers", name=name, value=values)
+        return _numbers(values, timed)
+    except _NoNumbersError as reason:
+        raise error(f"must be {wanted}{reason}", name=name, value=values) from None
+    except (TypeError, ValueError, OverflowError):
+        raise error(f"must be {wanted}", name=name, value=values) from None
 
 
-def not_complex(derivatives: Iterable[Any]) -> list[Any]:
-    """Return derivatives as a list; a ValueError if one is complex, since JAX would drop its imaginary part."""
-    given = list(derivatives)
-    if any(np.issubdtype(getattr(x, "dtype", float), np.complexfloating) for x in given):
-        raise ValueError("derivatives must be real numbers, got complex ones")
-    return given
+class _NoNumbersError(Exception):
+    """Says what values are in place of real numbers, and what to do."""
+
+    def __str__(self) -> str:
+        return f"; {self.args[0]}"
+
+
+def _numbers(values: Any, timed: bool) -> np.ndarray:
+    """Return values as an array of double precision; entries of lists and of arrays of objects one by one."""
+    if isinstance(values, list | tuple):
+        if set(map(type, values)) <= _PLAIN:
+            return np.array(values, float)
+        return np.array([_numbers(entry, timed) for entry in values], float)
+    if isinstance(values, datetime.timedelta) and timed:
+        return np.array(values / datetime.timedelta(seconds=1))
+    if isinstance(values, datetime.timedelta | datetime.date):
+        raise _NoNumbersError(_DATES if isinstance(values, datetime.date) else _DURATIONS)
+    if hidden := np.ma.count_masked(values) if isinstance(values, np.ma.MaskedArray) else 0:
+        raise _NoNumbersError(f"{hidden} of {np.size(values)} are masked: leave them out, or fill them in")
+    array = np.asarray(_unit_free(values, timed))
+    kind = array.dtype.kind
+    if kind in "fiu" or jnp.issubdtype(array.dtype, np.floating):
+        return np.asarray(array, float)
+    if kind == "m" and timed:
+        return _seconds_of(array)
+    if kind == "O" and array.ndim:
+        return np.array([_numbers(entry, timed) for entry in array.ravel()], float).reshape(array.shape)
+    if kind == "O" and not isinstance(array.item(), str | bytes):
+        return np.array(float(array.item()))  # a fraction, say
+    raise _NoNumbersError(_MEANT[kind]) if kind in _MEANT else ValueError
+
+
+def _seconds_of(durations: np.ndarray) -> np.ndarray:
+    if np.datetime_data(durations.dtype)[0] == "generic" or np.isnat(durations).any():
+        raise _NoNumbersError("these are durations, of which one has no unit, or is missing (NaT)")
+    return np.asarray(durations / np.timedelta64(1, "s"))
+
+
+def _unit_free(values: Any, timed: bool) -> Any:
+    """Return the magnitudes of a quantity with a unit; raise an error unless they are in SI units, or are times."""
+    unit = getattr(values, "attrs", {}).get("units")  # of arrays with labels
+    if isinstance(unit, str) and not _SI.fullmatch(unit.strip()):
+        raise _NoNumbersError(f"these are in {unit}: convert them to SI units")
+    bare = getattr(values, "data", values) if unit is not None or hasattr(values, "coords") else values
+    own = getattr(bare, "units", getattr(bare, "unit", None)) if hasattr(bare, "to") else None
+    if own is None or not hasattr(bare, "magnitude" if hasattr(bare, "units") else "value"):
+        return bare
+    if not timed:
+        raise _NoNumbersError(f"these have the unit {own or 1}: convert them to SI units, and give plain numbers")
+    try:
+        found: Any = bare.to("s")
+    except Exception:  # noqa: BLE001 - the errors of libraries of units have no common base
+        raise _NoNumbersError(f"these have the unit {own or 1}, which is none of time") from None
+    return found.magnitude if hasattr(found, "magnitude") else found.value
+
+
+_PLAIN = {float, int, np.float64, np.int64}
+_DURATIONS = "these are durations: divide them by np.timedelta64(1, 's')"
+_DATES = "these are dates: give seconds from the first on, (t - t[0]) / np.timedelta64(1, 's')"
+_MEANT = {
+    "m": _DURATIONS,
+    "M": _DATES,
+    "b": "these are truth values",
+    "V": "these are records: take one of their fields",
+}
+_UNIT = r"(?:m|kg|s|rad|N|J|W|Hz|Pa|K|1|met(?:er|re)s?|seconds?|radians?|newtons?)(?:(?:\^|\*\*)?-?\d+)?"
+_SI = re.compile(rf"|dimensionless|{_UNIT}(?: ?[*/ ] ?{_UNIT})*")
+
+
+def real_derivatives(derivatives: Iterable[Any]) -> list[Any]:
+    """Return derivatives as a list of arrays; a ValueError if one is not of real numbers, as `real_numbers` says."""
+
+    def error(message: str, name: str, value: object) -> ValueError:
+        return ValueError(f"{name} {message}, got {type(value).__name__}")
+
+    return [x if is_real(x) else real_numbers("derivatives", x, error) for x in derivatives]
+
+
+def is_real(x: Any) -> TypeGuard[jax.Array]:
+    """Tell whether a value is an array of JAX, traced or not, of real numbers."""
+    return isinstance(x, jax.Array) and x.dtype.kind in "fiu"

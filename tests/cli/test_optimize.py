@@ -96,3 +96,15 @@ def test_the_file_that_is_read_is_not_replaced_unasked(capsys, file):
     assert status == 2
     assert "--overwrite" in told
     assert pathlib.Path(file).read_text() == TEXT
+
+
+def test_a_minus_before_an_expression_needs_no_equals_sign(file, capsys):
+    status, _, err = shown(capsys, file, "--minimize", "-span(nothing)", *VARY)
+    assert status == 2
+    assert "unknown name 'nothing' in '-span(nothing)'" in err  # it was read as an expression
+    assert "a minus before it" in " ".join(_help(capsys).split())
+
+
+def _help(capsys):
+    assert main(["optimize", "--help"]) == 0
+    return capsys.readouterr().out

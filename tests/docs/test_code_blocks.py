@@ -7,6 +7,7 @@ import shlex
 import pytest
 
 import jounce as jn
+from jounce.cli import main
 
 ROOT = pathlib.Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -54,6 +55,16 @@ def test_mechanism_files_in_the_pages_solve(page, tmp_path):
 def test_the_readme_and_the_start_page_have_code():
     found = [page.name for page in PAGES if any(blocks(page, "python"))]
     assert {"README.md", "start.md", "own_joint.md"} <= set(found)
+
+
+def test_the_listing_of_the_start_page_is_what_the_command_prints(capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    (listing,) = (text for _, text in blocks(ROOT / "docs" / "start.md", "text") if text.startswith("Planar four-bar"))
+    assert main(["run", "examples/four_bar.yaml"]) == 0
+    # of two peaks that are equal but for rounding either may be told
+    shown, told = ([line.split()[:-3] + line.split()[-2:-1] for line in x.splitlines()] for x in
+                   (listing, capsys.readouterr().out))  # fmt: skip
+    assert shown == told
 
 
 ELSEWHERE = ("python3", ".venv/bin/python", "bash", "jounce reproduce")  # set-up, scripts and papers have own checks

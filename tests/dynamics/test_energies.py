@@ -194,6 +194,27 @@ def test_equation_116_with_its_cross_terms(seed):
     close(negrean_dynamics.second_order_rotation(body.moments, body.w), body.rotation(2))
 
 
+@SEEDS
+def test_the_matrix_of_equation_116_in_global_and_in_body_axes(seed):
+    turned = body_of(seed).R  # and its plain derivatives
+
+    def spin(k, left):
+        """Derivative k of R' R^T, the global angular velocity, or of R^T R', that in body axes."""
+        pairs = ((turned[j + 1], turned[k - j].T) for j in range(k + 1))
+        parts = [math.comb(k, j) * (a @ b if left else b @ a) for j, (a, b) in enumerate(pairs)]
+        return sum(parts)
+
+    for left in (True, False):
+        w, v, u, t = (spin(k, left) for k in range(4))
+        twice, once = (v @ w, w @ v) if left else (w @ v, v @ w)
+        third = u + 2 * twice + once + w @ w @ w
+        rate = t + 2 * (u @ w + v @ v if left else v @ v + w @ u) + (v @ v + w @ u if left else u @ w + v @ v)
+        rate = rate + v @ w @ w + w @ v @ w + w @ w @ v
+        fourth = rate + (third @ w if left else w @ third)
+        for order, matrix in ((3, third), (4, fourth)):
+            close(matrix @ turned[0] if left else turned[0] @ matrix, turned[order], 1e-12)
+
+
 def test_equation_121_as_printed_contradicts_that_of_first_order():
     found = []
     for seed in range(3):

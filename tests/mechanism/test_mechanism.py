@@ -66,6 +66,11 @@ def test_output_named_like_an_axis_of_the_dataset_or_a_rate(name):
         mechanism(outputs={name: jn.AngleOutput("crank")})
 
 
+def test_the_name_of_a_rate_is_refused_with_the_reason():
+    with pytest.raises(jn.MechanismError, match=r"where '_d' and a number mean a derivative of 'DF'; give another one"):
+        mechanism(outputs={"DF_d0": jn.AngleOutput("crank")})
+
+
 def test_output_named_like_a_component_of_another():
     outputs = {"C": jn.PointOutput("crank", [0.1, 0]), "C_x": jn.AngleOutput("crank")}
     with pytest.raises(jn.MechanismError, match=r"outputs\.C_x: this name is taken by a component of the output 'C'"):

@@ -152,3 +152,73 @@ def test_the_page_works_in_a_browser(page):
         browser.close()
     assert wrong == []
     assert asked == [page.as_uri()]
+
+
+RECORD = """
+window.written = [];
+const plain = CanvasRenderingContext2D.prototype.fillText;
+CanvasRenderingContext2D.prototype.fillText = function (text, x, y) {
+  window.written.push([this.canvas.id || this.canvas.ariaLabel, text, x, y, this.measureText(text).width]);
+  plain.call(this, text, x, y);
+};
+"""
+
+
+@pytest.fixture
+def written(tmp_path):
+    """Return what a page writes on its canvases, and where the places of names are in pixels."""
+    from playwright.sync_api import sync_playwright
+
+    def open_page(motion):
+        path = tmp_path / "page.html"
+        report(motion, path)
+        with sync_playwright() as playwright:
+            options = ["--no-sandbox", "--enable-unsafe-swiftshader"]
+            browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=options)
+            tab = browser.new_page(viewport={"width": 1200, "height": 900})
+            tab.add_init_script(RECORD)
+            tab.goto(path.as_uri())
+            tab.wait_for_selector("html[data-ready=true]")
+            tab.evaluate("window.written.length = 0")
+            tab.locator("#time").fill("0.5")
+            found = tab.evaluate("window.written"), tab.evaluate("[sketch.clientWidth, sketch.clientHeight]")
+            browser.close()
+        return data_of(path), *found
+
+    return open_page
+
+
+@pytest.mark.slow
+def test_values_beside_a_plot_are_those_of_its_axis(written):
+    motion = jn.solve(jn.load("examples/four_bar.yaml").with_parameters(tau=0.5), np.linspace(0.0, 1.0, 201), order=4)
+    _, texts, _ = written(motion)
+    psi = motion.outputs["psi"][100]
+    own = [text for canvas, text, *_ in texts if canvas == "psi, jounce"]
+    assert any("10" in text and "rad/s" in text for text in own)  # the axis counts in thousands
+    exponent = 3 * int(np.floor(np.log10(np.abs(motion.outputs["psi"][:, 4]).max() * 1.08) / 3))
+    numbers = np.array([float(text) for text in own if re.fullmatch(r"-?[0-9.]+", text)])
+    assert np.isclose(numbers, psi[4] / 10**exponent, rtol=1e-5).any()
+    assert not np.isclose(numbers, psi[4], rtol=1e-5).any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["four_bar", "six_bar_watt", "servo_press"])
+def test_names_are_nearest_to_their_own_places(written, name):
+    data, texts, (wide, tall) = written(jn.solve(jn.load(f"examples/{name}.yaml"), np.linspace(0.0, 1.0, 11), order=1))
+    left, right, low, high = data["scene"]["limits"]
+    scale = min(wide / (right - left), tall / (high - low))
+    places = {}
+    frame = int(np.searchsorted(data["scene"]["times"], 0.5))
+    for label in data["scene"]["labels"]:
+        points = np.reshape(label["points"], (-1, 2))
+        x, y = points[min(frame, len(points) - 1)] * data["scene"]["step"]
+        places[label["text"]] = wide / 2 + scale * (x - (left + right) / 2), tall / 2 - scale * (y - (low + high) / 2)
+    told = {text: (x, y, width) for canvas, text, x, y, width in texts if canvas == "sketch" and text in places}
+    assert set(told) == set(places)
+    for text, (x, y, width) in told.items():
+        gap = {
+            other: np.hypot(max(abs(x - u) - width / 2, 0.0), max(abs(y - v) - 8.0, 0.0))
+            for other, (u, v) in places.items()
+            if other == text or np.hypot(u - places[text][0], v - places[text][1]) > 4.0
+        }
+        assert min(gap, key=gap.get) == text

@@ -144,3 +144,13 @@ def test_hermite_laws_refuse_what_does_not_fit(times, rows, name):
     with pytest.raises(jn.TrajectoryError) as caught:
         jn.HermiteMotion(times, rows)
     assert caught.value.name == name
+
+
+def test_a_law_that_begins_again_counts_its_end_once():
+    quarter = math.pi / 2
+    rise, rest = jn.Segment("harmonic", quarter, to=0.01), jn.Segment("dwell", quarter)
+    fall = jn.Segment("harmonic", quarter, to=0.0)
+    for beyond in ("repeat", "hold"):
+        law = jn.SegmentedMotion([rise, rest, fall, rest], beyond=beyond)
+        found = jn.continuity(law, 0.0, 2 * math.pi, periodic=True)
+        assert [(x.order, x.count) for x in found.derivatives if x.order == 2] == [(2, 4)]

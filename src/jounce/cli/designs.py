@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from cyclopts import Parameter
 
 from jounce.cli.options import (
     PLAIN_MECHANISM,
@@ -27,9 +29,9 @@ def optimize(
     file: Path,
     /,
     *,
-    minimize: str,
+    minimize: Annotated[str, Parameter(allow_leading_hyphen=True)],
     vary: list[str],
-    subject_to: list[str] | None = None,
+    subject_to: Annotated[list[str] | None, Parameter(allow_leading_hyphen=True)] = None,
     curve: list[str] | None = None,
     assemblies: str | None = None,
     starts: int = 8,
@@ -53,7 +55,8 @@ def optimize(
     file
         Mechanism file: .yaml, .yml, .toml or .json.
     minimize
-        What is to be least.
+        What is to be least; with a minus before it, what is to be largest:
+        "-span(psi)".
     vary
         NAME=LOW:HIGH of a parameter, with units; repeatable.
     subject_to

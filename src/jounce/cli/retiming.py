@@ -188,7 +188,9 @@ def sampled(found: RetimedTrajectory) -> Any:
     """Return the positions of the joints, and their derivatives to jerk, at the instants of a trajectory."""
     import xarray
 
+    from jounce.trajectory.shown_units import time_axes
+
     values = found.derivatives(found.times, ROWS)
     variables = {name: (("time", "derivative"), values[:, :, k]) for k, name in enumerate(found.names)}
-    axes = {"time": ("time", found.times, {"units": "s", "long_name": "time"}), "derivative": range(ROWS + 1)}
+    axes = time_axes(found.times, ROWS + 1)
     return xarray.Dataset(variables, coords=axes, attrs={"title": found.report.robot, "source": "jounce"})

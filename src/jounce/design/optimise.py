@@ -17,7 +17,7 @@ from jounce.kinematics import assemblies as all_assemblies
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid, with_outputs_held
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, real_numbers, seconds
 
 
 @concrete
@@ -55,7 +55,7 @@ def optimise(
     mechanism : Mechanism
         As for `jounce.solve`; constraints must not be redundant.
     minimise : str
-        What is to be least.
+        What is to be least; what is to be largest has a minus before it, as ``"-span(psi)"``.
     vary : dict of str to (low, high)
         Bounds of the parameters that may be changed, SI or text with a unit; ``"12cm:16cm"`` holds both.
     subject_to : sequence of str, optional
@@ -195,14 +195,12 @@ def _instants(
 def _curve(name: str, given: Any) -> PrescribedPath:
     """Return points, and their times where they have some."""
     timed = isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1 and np.ndim(given[1]) == 2
-    try:
-        times, points = (np.asarray(x, float) for x in given) if timed else (None, np.asarray(given, float))
-    except (TypeError, ValueError):
-        times, points = None, np.zeros(0)
+    place, wanted = f"curves.{name}", "points, (points, components), or a pair of times and points, all finite"
+    times = seconds(place, given[0], MechanismError, wanted) if timed else None
+    points = real_numbers(place, given[1] if timed else given, MechanismError, wanted)
     whole = points.ndim == 2 and len(points) and np.isfinite(points).all()
     if not whole or (times is not None and (times.shape != points.shape[:1] or not np.isfinite(times).all())):
-        message = "must be points, (points, components), or a pair of times and points, all finite"
-        raise MechanismError(message, name=f"curves.{name}", value=given)
+        raise MechanismError(f"must be {wanted}", name=place, value=given)
     return PrescribedPath(points, times)
 
 

@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import numbers
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -11,6 +10,7 @@ from jaxtyping import Float
 
 from jounce.errors import ExpressionError, JounceError, MechanismError, check_name, did_you_mean
 from jounce.mechanism import Mechanism
+from jounce.shapes import real_numbers
 
 FORMS = "LOW:HIGH, LOW:HIGH:COUNT, normal:SIGMA or uniform:HALFWIDTH"
 MOST_VALUES = 10_000_000  # of one parameter
@@ -204,19 +204,18 @@ def _from_numbers(form: Any) -> Variation:
         if len(form) not in (2, 3):
             raise MechanismError("must be (low, high), (low, high, count), or a list of values", value=form)
         return _interval(*(_number(bound) for bound in form[:2]), *form[2:])
-    try:
-        values = np.array(form, float)
-    except (TypeError, ValueError):
-        values = np.zeros(0)
+    wanted = "(low, high), (low, high, count), or a list of finite numbers"
+    values = np.array(real_numbers(None, form, MechanismError, wanted))
     if values.ndim != 1 or not values.size or not np.isfinite(values).all():
-        raise MechanismError("must be (low, high), (low, high, count), or a list of finite numbers", value=form)
+        raise MechanismError(f"must be {wanted}", value=form)
     return Values(values)
 
 
 def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, numbers.Real) or not math.isfinite(value):
+    number = real_numbers(None, value, MechanismError, "a finite number")
+    if number.ndim or not np.isfinite(number):
         raise MechanismError("a bound must be a finite number", value=value)
-    return float(value)
+    return float(number)
 
 
 def _interval(low: float, high: float, count: Any = None) -> Interval:

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.display import Displayed
 from jounce.dynamics.highest import local_maxima
 from jounce.dynamics.limit_jumps import Infinite, infinite_quantities, jumps_of
 from jounce.dynamics.trajectories import FollowedTrajectory, why_not
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, real_numbers
+from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 FIELDS = ("position", "velocity", "acceleration", "jerk", "effort", "effort_rate")
@@ -108,7 +109,7 @@ class LimitRows:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class LimitReport(LimitRows):
+class LimitReport(LimitRows, Displayed):
     """What `check_limits` found.
 
     Parameters
@@ -136,6 +137,14 @@ class LimitReport(LimitRows):
     times: Float[np.ndarray, " time"]
     values: Float[np.ndarray, "time 6 joint"]
     shares: Float[np.ndarray, "time 6 joint"]
+
+    def __repr__(self) -> str:
+        found = f"{len(self.limited)} limits, {len(self.broken)} broken"
+        if (worst := self.worst) is not None:
+            found += (
+                f"; {worst.quantity} of {worst.joint} takes {worst.ratio:.6g} of its limit at t = {worst.time:.6g} s"
+            )
+        return f"<LimitReport of {self.robot}: {found}>"
 
 
 def check_limits(
@@ -380,7 +389,7 @@ def _grid(trajectory: JointTrajectory) -> Float[np.ndarray, " time"]:
 
 
 def _checked_times(times: ArrayLike) -> Float[np.ndarray, " time"]:
-    found = np.array(real_numbers("times", times, TrajectoryError))
+    found = np.array(seconds("times", times, TrajectoryError))
     if found.ndim != 1 or not found.size or not np.isfinite(found).all() or (np.diff(found) <= 0).any():
         raise TrajectoryError("must be finite instants that increase, at least one", name="times", value=found.tolist())
     return found

@@ -16,6 +16,7 @@ from jounce.kinematics.chunks import in_chunks
 from jounce.kinematics.device import on_processor
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
+from jounce.trajectory.shown_units import time_axes
 
 if TYPE_CHECKING:
     import xarray
@@ -123,6 +124,6 @@ def labelled(
     import xarray
 
     values = derivatives_along(motion, coefficients)
-    coordinates = {"time": motion.time, "derivative": np.arange(values.shape[1])}
+    coordinates = time_axes(motion.time, values.shape[1])
     coordinates |= {axis: list(labels) for axis, labels in axes.items()}
     return xarray.DataArray(values, coordinates, tuple(coordinates), attrs={"units": units} if units else None)

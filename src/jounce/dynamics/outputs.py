@@ -15,7 +15,10 @@ from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve_element
 from jounce.shapes import ArrayLike, Numbers
+from jounce.trajectory import FollowingMotion
 
+ROUNDING = 1e-9  # of the largest force
+MOST_TOLD = 4  # instants
 RATES = ("yank", "second rate", "third rate", "fourth rate")
 
 
@@ -59,6 +62,23 @@ class _DriverOutput(AbstractForceOutput):
         """Return the Taylor coefficients of what the driver exerts, (levels, 1, time)."""
         size = motion.model.length if self.unit == "N*m" else 1.0
         return MotionForces.of(motion).unique(lambda forces: forces.driver_force(self.driver), size)
+
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN, or where the force of a cam on its follower changes its sign."""
+        if why := super().remark(motion, values):
+            return why
+        if not isinstance(getattr(motion.mechanism.drivers[self.driver], "motion", None), FollowingMotion):
+            return ""
+        forces = values[:, 0]
+        known = np.isfinite(forces)
+        times, sign = motion.time[known], np.sign(forces[known])
+        sign[np.abs(forces[known]) <= ROUNDING * np.max(np.abs(forces[known]), initial=0.0)] = 0.0
+        times, sign = times[sign != 0], sign[sign != 0]
+        changes = times[1:][sign[1:] != sign[:-1]]
+        if not changes.size:
+            return ""
+        where = ", ".join(f"{t:.4g} s" for t in changes[:MOST_TOLD]) + (", ..." if len(changes) > MOST_TOLD else "")
+        return f"changes its sign before t = {where}: a follower that is pressed against a cam lifts off there"
 
 
 class DriverForceOutput(_DriverOutput):

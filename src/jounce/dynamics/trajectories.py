@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag, no_such
+from jounce.errors import RobotError, SampleWarning, TrajectoryError, UnitWarning, flag, no_such
 from jounce.kinematics.chunks import in_chunks
 from jounce.robot.arguments import joints_of, whole_number
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.joint_trajectory import JointTrajectory
+from jounce.trajectory.shown_units import derivatives_of, time_axes
+from jounce.trajectory.unit_doubts import trajectory_doubt
 
 if TYPE_CHECKING:
     import xarray
@@ -33,6 +35,8 @@ class FollowedTrajectory:
         The robot.
     trajectory : JointTrajectory
         Of some or all of its joints.
+    given : bool, default True
+        Whether a user gave it: then a warning says where angles are likely in degrees.
 
     Attributes
     ----------
@@ -48,7 +52,7 @@ class FollowedTrajectory:
         If the robot has no joints, or the trajectory names one that it does not have, or that moves otherwise.
     """
 
-    def __init__(self, robot: Robot, trajectory: JointTrajectory):
+    def __init__(self, robot: Robot, trajectory: JointTrajectory, *, given: bool = True):
         if not joints_of(robot):
             raise RobotError("the robot has no moving joint; nothing can follow the trajectory", name="joints")
         for name in trajectory.names:
@@ -61,6 +65,8 @@ class FollowedTrajectory:
         limits = robot.limits if still else {}
         self.held = {name: _rest(limits[name]) for name in still}
         self.doubts: list[str] = []
+        if given:
+            warn_of_degrees(robot, trajectory)
 
     def coordinates(self, times: Float[np.ndarray, " time"], order: int) -> Float[np.ndarray, "time {order}+1 joint"]:
         """Return coordinates and derivatives.
@@ -101,6 +107,24 @@ class FollowedTrajectory:
             quantity = names[level] if level < len(names) else f"derivative {level} of the {names[0]}"
             message = f"the {quantity} of this joint is not finite at t = {times[instant]:g} s"
             raise TrajectoryError(f"{message}; choose another law there", name=self.robot.joint_names[joint])
+
+
+def warn_of_degrees(robot: Robot, trajectory: JointTrajectory) -> None:
+    """Warn of joints that turn and whose values are likely meant in degrees, unless they came with a unit.
+
+    Warns
+    -----
+    UnitWarning
+    """
+    laws = {
+        name: law
+        for name, law in trajectory.laws.items()
+        if name in robot.joint_names and robot.joints[name].turning and name not in trajectory.measures
+    }
+    if why := trajectory_doubt(
+        laws, trajectory.start, trajectory.stop, {name: robot.joints[name].limits for name in laws}
+    ):
+        warnings.warn(UnitWarning(why), stacklevel=3)
 
 
 def trajectory_torques(
@@ -152,15 +176,15 @@ def trajectory_torques(
 
     rates, drives = whole_number("rates", rates), flag("drives", drives, error=RobotError)
     followed = FollowedTrajectory(robot, trajectory)
-    instants = trajectory.times if times is None else np.atleast_1d(np.asarray(times, float))
+    instants = trajectory.times if times is None else np.atleast_1d(seconds("times", times, TrajectoryError))
     values = followed.torques(followed.coordinates(instants, rates + 2), instants, drives)
     for message in followed.doubts:
         warnings.warn(SampleWarning(message), stacklevel=2)
-    variables = {
-        name: (("time", "derivative"), values[..., k], {"units": "N*m" if robot.joints[name].turning else "N"})
-        for k, name in enumerate(robot.joint_names)
-    }
-    axes = {"time": ("time", instants, {"units": "s", "long_name": "time"}), "derivative": np.arange(rates + 1)}
+    variables = {}
+    for k, name in enumerate(robot.joint_names):
+        told = {"units": "N*m" if robot.joints[name].turning else "N", "long_name": derivatives_of(name)}
+        variables[name] = (("time", "derivative"), values[..., k], told)
+    axes = time_axes(instants, rates + 1)
     return xarray.Dataset(variables, coords=axes, attrs={"title": robot.name, "source": "jounce"})
 
 

@@ -62,6 +62,10 @@ class Batch(Displayed):
     status: Int[np.ndarray, "run time"]
     steps: Int[np.ndarray, " run"]
 
+    def __repr__(self) -> str:
+        complete = int((self.status == Status.OK).all(axis=1).sum())
+        return f"<Batch {complete} of {len(self.status)} runs complete, {len(self.time)} instants>"
+
 
 @concrete
 def simulate_batch(

@@ -19,7 +19,7 @@ from jounce.integrate.turns import measured
 from jounce.jet import Jet
 from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import measures_angle
-from jounce.shapes import ArrayLike, Numbers
+from jounce.shapes import ArrayLike, Numbers, seconds
 
 
 def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
@@ -136,7 +136,7 @@ class OrdinaryEquation:
         order : int, default 4
             Highest derivative of the outputs.
         """
-        instants = np.asarray(time, float)
+        instants = seconds("time", time, MechanismError)
         polynomial = State(*states[:4]).map(lambda part: np.asarray(part)[:, None])
         angles = tuple(np.asarray(part) for part in states.angles) if isinstance(states, CountedState) else ()
         dense = DenseOutput(instants, np.zeros_like(instants), polynomial, np.full(len(instants), -1), angles)

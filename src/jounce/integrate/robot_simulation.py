@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.display import Displayed
+from jounce.errors import RobotError
 from jounce.integrate.robot_marching import (
     RobotProblem,
     RobotState,
@@ -29,7 +30,8 @@ from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.robot import Robot
 from jounce.robot.wrench_laws import STATE
 from jounce.robot.wrenches import Wrench
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, seconds
+from jounce.trajectory.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray
@@ -215,7 +217,7 @@ class RobotSimulation(Displayed):
         order : int, optional
             Highest derivative; that of this simulation unless given.
         """
-        instants = np.atleast_1d(np.asarray(time, float))
+        instants = np.atleast_1d(seconds("time", time, RobotError))
         order = self.order if order is None else order
         return RobotSimulation(
             self.robot, self._problem, self.steps, instants, order, self._ending, self.events, self._wrenches
@@ -226,15 +228,13 @@ class RobotSimulation(Displayed):
         """Coordinates as an `xarray.Dataset`, a variable for each joint with dimensions time and derivative."""
         import xarray
 
-        axes = {"time": self.time, "derivative": np.arange(self.order + 1)}
+        axes = time_axes(self.time, self.order + 1)
         variables = {}
         for k, name in enumerate(self.robot.joint_names):
             unit = "rad" if self.robot.joints[name].turning else "m"
-            variables[name] = xarray.DataArray(self.q[:, :, k], axes, tuple(axes), attrs={"units": unit})
-        dataset = xarray.Dataset(variables, attrs={"title": self.robot.name, "source": "jounce"})
-        dataset["time"].attrs = {"units": "s", "long_name": "time"}
-        dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
-        return dataset
+            told = {"units": unit, "long_name": derivatives_of(name)}
+            variables[name] = (tuple(axes), self.q[:, :, k], told)
+        return xarray.Dataset(variables, axes, attrs={"title": self.robot.name, "source": "jounce"})
 
 
 def _states(steps: RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, RobotState]:

@@ -11,6 +11,7 @@ from jounce.dynamics.energies import body_energy, energy_of_forces
 from jounce.dynamics.forward import Equations, Instants, Lanes, State, expand
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart
+from jounce.errors import MechanismError
 from jounce.integrate.breaks import breaks
 from jounce.integrate.events import WIDTHS, in_pieces, pose_coordinates, series_of
 from jounce.integrate.lookahead import watched_names
@@ -30,7 +31,7 @@ from jounce.kinematics.store import is_wanted_soon
 from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle, with_turns
 from jounce.mechanism.system import Group
-from jounce.shapes import ArrayLike, Numbers
+from jounce.shapes import ArrayLike, Numbers, seconds
 
 MUCH_LONGER = (
     1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
@@ -154,7 +155,7 @@ class Simulation(Motion):
         order : int, optional
             Highest derivative; that of this simulation unless given.
         """
-        instants = np.atleast_1d(np.asarray(time, float))
+        instants = np.atleast_1d(seconds("time", time, MechanismError))
         order = self.order if order is None else order
         return Simulation(self.mechanism, self._start, self.dense_output, instants, order, self._ending, self.events)
 

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from jounce.errors import OutputError
 from jounce.mechanism import EulerAnglesOutput, EulerParametersOutput, RotationMatrixOutput
-from jounce.trajectory.shown_units import derivative_unit
+from jounce.trajectory.shown_units import derivative_unit, time_axes
 
 if TYPE_CHECKING:
     import xarray
@@ -88,8 +88,7 @@ def dataset_of(header: list[str], table: Float[np.ndarray, "time columns"], unit
     levels = _derivative_count(header[1:])
     stems = {header[k]: list(table.T[k : k + levels]) for k in range(1, len(header), levels)}
     variables: dict[str, Any] = {}
-    coordinates: dict[str, Any] = {"time": ("time", table[:, 0], {"units": "s"})}
-    coordinates["derivative"] = np.arange(levels)
+    coordinates = time_axes(table[:, 0], levels)
     for (name, _), group in itertools.groupby(stems, lambda column: (_name_of(column), units.get(column))):
         members = list(group)
         for axes, labels in AXES.items():

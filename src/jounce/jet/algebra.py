@@ -26,7 +26,7 @@ from jounce.jet.coefficients import (
     square_root,
     total,
 )
-from jounce.shapes import ArrayLike, Numbers, Real, not_complex
+from jounce.shapes import ArrayLike, Numbers, Real, real_derivatives
 
 
 @jax.tree_util.register_pytree_node_class
@@ -78,7 +78,7 @@ class Jet:
     @classmethod
     def from_derivatives(cls, derivatives: Iterable[ArrayLike]) -> "Jet":
         """Return the jet whose plain derivatives ``x, x', x'', ...`` stand along the leading axis."""
-        return cls(jnp.asarray(x, float) * (1 / math.factorial(k)) for k, x in enumerate(not_complex(derivatives)))
+        return cls(jnp.asarray(x, float) * (1 / math.factorial(k)) for k, x in enumerate(real_derivatives(derivatives)))
 
     def derivatives(self) -> jax.Array:
         """Return the plain derivatives ``x, x', x'', ...`` along a new leading axis."""

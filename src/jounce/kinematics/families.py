@@ -29,7 +29,8 @@ from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, real_numbers
+from jounce.trajectory.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray
@@ -50,14 +51,10 @@ def checked_values(mechanism: Mechanism, parameters: Mapping[str, Any], each: st
     values, count = {}, None
     for name, given in parameters.items():
         check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
-        try:
-            array = np.asarray(given, float)
-        except (TypeError, ValueError):
-            array = np.zeros(0)
+        wanted = f"a list of finite numbers, one for each {each}"
+        array = real_numbers(f"parameters.{name}", given, MechanismError, wanted)
         if array.ndim != 1 or not array.size or not np.isfinite(array).all():
-            raise MechanismError(
-                f"must be a list of finite numbers, one for each {each}", name=f"parameters.{name}", value=given
-            )
+            raise MechanismError(f"must be {wanted}", name=f"parameters.{name}", value=given)
         if count is not None and len(array) != count:
             message = f"must have one value for each {each}, {count} as those before"
             raise MechanismError(message, name=f"parameters.{name}", value=len(array))
@@ -184,8 +181,7 @@ class _Family:
         """Return the results, labelled."""
         import xarray
 
-        coordinates: dict[str, Any] = {"design": np.arange(len(self.rows)), "time": self.instants}
-        coordinates["derivative"] = np.arange(self.order + 1)
+        coordinates: dict[str, Any] = {"design": np.arange(len(self.rows)), **time_axes(self.instants, self.order + 1)}
         variables = {}
         for name, output in self.mechanism.outputs.items():
             found = self.outputs.get(name)
@@ -197,17 +193,14 @@ class _Family:
                 coordinates |= {axis: list(labels) for axis, labels in axes}
                 found = found.reshape(*found.shape[:3], *(len(labels) for _, labels in axes))
                 dims += [axis for axis, _ in axes]
-            variables[name] = (dims, found, {"units": output.unit, "long_name": name})
+            variables[name] = (dims, found, {"units": output.unit, "long_name": derivatives_of(name)})
         words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": _flags()}
         variables["status"] = (("design", "time"), self.status, words)
         taken = {*variables, *coordinates}
         named = {name: name if name not in taken else f"parameter_{name}" for name in values}
         coordinates |= {named[name]: ("design", value, {"long_name": name}) for name, value in values.items()}
         attributes = {"title": self.mechanism.title or "designs of a mechanism", "source": "jounce"}
-        dataset = xarray.Dataset(variables, coordinates, attributes)
-        dataset["time"].attrs = {"units": "s", "long_name": "time"}
-        dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
-        return dataset
+        return xarray.Dataset(variables, coordinates, attributes)
 
     def _of_whole_motions(self) -> bool:
         """Tell whether outputs are asked for that follow from whole motions, not from one instant."""

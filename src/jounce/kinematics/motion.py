@@ -40,6 +40,7 @@ from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
 from jounce.modules import with_fields
 from jounce.shapes import ArrayLike, Numbers
 from jounce.trajectory import HermiteMotion
+from jounce.trajectory.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray
@@ -263,10 +264,7 @@ class Motion(Displayed):
         attributes: dict[str, Any] = {"title": self.mechanism.title or "motion of a mechanism", "source": "jounce"}
         if self.change_points.size:
             attributes["change_points"] = self.change_points
-        dataset = xarray.Dataset(variables, coords=self._axes(), attrs=attributes)
-        dataset["time"].attrs = {"units": "s", "long_name": "time"}
-        dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
-        return dataset
+        return xarray.Dataset(variables, coords=time_axes(self.time, self.order + 1), attrs=attributes)
 
     def point(self, body: str, point: ArrayLike) -> "xarray.DataArray":
         """Return the position of any point of a body in the global frame and its derivatives.
@@ -383,16 +381,13 @@ class Motion(Displayed):
     ) -> "xarray.DataArray":
         import xarray
 
-        coordinates = {"time": self.time, "derivative": np.arange(values.shape[1])}
+        coordinates = time_axes(self.time, values.shape[1])
         if values.ndim == 3:
             axes = output.axes or (("component", output.labels[: values.shape[2]]),)
             coordinates |= {axis: list(labels) for axis, labels in axes}
             values = values.reshape(*values.shape[:2], *(len(labels) for _, labels in axes))
         dims = tuple(coordinates)
-        attributes = {"units": output.unit, "long_name": name}
+        attributes = {"units": output.unit, "long_name": derivatives_of(name)}
         if isinstance(output, AbstractMotionOutput) and not self.traced and (remark := output.remark(self, values)):
             attributes["comment"] = remark
         return xarray.DataArray(values, dims=dims, coords=coordinates, name=name, attrs=attributes)
-
-    def _axes(self) -> dict[str, Any]:
-        return {"time": self.time, "derivative": np.arange(self.order + 1)}

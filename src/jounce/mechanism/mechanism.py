@@ -184,6 +184,11 @@ class Mechanism(Displayed):
         self._check_columns()
         _ = self.shown_units
 
+    def __repr__(self) -> str:
+        kinds = {"bodies": self.bodies, **self.elements}
+        counts = ", ".join(f"{kind} {len(found)}" for kind, found in kinds.items() if found)
+        return f"<Mechanism {self.title}{': ' if self.title else ''}{self.space}; {counts}>"
+
     @property
     def shown_units(self) -> ShownUnits:
         """The units in which results are shown and written."""
@@ -349,7 +354,9 @@ def check_output_name(given: object, error: type[JounceError], **place: Any) -> 
     if not isinstance(given, str) or not given:
         raise error("the name of an output is text that is not empty", value=given, **place)
     if names_column(given):
-        raise error(f"the name '{given}' is reserved for columns of the results; give another one", **place)
+        rate = RATE_COLUMN.fullmatch(given) is not None
+        why = f", where '_d' and a number mean a derivative of '{given.rpartition('_d')[0]}'" if rate else ""
+        raise error(f"the name '{given}' is reserved for columns of the results{why}; give another one", **place)
 
 
 def check_mechanism(given: object) -> None:

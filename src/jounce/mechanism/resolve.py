@@ -17,6 +17,7 @@ from jounce.errors import JounceError, MechanismError
 from jounce.forces import AbstractForce, AbstractLaw, ExpressionLaw, FunctionLaw, TimeLaw, VectorLaw
 from jounce.jet import Jet
 from jounce.modules import Module, unchecked
+from jounce.shapes import real_numbers
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FunctionMotion, SplineMotion
 
 Element = Module
@@ -42,10 +43,14 @@ def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
             return jnp.stack([jnp.asarray(entry, float) for entry in entries])
         return np.array(entries, float) if _are_numbers(entries) else list(value)
     if isinstance(value, numbers.Real):
-        return float(value)
+        return _number(value)
     if isinstance(value, np.ndarray | jax.Array) and not isinstance(value, Tracer):
-        return np.asarray(value, float) if value.dtype.kind in "fiu" else value
+        return real_numbers(None, value, MechanismError) if value.dtype.kind in "fiu" else value
     return value
+
+
+def _number(value: Any) -> float:
+    return float(real_numbers(None, value, MechanismError, "one number"))
 
 
 def _are_numbers(entries: list[Any]) -> bool:
@@ -59,7 +64,7 @@ def resolve_motion(motion: Any, parameters: Mapping[str, Any]) -> AbstractMotion
     if isinstance(motion, AbstractMotion):
         return _traceable(motion.resolved(parameters))
     if isinstance(motion, numbers.Real):
-        motion = Expression(repr(float(motion)))
+        motion = Expression(repr(_number(motion)))
     if isinstance(motion, str):
         motion = Expression(motion)
     if isinstance(motion, Expression):
@@ -136,7 +141,7 @@ def _scalar_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any]) -
     if isinstance(law, AbstractMotion):
         return TimeLaw(law.resolved(parameters))
     if isinstance(law, numbers.Real) and not isinstance(law, bool):
-        size = float(law)
+        size = _number(law)
         if not np.isfinite(size):
             raise MechanismError("must be finite", value=size)
         return ExpressionLaw("size", {"size": size}, *names)  # a leaf: laws that differ in it are stacked
@@ -162,16 +167,19 @@ def parameter_value(name: str, value: Any) -> Any:
     MechanismError
         If it is not one finite number.
     """
+    if type(value) is float and math.isfinite(value):
+        return value
     if isinstance(value, Tracer):
         return value
-    try:
-        real = np.shape(value) == () and not isinstance(value, bool | np.bool_ | np.complexfloating)
-        number = float(value) if real else np.nan
-    except (TypeError, ValueError):
-        number = np.nan
-    if not np.isfinite(number):
-        raise MechanismError("a parameter must be one finite number", name=f"parameters.{name}", value=_plain(value))
-    return number
+
+    def error(message: str, **place: Any) -> MechanismError:
+        return MechanismError(f"a parameter {message}", **{**place, "value": _plain(value)})
+
+    place, wanted = f"parameters.{name}", "one finite number"
+    number = real_numbers(place, value, error, wanted)
+    if number.ndim or not np.isfinite(number):
+        raise error(f"must be {wanted}", name=place)
+    return float(number)
 
 
 def check_value(field: str, kind: str, value: Any, components: int, sign: str = "") -> None:

@@ -9,7 +9,8 @@ from jaxtyping import Float, Int
 
 from jounce.errors import MechanismError
 from jounce.mechanism.resolve import resolve
-from jounce.shapes import ArrayLike, real_numbers
+from jounce.shapes import ArrayLike, seconds
+from jounce.trajectory import Expression
 
 MAX_INSTANTS = 10_000_000
 
@@ -93,7 +94,7 @@ def instants_of(time: TimeLike | None, parameters: Mapping[str, Any]) -> Instant
         raise MechanismError("no time grid is given, by the mechanism or by the call", name="time")
     if isinstance(time, TimeGrid):
         return _spaced(time, parameters)
-    instants = real_numbers("time", time, MechanismError)
+    instants = seconds("time", time, MechanismError)
     if instants.ndim != 1 or not instants.size:
         raise MechanismError("the time grid must be a list of at least one instant", name="time", value=time)
     if not np.isfinite(instants).all():
@@ -106,9 +107,13 @@ def instants_of(time: TimeLike | None, parameters: Mapping[str, Any]) -> Instant
     return instants
 
 
+def _resolved(name: str, value: Any, parameters: Mapping[str, Any]) -> Any:
+    return resolve(value if isinstance(value, str | Expression) else seconds(name, value, MechanismError), parameters)
+
+
 def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> SpacedInstants:
     given = {k: getattr(grid, k) for k in ("start", "stop", "step", "count") if getattr(grid, k) is not None}
-    values = {k: float(resolve(v, parameters)) for k, v in given.items()}
+    values = {k: float(_resolved(f"time.{k}", v, parameters)) for k, v in given.items()}
     for name, value in values.items():
         if not np.isfinite(value):
             raise MechanismError("must be finite", name=f"time.{name}", value=value)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import equinox as eqx
 from typing_extensions import TypedDict
 
 from jounce.mechanism import Mechanism
@@ -13,8 +14,18 @@ from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.held_outputs import led_outputs, with_outputs_held
 from jounce.mechanism.resolve import resolve_motion
 from jounce.reporting.peaks import derivative_name
-from jounce.trajectory import Continuity, continuity
+from jounce.trajectory import (
+    AbstractMotion,
+    Continuity,
+    ExpressionMotion,
+    FollowingMotion,
+    SplineMotion,
+    continuity,
+)
 from jounce.trajectory.shown_units import derivative_unit
+
+TURN = 2 * math.pi
+WHOLE = 1e-6  # of turns
 
 
 class JumpFacts(TypedDict):
@@ -52,16 +63,41 @@ def law_facts(mechanism: Mechanism, first: float, last: float) -> list[dict[str,
         motion = getattr(driver, "motion", None)
         if motion is None:
             continue
-        told = continuity(resolve_motion(motion, mechanism.parameter_values), first, last)
+        law = resolve_motion(motion, mechanism.parameter_values)
+        told = continuity(law, first, last)
         found.append({
             "driver": name,
             "of": led[name].output if name in led else name,
             "unit": "rad" if is_turning(driver) else "m",
             "continuous_to": told.smoothness,
             "derivatives": jump_facts(told),
-            "remark": told.unknown,
+            "remark": "; ".join(filter(None, (told.unknown, _uneven_repeat(law, held)))),
         })  # fmt: skip
     return found
+
+
+def _uneven_repeat(law: AbstractMotion, mechanism: Mechanism) -> str:
+    """Word that a law repeats on a shaft by what is no whole part or multiple of a turn; nothing if it does not."""
+    own, leader = law.parts if isinstance(law, FollowingMotion) and law.parts else (None, None)
+    if not isinstance(own, SplineMotion) or own.beyond != "repeat":
+        return ""
+    span = float(own.stop) - float(own.breakpoints[0])
+    turns = max(span, TURN) / min(span, TURN)
+    if abs(turns - round(turns)) <= WHOLE * turns:
+        return ""
+    for name, driver in mechanism.drivers.items():
+        motion = getattr(driver, "motion", None)
+        if motion is not None and is_turning(driver) and _same(motion, leader, mechanism.parameter_values):
+            return f"repeats every {math.degrees(span):.6g} deg of {name}, and so moves on it from turn to turn"
+    return ""
+
+
+def _same(motion: Any, law: AbstractMotion, parameters: Mapping[str, Any]) -> bool:
+    """Tell whether what a driver has for a law is a law."""
+    found = resolve_motion(motion, parameters)
+    if isinstance(found, ExpressionMotion) and isinstance(law, ExpressionMotion):
+        return found.expression == law.expression
+    return found is law or bool(eqx.tree_equal(found, law))
 
 
 def jump_facts(told: Continuity) -> list[dict[str, Any]]:

@@ -10,18 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from jounce.dynamics import Equilibrium, Linearisation, Modes
+from jounce.design import OptimisedDesign
+from jounce.display import Displayed
+from jounce.dynamics import Equilibrium, LimitReport, Linearisation, Modes
 from jounce.errors import JounceError, SampleWarning
 from jounce.integrate import Batch
-from jounce.kinematics import Motion, Status
+from jounce.kinematics import Curve, Motion, Status
 from jounce.mechanism import Mechanism
+from jounce.reporting.curve_facts import curve_facts, curve_summary, curve_tables
+from jounce.reporting.design_facts import design_facts, design_table, design_words
 from jounce.reporting.mechanism_facts import mechanism_facts
 from jounce.reporting.modes_facts import equilibrium_facts, equilibrium_tables, equilibrium_words, modes_table
 from jounce.reporting.motion_facts import motion_facts
 from jounce.reporting.peaks import peaks, shown_peaks
 from jounce.reporting.robot_facts import robot_facts
-from jounce.reporting.summaries import count
-from jounce.reporting.tables import Table, mechanism_tables, number, peaks_table, robot_tables, table
+from jounce.reporting.summaries import count, verdict
+from jounce.reporting.tables import Table, limits_table, mechanism_tables, number, peaks_table, robot_tables, table
 from jounce.robot import Robot
 from jounce.trajectory import JointTrajectory
 
@@ -37,9 +41,7 @@ STYLE = (
 )
 
 
-def shown(
-    thing: Mechanism | Motion | Robot | JointTrajectory | Batch | Equilibrium | Linearisation | Modes,
-) -> str:
+def shown(thing: Displayed) -> str:
     """Return the HTML that a notebook shows of an object of this package, such as a mechanism or a motion.
 
     Examples
@@ -66,6 +68,19 @@ def shown(
             parts = _linearisation(thing)
         case Modes():
             parts = _tables([modes_table(thing)])
+        case Curve():
+            facts = curve_facts(thing)
+            parts = [*_title(*(curve_summary(facts, "Curve").split("\n"))), *_tables(curve_tables(facts))]
+        case OptimisedDesign():
+            design = design_facts(thing, "Optimised design")
+            parts = [*_title(*design_words(design).split("\n")), *_tables([design_table(design)])]
+        case LimitReport():
+            parts = [
+                *_title(thing.robot, *(verdict(thing).split("\n") if thing.limited else ["nothing has a limit"])),
+                *_tables([limits_table(thing)]),
+            ]
+        case _:
+            parts = _title(repr(thing).strip("<>"))
     return f'<div class="jounce">{STYLE}{"".join(parts)}</div>'
 
 

@@ -10,7 +10,7 @@ from jounce.jet.pieces import last_begun
 from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.rigid.orientation import angular_velocity, check_rotation
 from jounce.rigid.rotations import rotation_matrix
-from jounce.shapes import ArrayLike, Numbers, Real, is_traced
+from jounce.shapes import ArrayLike, Numbers, Real, is_traced, real_numbers, seconds
 
 HIGHEST_DEGREE = 11
 UNIT = 1e-6  # how far the length of a sampled quaternion may be from one: printed digits, single precision
@@ -53,7 +53,7 @@ class AttitudeSamples:
     """
 
     def __init__(self, times: ArrayLike, quaternions: ArrayLike, degree: int = 5):
-        times, quaternions = np.asarray(times, float), np.asarray(quaternions, float)
+        times, quaternions = _numbers(times, quaternions, "quaternions")
         _check_times(times, quaternions, "quaternions", (4,), degree)
         length = np.linalg.norm(quaternions, axis=1)
         bad = np.abs(length - 1) > UNIT
@@ -83,7 +83,7 @@ class AttitudeSamples:
         TrajectoryError
             As in the class, and if a matrix is not a rotation.
         """
-        times, matrices = np.asarray(times, float), np.asarray(matrices, float)
+        times, matrices = _numbers(times, matrices, "matrices")
         _check_times(times, matrices, "matrices", (3, 3), degree)
         try:
             check_rotation(np.moveaxis(matrices, 0, -1), "matrices")
@@ -104,7 +104,7 @@ class AttitudeSamples:
         JounceError
             If the sequence is not known.
         """
-        times, angles = np.asarray(times, float), np.asarray(angles, float)
+        times, angles = _numbers(times, angles, "angles")
         _check_times(times, angles, "angles", (3,), degree)
         return cls(
             times, from_rotation_matrices(np.moveaxis(np.asarray(rotation_matrix(sequence, angles.T)), -1, 0)), degree
@@ -201,6 +201,10 @@ class AttitudeSamples:
         if outside.any():
             message = f"the samples reach from {self.start:g} to {self.stop:g} s; there is no attitude outside of them"
             raise TrajectoryError(message, name="time", value=float(np.asarray(instants)[outside].flat[0]))
+
+
+def _numbers(times: ArrayLike, values: ArrayLike, name: str) -> tuple[np.ndarray, np.ndarray]:
+    return seconds("times", times, TrajectoryError), real_numbers(name, values, TrajectoryError)
 
 
 def _check_times(times: np.ndarray, samples: np.ndarray, name: str, shape: tuple[int, ...], degree: int) -> None:

@@ -1,7 +1,7 @@
 """Mass, centre of mass and inertia of a rigid body, and their sums. Negrean 2025, equations 72 and 108."""
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -288,7 +288,11 @@ def _check_sizes(given: dict[str, Any]) -> None:
 
 
 def finite_numbers(
-    name: str, value: ArrayLike | Refused, *shapes: tuple[int, ...], error: type[JounceError] = RobotError
+    name: str,
+    value: ArrayLike | Refused,
+    *shapes: tuple[int, ...],
+    error: type[JounceError] = RobotError,
+    read: Callable[..., np.ndarray] = real_numbers,
 ) -> np.ndarray:
     """Return a copy of finite numbers of one of the shapes, of any shape if none is given; it cannot be written to.
 
@@ -298,7 +302,7 @@ def finite_numbers(
         Or the error given, if the value is not made of real numbers, its shape is another one, or a number is not
         finite.
     """
-    array = np.array(real_numbers(name, value, error))
+    array = np.array(read(name, value, error))
     if shapes and array.shape not in shapes:
         wanted = " or ".join(map(str, shapes))
         raise error(f"must have the shape {wanted}, not {array.shape}", name=name)

@@ -298,7 +298,7 @@ class AbstractRobot(Displayed, abc.ABC):
         """Return an array for q, shape (n,), with the named joints at the given values and the others at zero."""
         for name in values:
             check_name("moving joint", name, self.joint_names, RobotError, name="joint")
-        return np.array([values.get(name, 0.0) for name in self.joint_names], float)
+        return np.array([finite_numbers(name, values.get(name, 0.0), ()) for name in self.joint_names])
 
     def _changed(self: Made, **parts: Any) -> Made:
         """Return the robot with other links, joints, gravity or closures."""

@@ -1,19 +1,20 @@
 """What users hand to the functions of robots, checked: numbers, coordinates and their derivatives."""
 
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
-import jax
 import numpy as np
 from jaxtyping import Float
 
 from jounce import errors
 from jounce.errors import RobotError
 from jounce.robot.abstract_robot import AbstractRobot
-from jounce.shapes import Numbers
+from jounce.shapes import Numbers, is_real, real_numbers
 from jounce.trajectory.joint_trajectory import MAX_ORDER
 
 
-def floats(name: str, values: object) -> Float[Numbers, "..."]:
+def floats(name: str, values: Any, read: Callable[..., np.ndarray] = real_numbers) -> Float[Numbers, "..."]:
     """Return values as an array of double precision, of NumPy unless it is one of JAX.
 
     Raises
@@ -21,16 +22,13 @@ def floats(name: str, values: object) -> Float[Numbers, "..."]:
     RobotError
         If they are not real numbers in one rectangular array.
     """
-    array = values if isinstance(values, jax.Array) else None
-    try:
-        array = np.asarray(values) if array is None else array
-        if array.dtype.kind not in "OUSc":
-            return array.astype(float, copy=False)
-        if array.dtype.kind == "O":
-            return np.asarray(array, float)
-    except (TypeError, ValueError):
-        pass
-    raise RobotError("must be an array of real numbers", name=name, value=type(values).__name__)
+    if is_real(values):
+        return values.astype(float, copy=False)
+    return read(name, values, _no_array, "an array of real numbers")
+
+
+def _no_array(message: str, name: str, value: object) -> RobotError:
+    return RobotError(message, name=name, value=type(value).__name__)
 
 
 whole_number = partial(errors.whole_number, error=RobotError)

@@ -176,8 +176,9 @@ def mass_matrix(
     robot : Robot
         The robot, with what it holds (`Robot.with_payload`); one with closed loops has no independent coordinates.
     q : array_like of shape (..., n)
-        Coordinates in the order of `robot.joint_names`, rad or m. With `rates` of shape (..., order + 1, n): the
-        coordinates and their derivatives.
+        Coordinates in the order of `robot.joint_names`, rad or m, as many positions as there are: unlike for
+        `inverse_dynamics`, derivatives must not stand among them, since nothing tells them from positions; give
+        ``q[..., 0, :]``. With `rates` of shape (..., order + 1, n): the coordinates and their derivatives.
     rates : bool, default False
         Whether derivatives of the coordinates are given and those of the matrix are wanted.
     drives : bool, default False

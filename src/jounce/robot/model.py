@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia, finite_numbers, unchanging
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, real_numbers
 
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = (*MOVING, "fixed")
@@ -49,7 +48,8 @@ class Limits:
             value = getattr(self, field.name)
             if value is None:
                 continue
-            if isinstance(value, bool) or not isinstance(value, numbers.Real) or not np.isfinite(float(value)):
+            number = real_numbers(field.name, value, RobotError, "a finite number")
+            if number.ndim or not np.isfinite(number):
                 raise RobotError("must be a finite number", name=field.name, value=value)
             if field.name not in ("lower", "upper") and value <= 0:
                 raise RobotError("must be greater than zero", name=field.name, value=value)

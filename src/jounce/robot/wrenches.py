@@ -14,7 +14,7 @@ from jounce.jet import Jet, compose
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.arguments import floats
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, Refused, is_traced
+from jounce.shapes import ArrayLike, Refused, is_traced, seconds
 
 FRAMES = ("base", "link")
 
@@ -102,7 +102,7 @@ def _derivatives(where: str, value: Any, lead: tuple[int, ...], levels: int, tim
     if callable(value):
         if time is None:
             raise RobotError("is a function of time: give the instants of the samples as `time`", name=where)
-        instants = jnp.asarray(floats("time", time))
+        instants = jnp.asarray(floats("time", time, seconds))
         if instants.shape != lead:
             raise RobotError(
                 f"must have one instant for each sample, the shape {lead}, not {instants.shape}", name="time"

@@ -32,6 +32,7 @@ from jounce.mechanism import (
 from jounce.mechanism.builder import pose_at
 from jounce.rigid.inertia import Inertia
 from jounce.robot.robot import Robot
+from jounce.shapes import seconds
 from jounce.trajectory.joint_trajectory import JointTrajectory
 from jounce.trajectory.units import parse_value
 
@@ -259,7 +260,7 @@ class Torques(Problem):
     @functools.cached_property
     def instants(self) -> Float[np.ndarray, " time"]:
         """Instants of the trajectory at its own speed, s."""
-        return self.trajectory.times if self.time is None else np.atleast_1d(np.asarray(self.time, float))
+        return self.trajectory.times if self.time is None else np.atleast_1d(seconds("time", self.time, RobotError))
 
     @property
     def levels(self) -> int:

@@ -1,6 +1,6 @@
 """Checks of the numbers that motion laws are made of; each raises an error that names the number at fault."""
 
-import math
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -10,34 +10,35 @@ from jaxtyping import Float
 from jounce import errors
 from jounce.errors import JounceError, TrajectoryError
 from jounce.rigid import inertia
-from jounce.shapes import ArrayLike, real_numbers
+from jounce.shapes import ArrayLike, real_numbers, seconds
 
 whole_number = partial(errors.whole_number, error=TrajectoryError)
 finite_numbers = partial(inertia.finite_numbers, error=TrajectoryError)
 
 
-def finite(name: str, value: Any) -> float:
+Read = Callable[..., np.ndarray]
+"""How numbers are read: as they are, `real_numbers`, or as times, `seconds`."""
+
+
+def finite(name: str | None, value: Any, read: Read = real_numbers) -> float:
     """Return a finite number."""
-    try:
-        number = math.nan if np.iscomplexobj(value) else float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if isinstance(value, str | bool) or not math.isfinite(number):
+    number = read(name, value, TrajectoryError, "a finite number")
+    if number.ndim or not np.isfinite(number):
         raise TrajectoryError("must be a finite number", name=name, value=value)
-    return number
+    return float(number)
 
 
-def positive(name: str, value: Any) -> float:
+def positive(name: str, value: Any, read: Read = real_numbers) -> float:
     """Return a finite number greater than zero."""
-    number = finite(name, value)
+    number = finite(name, value, read)
     if number <= 0:
         raise TrajectoryError("must be greater than zero", name=name, value=value)
     return number
 
 
-def finite_row(name: str, values: ArrayLike) -> Float[np.ndarray, " number"]:
+def finite_row(name: str, values: ArrayLike, read: Read = real_numbers) -> Float[np.ndarray, " number"]:
     """Return finite numbers along one axis, at least one."""
-    row = finite_numbers(name, values)
+    row = finite_numbers(name, values, read=read)
     if row.ndim != 1 or not row.size:
         raise TrajectoryError(f"must have one axis of at least one number, not the shape {row.shape}", name=name)
     return row
@@ -47,7 +48,7 @@ def check_samples(
     times: ArrayLike, values: ArrayLike, error: type[JounceError] = TrajectoryError
 ) -> tuple[Float[np.ndarray, " samples"], Float[np.ndarray, "samples *columns"]]:
     """Return times and values of samples: finite, two at least, a value or row for each time, times that increase."""
-    times, values = (real_numbers(name, x, error) for name, x in (("times", times), ("values", values)))
+    times, values = seconds("times", times, error), real_numbers("values", values, error)
     if times.ndim != 1 or values.ndim < 1 or len(times) != len(values):
         shapes = f"shapes {times.shape} and {values.shape}"
         raise error("samples need one value for each time; give lists of equal length", value=shapes)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import TrajectoryError, check_choice
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.checks import finite_numbers, finite_row
 from jounce.trajectory.knots import Jumps, knot_jumps
 from jounce.trajectory.motion import SplineMotion
@@ -46,7 +46,7 @@ class HermiteMotion(SplineMotion):
 
     def __init__(self, times: ArrayLike, derivatives: ArrayLike, beyond: str = "refuse"):
         check_choice("beyond", beyond, BEYOND, TrajectoryError)
-        instants = finite_row("times", times)
+        instants = finite_row("times", times, seconds)
         shape = np.shape(derivatives)
         columns = shape[1] if len(shape) == 2 and shape[1] else 1
         table = finite_numbers("derivatives", derivatives, (len(instants), columns))

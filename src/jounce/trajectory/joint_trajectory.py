@@ -12,8 +12,8 @@ from jaxtyping import Float
 from jounce.display import Displayed
 from jounce.errors import JounceError, MechanismError, SampleWarning, TrajectoryError, check_name
 from jounce.jet import Jet
-from jounce.shapes import ArrayLike
-from jounce.trajectory.checks import check_samples, finite_numbers, finite_row, whole_number
+from jounce.shapes import ArrayLike, seconds
+from jounce.trajectory.checks import check_samples, finite, finite_numbers, finite_row, positive, whole_number
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 from jounce.trajectory.profiles import motion_profile
@@ -72,7 +72,11 @@ class JointTrajectory(Displayed):
                 law.check_instants(self.start, self.stop)
             except JounceError as error:
                 raise TrajectoryError(error.message, name=f"laws.{name}", value=error.value) from None
-        instants = np.linspace(self.start, self.stop, 201) if times is None else check_samples(times, times)[0]
+        instants = (
+            np.linspace(self.start, self.stop, 201)
+            if times is None
+            else check_samples(times, seconds("times", times, TrajectoryError))[0]
+        )
         self.times = self._inside(instants)
         self.measures = MappingProxyType(dict(measures or {}))
 
@@ -174,6 +178,8 @@ class JointTrajectory(Displayed):
         names = _names(names)
         begins, ends = (finite_numbers(key, x, (len(names),)) for key, x in (("start", start), ("end", end)))
         bounds = [None] * len(names) if limits is None else _limits(limits, len(names))
+        start_time = finite("start_time", start_time, seconds)
+        duration = None if duration is None else positive("duration", duration, seconds)
 
         def law(k: int, time: float | None) -> Any:
             try:
@@ -249,7 +255,7 @@ class JointTrajectory(Displayed):
         """
         chosen = self._chosen(names)
         order = whole_number("order", order, 0, MAX_ORDER)
-        instants = self._inside(finite_row("times", times))
+        instants = self._inside(finite_row("times", times, seconds))
         self._warn(order, chosen)
         found = law_derivatives([self.laws[name] for name in chosen], jnp.asarray(instants), order)
         result = np.ascontiguousarray(np.moveaxis(np.asarray(found), -1, 0))
@@ -354,13 +360,13 @@ def _law(name: Any, law: Any) -> AbstractMotion:
     if isinstance(law, bool) or not isinstance(law, str | int | float | np.integer | np.floating | Expression):
         raise TrajectoryError("a law is a motion, an expression of t, or a number", name=f"laws.{name}", value=law)
     try:
-        return ExpressionMotion(law if isinstance(law, str | Expression) else repr(float(law)))
+        return ExpressionMotion(law if isinstance(law, str | Expression) else repr(finite(f"laws.{name}", law)))
     except JounceError as error:
         raise TrajectoryError(error.message, name=f"laws.{name}", value=error.value) from None
 
 
 def _bounds(start: float, stop: float) -> tuple[float, float]:
-    first, last = finite_numbers("start and stop", (start, stop), (2,)).tolist()
+    first, last = finite_numbers("start and stop", (start, stop), (2,), read=seconds).tolist()
     if last <= first:
         raise TrajectoryError(f"must come after the start, {first:g} s", name="stop", value=last)
     return first, last

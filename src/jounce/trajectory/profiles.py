@@ -11,6 +11,7 @@ import numpy as np
 
 from jounce.errors import TrajectoryError, check_name
 from jounce.jet import Jet, sin
+from jounce.shapes import seconds
 from jounce.trajectory.checks import finite, positive, whole_number
 from jounce.trajectory.motion import AbstractMotion
 from jounce.trajectory.trapezoid import LIMITS, TrapezoidalMotion
@@ -32,7 +33,10 @@ class AbstractProfile(AbstractMotion):
 
     def __init__(self, start: float = 0.0, end: float = 1.0, duration: float = 1.0, start_time: float = 0.0):
         self.start, self.end = finite("start", start), finite("end", end)
-        self.duration, self.start_time = positive("duration", duration), finite("start_time", start_time)
+        self.duration, self.start_time = (
+            positive("duration", duration, seconds),
+            finite("start_time", start_time, seconds),
+        )
 
     @abc.abstractmethod
     def first_half(self, share: Jet) -> Jet:

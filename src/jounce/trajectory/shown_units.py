@@ -10,8 +10,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import JounceError, UnitError, no_such
+from jounce.shapes import Numbers
 from jounce.trajectory.dimensions import (
     ANGLE,
     FORCE,
@@ -48,6 +53,28 @@ def derivative_unit(unit: str, order: int) -> str:
     base = unit[: per_time.start()] if per_time else unit
     total = order + (int(per_time[1] or 1) if per_time else 0)
     return base if total == 0 else f"{base}/s" if total == 1 else f"{base}/s^{total}"
+
+
+def time_axes(instants: Float[Numbers, " time"], levels: int) -> dict[str, Any]:
+    """Return the axes of an array of a quantity and its derivatives at instants, s, labelled for `xarray`."""
+    orders = {"long_name": "order of the time derivative"}
+    return {
+        "time": ("time", instants, {"units": "s", "long_name": "time"}),
+        "derivative": ("derivative", np.arange(levels), orders),
+    }
+
+
+def derivatives_of(name: str) -> str:
+    """Return the long name of an array of a quantity and its derivatives, whose unit is that of the quantity itself.
+
+    Plots label an axis with the long name and the unit, whatever derivative they show.
+
+    Examples
+    --------
+    >>> derivatives_of("psi")
+    'psi, each derivative by s'
+    """
+    return f"{name}, each derivative by s"
 
 
 def unit_size(text: str) -> tuple[float, Dimension]:

@@ -97,7 +97,12 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
     """
     whole_number("order", order, 0, HIGHEST)
     instants, jumps, unknown = _jumps(law, first, last)
-    if periodic and getattr(law, "beyond", "") != "repeat":
+    repeats = getattr(law, "beyond", "") == "repeat"
+    if periodic:  # its end is its beginning, and counts once; whatever else a law is there, it begins again
+        near = SLACK * (last - first)
+        inside = (instants < last - near) & ((instants > first + near) | repeats)
+        instants, jumps = instants[inside], jumps[:, inside]
+    if periodic and not repeats:
         ends = [np.asarray(law(Jet.variable(np.asarray(at, float), HIGHEST)).derivatives()) for at in (last, first)]
         rounding = SMOOTH * derivative_sizes(law, first, last, HIGHEST)
         closing = np.where(np.abs(ends[1] - ends[0]) <= rounding, 0.0, ends[1] - ends[0])

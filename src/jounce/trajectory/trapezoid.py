@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import TrajectoryError
+from jounce.shapes import seconds
 from jounce.trajectory.checks import finite, positive
 from jounce.trajectory.motion import SplineMotion
 
@@ -57,9 +58,9 @@ class TrapezoidalMotion(SplineMotion):
         duration: float | None = None,
         start_time: float = 0.0,
     ):
-        start, end, start_time = finite("start", start), finite("end", end), finite("start_time", start_time)
+        start, end, start_time = finite("start", start), finite("end", end), finite("start_time", start_time, seconds)
         if duration is not None:
-            duration = positive("duration", duration)
+            duration = positive("duration", duration, seconds)
         way = abs(end - start)
         given = {name: x for name, x in zip(LIMITS, (velocity, acceleration, jerk), strict=True) if x is not None}
         if len(given) == len(LIMITS):

@@ -19,6 +19,7 @@ from jounce.robot import forward_kinematics, inverse_dynamics, joint_wrenches
 from jounce.robot.model import Joint
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
+from jounce.trajectory.shown_units import time_axes
 from jounce.viewer.appearance import Appearance, Place
 from jounce.viewer.recording import Load, Parameter, Quantity, Recording, rotated
 
@@ -96,7 +97,7 @@ class RobotRecording(Recording):
             padded[:, : quantity.values.shape[1]] = quantity.values[..., 0]
             key = name.replace("torque of ", "torque_").replace("force of ", "force_")
             variables[key] = (("time", "derivative"), padded, {"units": quantity.unit})
-        axes = {"time": ("time", self.time, {"units": "s"}), "derivative": np.arange(self.order + 1)}
+        axes = time_axes(self.time, self.order + 1)
         return Dataset(variables, coords=axes, attrs={"title": self.robot.name, "source": "jounce"})
 
 

@@ -1,11 +1,14 @@
 """Warnings of numbers that are likely meant in another unit."""
 
+import dataclasses
+import math
 import warnings
 from pathlib import Path
 
 import pytest
 
 import jounce as jn
+from jounce.io.mechanisms.overrides import override
 
 FOUR_BAR = """
 space: planar
@@ -19,13 +22,14 @@ joints:
   BC: {{type: double_revolute, bodies: [crank, rocker], points: [[AB, 0], [CD, 0]], length: BC}}
 drivers:
   theta: {{type: coordinate, bodies: [ground, crank], coordinate: angle, motion: {motion}}}
-"""
-PLAIN = {"AB": "4 cm", "angle": "30 deg", "motion": "30*deg + 5*t"}
+{time}"""
+PLAIN = {"AB": "4 cm", "angle": "30 deg", "motion": "30*deg + 5*t", "time": ""}
 
 
 def load(folder, **changes):
     path = folder / "four_bar.yaml"
-    path.write_text(FOUR_BAR.format(**{**PLAIN, **changes}))
+    time = {"time": f"time: {changes['time']}\n"} if "time" in changes else {}
+    path.write_text(FOUR_BAR.format(**{**PLAIN, **changes, **time}))
     return jn.load(path)
 
 
@@ -67,6 +71,170 @@ def test_no_false_alarm_in_the_examples(path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         jn.load(path)
+
+
+PROFILE = "{{profile: [{{profile: cycloidal, duration: 1, to: {}}}]}}"
+
+
+@pytest.mark.parametrize(
+    "motion, words",
+    [
+        ("30 + 60*sin(2*pi*t)", r"line 12, drivers.theta.motion: goes from -30 to 90 rad, 19 turns: degrees\?"),
+        ("45*cos(pi*t/2) - 10", r"goes from -55 to 35 rad, 14 turns: degrees\?"),
+        (PROFILE.format(90), r"goes from 0 to 90 rad, 14 turns: degrees\?"),
+        (
+            "{profile: [{profile: modified_sine, duration: 1, to: 30}, {profile: dwell, duration: 1}]}",
+            "from 0 to 30 rad",
+        ),
+        ("{piecewise: [{until: 1, expression: 45*t}, {expression: 45}]}", "goes from 0 to 45 rad"),
+        ("{samples: swing.csv}", r"goes from -30 to 90 rad"),
+        ("{profile: [{profile: trapezoidal, duration: 1, to: 120}]}", "goes from 0 to 120 rad"),
+    ],
+)
+def test_laws_that_take_degrees_over_the_run_are_told(tmp_path, motion, words):
+    rows = "".join(f"{k / 100},{30 + 60 * math.sin(math.pi * k / 100)}\n" for k in range(201))
+    (tmp_path / "swing.csv").write_text(f"time,angle\n{rows}")
+    with pytest.warns(jn.UnitWarning, match=words):
+        load(tmp_path, motion=motion, time="{start: 0, stop: 2, step: 0.01}")
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        "6000*2*pi/60*t",
+        "628.3*t",
+        "2*pi*10*t",
+        "360*t",
+        "100*(1 - exp(-t/0.2))",  # a motor runs up, and goes on
+        "0.5 + 40*t + 0.1*sin(30*t)",
+        "20*pi*sin(t)",  # a winch, ten turns each way
+        "1000*deg*sin(t)",
+        "3 + 3*sin(t)",
+        "{profile: [{profile: cycloidal, duration: 1, to: 5 rev}]}",
+        "{profile: [{profile: cycloidal, duration: 1, to: 1000 deg}]}",
+        "{profile: [{profile: cycloidal, duration: 1, to: 1.57}, {profile: dwell, duration: 1}], beyond: advance}",
+        "{piecewise: [{until: 1, expression: 3*t}, {expression: 3}]}",
+        "{samples: winch.csv}",
+        "{samples: shaft.csv}",
+    ],
+)
+def test_laws_that_turn_on_or_have_units_are_not_doubted(tmp_path, motion):
+    winch = "".join(f"{k / 100},{30 + 60 * math.sin(math.pi * k / 100)}\n" for k in range(201))
+    (tmp_path / "winch.csv").write_text(f"time [s],angle [rad]\n{winch}")
+    shaft = "".join(f"{k / 100},{k + 0.3 * math.sin(k)}\n" for k in range(201))
+    (tmp_path / "shaft.csv").write_text(f"time,angle\n{shaft}")
+    load(tmp_path, motion=motion, time="{start: 0, stop: 2, step: 0.01}")  # warnings are errors here
+
+
+BARE = """
+space: planar
+parameters: {{AD: {AD}, AB: {AB}, BC: {BC}, CD: {CD}}}
+bodies:
+  crank: {{position: [0, 0], angle: 30 deg{crank}}}
+  rocker: {{position: [AD, 0], angle: 100 deg}}
+joints:
+  A:  {{type: revolute, bodies: [ground, crank], points: [[0, 0], [0, 0]]}}
+  D:  {{type: revolute, bodies: [ground, rocker], points: [[AD, 0], [0, 0]]}}
+  BC: {{type: double_revolute, bodies: [crank, rocker], points: [[AB, 0], [CD, 0]], length: BC}}
+drivers:
+  theta: {{type: coordinate, bodies: [ground, crank], coordinate: angle, motion: {motion}}}
+time: {{start: 0, stop: 2, step: 0.01}}
+"""
+MILLIMETRES = {"AD": "132.1", "AB": "40", "BC": "142.3", "CD": "203.1", "motion": "30*deg + 2*pi*t", "crank": ""}
+
+
+def bare(folder, **changes):
+    path = folder / "bare.yaml"
+    path.write_text(BARE.format(**{**MILLIMETRES, **changes}))
+    return jn.load(path)
+
+
+@pytest.mark.parametrize(
+    "changes, words",
+    [
+        ({}, r"line 3, parameters.CD: the lengths of this file go up to 203.1 m, which would move at .* m/s: millim"),
+        ({"motion": "30*deg + 60*deg*sin(pi*t)"}, "millimetres"),
+        ({"motion": "30*deg", "crank": ", mass: 0.2, inertia: 0.0001"}, "of masses up to 0.2 kg: millimetres"),
+        ({"motion": "30*deg", "crank": ", mass: 30, inertia: 0.02"}, "an inertia of 0.02 kg m.2: millimetres"),
+    ],
+)
+def test_a_file_in_bare_millimetres_is_told(tmp_path, changes, words):
+    with pytest.warns(jn.UnitWarning, match=words):
+        bare(tmp_path, **changes)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"AD": "132.1 m"},
+        {"AD": "0.1321", "AB": "0.04", "BC": "0.1423", "CD": "0.2031"},
+        {"AD": "13.21e-4", "AB": "4e-4", "BC": "14.23e-4", "CD": "20.31e-4"},  # a watch
+        {"AD": "13.2", "AB": "4", "BC": "14.2", "CD": "20.3", "motion": "30*deg + 0.1*t"},  # a crane
+        {"AD": "66", "AB": "20", "BC": "71", "CD": "100", "motion": "30*deg + 0.05*t",
+         "crank": ", mass: 20000, inertia: 1000000"},
+        {"motion": "30*deg + 20*deg*sin(0.1*t)", "crank": ", mass: 5e4, inertia: 1e7"},
+    ],
+)  # fmt: skip
+def test_lengths_that_may_be_metres_are_not_doubted(tmp_path, changes):
+    bare(tmp_path, **changes)
+
+
+@pytest.mark.parametrize(
+    "given, words",
+    [
+        ("AB=30", r"--set AB: 30 m is 800 times what it was: 30 mm\?"),
+        ("amplitude=60", r"--set amplitude: 60 rad is 9.5 turns: 60 deg\?"),
+        ("swing=45", r"--set: now the law of drivers.theta goes from -44.5 to 45.5 rad, 14 turns: degrees\?"),
+    ],
+)
+def test_a_value_set_without_its_unit_is_told(tmp_path, given, words):
+    (tmp_path / "set.yaml").write_text(
+        FOUR_BAR.format(**PLAIN | {"motion": "0.5 + (amplitude + swing)*sin(pi*t)", "AB": "4 cm"}).replace(
+            "AD: 13.21 cm", "AD: 13.21 cm, amplitude: 0 deg, swing: 0.4"
+        )
+        + "time: {start: 0, stop: 2, step: 0.01}\n"
+    )
+    mechanism = jn.load(tmp_path / "set.yaml")
+    if given.startswith("swing"):
+        mechanism = dataclasses.replace(mechanism, dimensions={"AB": mechanism.dimensions["AB"]})
+    with pytest.warns(jn.UnitWarning, match=words):
+        override(mechanism, [given])
+
+
+def test_values_that_are_set_as_they_are_meant_are_not_doubted():
+    mechanism = jn.load("examples/four_bar.yaml")
+    for given in ("AB=0.03", "AB=30 mm", "tau=60", "BC=15 cm"):
+        assert override(mechanism, [given]).parameters
+
+
+def test_a_cam_law_over_degrees_without_a_unit_is_told(tmp_path):
+    path = tmp_path / "cam.yaml"
+    path.write_text(CAM)
+    with pytest.warns(jn.UnitWarning, match=r"goes on over 360 rad of its leader, 57 turns: degrees\?"):
+        jn.load(path)
+
+
+CAM = """
+space: planar
+bodies:
+  shaft: {position: [0, 0]}
+  table: {position: [1, 0]}
+joints:
+  bearing: {type: revolute, bodies: [ground, shaft], points: [[0, 0], [0, 0]]}
+  pivot: {type: revolute, bodies: [ground, table], points: [[1, 0], [0, 0]]}
+drivers:
+  shaft: {type: coordinate, bodies: [ground, shaft], coordinate: angle, motion: 2*pi*t}
+  table:
+    type: coordinate
+    bodies: [ground, table]
+    coordinate: angle
+    motion:
+      profile: [{profile: cycloidal, duration: 120, to: 30 deg}, {profile: dwell, duration: 60},
+                {profile: cycloidal, duration: 180, to: 0}]
+      beyond: repeat
+      of: shaft
+time: {start: 0, stop: 1, step: 0.01}
+"""
 
 
 def test_files_say_what_is_beyond_samples(tmp_path):

@@ -1,5 +1,7 @@
 """Robots from URDF files against Pinocchio, entry by entry, and what the format leaves open."""
 
+import contextlib
+
 import numpy as np
 import pinocchio
 import pytest
@@ -398,3 +400,25 @@ def test_no_floating_base_where_a_link_is_named_world_already(tmp_path):
     path.write_text(f'<robot name="r"><link name="world">{INERTIAL}</link></robot>')
     with pytest.raises(RobotFileError, match=r"links\.world: .*floating base"):
         load_robot(path, floating_base=True)
+
+
+@pytest.mark.parametrize(
+    "limit, expected, told",
+    [
+        ('lower="-1" upper="1" effort="9" velocity="inf"', (-1.0, 1.0, None), None),
+        ('lower="-1" upper="1" effort="9" velocity="-1"', (-1.0, 1.0, None), "below zero, .* taken for none: j"),
+        ('upper="-0.3" effort="9" velocity="2"', (None, -0.3, 2.0), "one end of a range, .* taken for none: j"),
+        ('lower="0.3" effort="9" velocity="2"', (0.3, None, 2.0), "one end of a range"),
+        ('upper="0.3" effort="9" velocity="2"', (0.0, 0.3, 2.0), None),
+    ],
+)
+def test_limits_that_say_little_are_read(tmp_path, limit, expected, told):
+    moving = f'type="revolute"><limit {limit}/>'
+    with pytest.warns(jn.RobotWarning, match=told) if told else contextlib.nullcontext():
+        limits = load_robot(small(tmp_path, moving)).joints["j"].limits
+    assert (limits.lower, limits.upper, limits.velocity) == expected
+
+
+def test_a_range_with_both_ends_the_wrong_way_round_is_refused(tmp_path):
+    with pytest.raises(jn.RobotFileError, match="lower limit must not exceed"):
+        load_robot(small(tmp_path, 'type="revolute"><limit lower="0.3" upper="0" effort="9" velocity="2"/>'))

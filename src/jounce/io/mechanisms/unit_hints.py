@@ -5,44 +5,206 @@ from __future__ import annotations
 import math
 import warnings
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
+
+import numpy as np
 
 from jounce.constraints import catalogue
 from jounce.errors import JounceError, UnitWarning
 from jounce.io.files.located_data import Location, Source, dotted
+from jounce.io.files.samples import sampled_dimension
 from jounce.io.mechanisms.keys import ROLES, file_keys
-from jounce.mechanism import Mechanism
-from jounce.trajectory import Expression
+from jounce.mechanism import Mechanism, with_outputs_held
+from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.resolve import resolve, resolve_motion
+from jounce.mechanism.time import instants_of
+from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FollowingMotion, SplineMotion
 from jounce.trajectory.dimensions import ANGLE, LENGTH, Dimension
+from jounce.trajectory.unit_doubts import TURN, degrees_meant, looks_like_degrees, values_of
+from jounce.trajectory.units import parse_value
 
-MANY_TURNS = 4 * math.pi
 FAR_OFF = 100.0  # times the other lengths
 ALIKE = 30.0  # within which a thousandth of a length must be to them
 TO_COMPARE = 3  # lengths, at least
+LARGE = 5.0  # m, from which on a machine may be one in millimetres
+FAST = 120.0  # m/s, which nothing so large reaches
+LIGHT = 0.1  # kg/m, less than which nothing so large has
+SLENDER = 1e-5  # of the mass by the square of the size, less than which no body's inertia is
+IN_SI = "A number without a unit is in SI"
 
 
 def warn_of_units(source: Source, mechanism: Mechanism) -> None:
-    """Warn of angles of many turns and of lengths far from all others, where numbers stand without a unit.
+    """Warn of angles that are likely in degrees, laws over the run among them, and of lengths likely in millimetres.
 
     Warns
     -----
     UnitWarning
         With the file, the line, the name and what may be meant.
     """
+    told = set()
     for location, value in _angles(source.data, mechanism):
-        round_degrees = value.is_integer() and value % 5 == 0 and abs(value) > 2 * math.pi
-        if round_degrees or abs(value) > MANY_TURNS:
-            _warn(source, location, f"{value:g} rad is {abs(value) / (2 * math.pi):.2g} turns: {value:g} deg?")
+        if looks_like_degrees(value):
+            told.add(location[:3])
+            _warn(source, location, f"{value:g} rad is {abs(value) / TURN:.2g} turns: {value:g} deg?")
+    laws = list(_laws(mechanism))
+    for name, law, run in laws:
+        at: Location = ("drivers", name, "motion")
+        if at in told or _names_angle(law, mechanism.drivers[name], mechanism) or _has_unit(source, at):
+            continue
+        if why := _in_degrees(law, run):
+            _warn(source, at, why)
+        elif (span := _angle_of_leader(law)) and looks_like_degrees(span):
+            _warn(source, at, f"goes on over {span:g} rad of its leader, {span / TURN:.2g} turns: degrees?")
+    _warn_of_lengths(source, mechanism, laws)
+
+
+def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], option: str) -> None:
+    """Warn of parameters that were given as plain numbers, likely in degrees or millimetres, by the values before.
+
+    Parameters
+    ----------
+    before, after : Mechanism
+        With the values of a file, and with those given.
+    given : iterable of str
+        Names of parameters whose values are plain numbers.
+    option : str
+        By which they were given.
+
+    Warns
+    -----
+    UnitWarning
+    """
+    old, new, told = before.parameter_values, after.parameter_values, False
+    for name in given:
+        dimensions, value = after.dimensions.get(name, ()), float(new[name])
+        was = abs(float(old[name]))
+        if ANGLE in dimensions and looks_like_degrees(value):
+            hint = f"{value:g} rad is {abs(value) / TURN:.2g} turns: {value:g} deg?"
+        elif LENGTH in dimensions and was and _is_thousandfold(abs(value), was):
+            hint = f"{value:g} m is {float(f'{abs(value) / was:.1g}'):g} times what it was: {value:g} mm?"
+        else:
+            continue
+        told = True
+        warnings.warn(UnitWarning(f"{option} {name}: {hint} {IN_SI}"), stacklevel=3)
+    known = {name for name, law, run in _laws(before) if _in_degrees(law, run)}
+    for name, law, run in () if told else _laws(after):
+        if name not in known and (why := _in_degrees(law, run)):
+            warnings.warn(UnitWarning(f"{option}: now the law of drivers.{name} {why} {IN_SI}"), stacklevel=3)
+
+
+def _is_thousandfold(value: float, usual: float) -> bool:
+    """Tell whether a length is far larger than usual, and a usual one where it is in millimetres."""
+    return value > FAR_OFF * usual and usual / ALIKE < value / 1000 < ALIKE * usual
+
+
+_Law = tuple[str, AbstractMotion, tuple[float, float]]
+"""The name of a driver, its law, and the first and the last instant of the run, s."""
+
+
+def _in_degrees(law: AbstractMotion, run: tuple[float, float]) -> str:
+    values = values_of(law, *run)
+    return "" if values is None else degrees_meant(values)
+
+
+def _laws(mechanism: Mechanism) -> Iterator[_Law]:
+    """Return the laws of angles."""
+    try:
+        held, parameters = with_outputs_held(mechanism), mechanism.parameter_values
+        instants = None if mechanism.time is None else instants_of(mechanism.time, parameters)
+        first, last = (0.0, 1.0) if instants is None else (float(instants[0]), float(instants[-1]))
+    except JounceError:  # told where they are used
+        return
+    for name, driver in held.drivers.items():
+        motion = getattr(driver, "motion", None)
+        if motion is None or not is_turning(driver):
+            continue
+        try:
+            known = isinstance(motion, AbstractMotion)
+            law = motion.resolved(parameters) if known else resolve_motion(motion, parameters)
+        except JounceError:
+            continue
+        yield name, law, (first, last)
+
+
+def _names_angle(law: AbstractMotion, driver: Any, mechanism: Mechanism) -> bool:
+    """Tell whether the law of an angle is a formula with a unit of one, or with a parameter that is an angle."""
+    if not isinstance(law, ExpressionMotion) or not isinstance(getattr(driver, "motion", None), Expression | str):
+        return False
+    expression = law.expression
+    return "deg" in expression.text or any(ANGLE in mechanism.dimensions.get(x, ()) for x in expression.names)
+
+
+def _has_unit(source: Source, at: Location) -> bool:
+    """Tell whether the samples of a law say their unit."""
+    raw = source.at(at)
+    if not isinstance(raw, dict) or not isinstance(raw.get("samples"), str):
+        return False
+    columns = {key: raw[key] for key in ("time", "value") if key in raw}
+    try:
+        return bool(source.read_named(raw["samples"], at, lambda path: sampled_dimension(path, **columns)))
+    except JounceError:
+        return False
+
+
+def _angle_of_leader(law: AbstractMotion) -> float | None:
+    """Return over which part of its leader's way a law is given, None where it follows none, or has no ends."""
+    if not isinstance(law, FollowingMotion) or not law.parts:
+        return None
+    own = law.parts[0]
+    return float(own.stop) - float(np.asarray(own.breakpoints)[0]) if isinstance(own, SplineMotion) else None
+
+
+def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[_Law]) -> None:
     lengths = [(location, abs(value), plain) for location, value, plain in _lengths(source.data, mechanism) if value]
     in_order = sorted(value for _, value, _ in lengths)
     for location, value, plain in lengths:
         if not plain or len(lengths) <= TO_COMPARE:
             continue
         usual = _median_of_others(in_order, value)
-        if value > FAR_OFF * usual and usual / ALIKE < value / 1000 < ALIKE * usual:
+        if _is_thousandfold(value, usual):
             times = float(f"{value / usual:.1g}")
             _warn(source, location, f"{value:g} m is {times:g} times the others: {value:g} mm?")
+    if len(lengths) < TO_COMPARE or in_order[-1] < LARGE or not all(plain for *_, plain in lengths):
+        return
+    if (why := _too_large(mechanism, in_order[-1], laws)) and not _any_unit(source.data, mechanism):
+        location = max(lengths, key=lambda x: x[1])[0]
+        _warn(source, location, f"the lengths of this file go up to {in_order[-1]:g} m, {why}: millimetres?")
+
+
+def _too_large(mechanism: Mechanism, size: float, laws: Iterable[_Law]) -> str:
+    """Word why no mechanism of this one's motion or masses is of a size, m; nothing if there may be one."""
+    for _, law, (first, last) in laws:
+        values = values_of(law, first, last)
+        if values is not None and last > first:
+            fastest = float(np.abs(np.diff(values)).max()) * (len(values) - 1) / (last - first)
+            if fastest * size > FAST:
+                return f"which would move at {fastest * size:.3g} m/s"
+    parameters = mechanism.parameter_values
+    masses = {name: body.mass for name, body in mechanism.bodies.items() if body.mass is not None}
+    heaviest = max((abs(float(resolve(mass, parameters))) for mass in masses.values()), default=math.nan)
+    if heaviest < LIGHT * size:
+        return f"of masses up to {heaviest:g} kg"
+    for name, mass in masses.items():
+        inertia = mechanism.bodies[name].inertia
+        if inertia is not None:
+            most = float(np.abs(np.asarray(resolve(inertia, parameters), float)).max())
+            if 0 < most < SLENDER * float(resolve(mass, parameters)) * size**2:
+                return f"of a body with an inertia of {most:g} kg m^2"
+    return ""
+
+
+def _any_unit(data: dict[str, Any], mechanism: Mechanism) -> bool:
+    """Tell whether any length of a file has a unit."""
+    names = dict.fromkeys(mechanism.parameters)
+    given = [raw for _, quantity, raw in _fields(data, mechanism) if quantity == "length"]
+    for raw in [*(raw for _, raw in _parameters(data, mechanism, LENGTH)), *given]:
+        try:
+            if isinstance(raw, str) and parse_value(raw, "any", names).dimension == LENGTH:
+                return True
+        except JounceError:
+            continue
+    return False
 
 
 def _median_of_others(in_order: list[float], value: float) -> float:
@@ -54,7 +216,7 @@ def _median_of_others(in_order: list[float], value: float) -> float:
 
 def _warn(source: Source, location: Location, hint: str) -> None:
     line = source.line(location)
-    words = f"{source.path}, line {line}, {dotted(location)}: {hint} A number without a unit is in SI"
+    words = f"{source.path}, line {line}, {dotted(location)}: {hint} {IN_SI}"
     warnings.warn(UnitWarning(words), stacklevel=4)
 
 

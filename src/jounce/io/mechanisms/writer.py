@@ -18,7 +18,7 @@ from jounce.io.mechanisms.keys import OUTPUTS, ROLES, file_keys, output_holder
 from jounce.io.mechanisms.written_laws import WrittenLaws
 from jounce.io.mechanisms.written_values import plain, plain_number
 from jounce.mechanism import Body, Mechanism, TimeGrid
-from jounce.shapes import real_numbers
+from jounce.shapes import seconds
 
 
 def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrite: bool = False) -> None:
@@ -210,7 +210,7 @@ def _time(time: Any) -> dict[str, Any]:
     if isinstance(time, TimeGrid):
         given = {key: getattr(time, key) for key in ("start", "stop", "step", "count")}
         return {key: plain(value, f"time.{key}") for key, value in given.items() if value is not None}
-    instants = real_numbers("time", time, MechanismError)
+    instants = seconds("time", time, MechanismError)
     start, stop, count = float(instants[0]), float(instants[-1]), len(instants)
     if not np.allclose(instants, np.linspace(start, stop, count), rtol=0, atol=1e-12 * max(abs(start), abs(stop))):
         raise MechanismError("instants that are not evenly spaced have no form in a file", name="time")

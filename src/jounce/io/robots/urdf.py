@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import RobotError, RobotFileError, did_you_mean, no_such
-from jounce.io.robots.faults import FOLLOWS_NONE, IDLE, MASSLESS, Faults, left_out
+from jounce.io.robots.faults import BELOW_ZERO, FOLLOWS_NONE, IDLE, MASSLESS, ONE_END, Faults, left_out
 from jounce.io.robots.named_elements import NamedElements
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
@@ -217,7 +217,7 @@ def _joints(name: str, element: Element, mimics: dict[str, Mimic], faults: Fault
         raise (axis or element).error("must have a direction", *where, "axis", value=direction)
     if kind == "planar":
         return _planar(name, (parent, child), (position, rotation), np.array(direction))
-    kept: dict[str, Any] = {"limits": _limits(name, limit, kind, bounds), "mimic": mimics.get(name)}
+    kept: dict[str, Any] = {"limits": _limits(name, limit, kind, bounds, faults), "mimic": mimics.get(name)}
     kept |= {"axis": np.array(direction), "damping": damping, "friction": friction}
     return [], [Joint(name, parent, child, kind, position, rotation, **kept)]
 
@@ -264,12 +264,21 @@ def _bound(limit: Element, key: str, name: str) -> float:
     return given[0] if given else 0.0
 
 
-def _limits(name: str, limit: Element | None, kind: str, bounds: dict[str, float]) -> Limits:
+def _limits(name: str, limit: Element | None, kind: str, bounds: dict[str, float], faults: Faults) -> Limits:
     if limit is None:
         return Limits()
     given = {key: bounds[key] for key in SIZES if bounds[key] != 0}
+    for key in [key for key in ("velocity", "effort") if given.get(key, 0) < 0]:
+        message = "must be greater than zero; leave it out where there is no limit"
+        faults.add(BELOW_ZERO, name, limit.error(message, "joints", name, "limit", key, value=given.pop(key)))
     if kind != "continuous" and (bounds["lower"], bounds["upper"]) != (0, 0):
-        given |= {key: bounds[key] for key in ("lower", "upper")}
+        ends = {key: bounds[key] for key in ("lower", "upper")}
+        if bounds["lower"] > bounds["upper"] and (absent := ends.keys() - limit.attributes.keys()):
+            for key in absent:  # it would be zero
+                message = f"is missing and so is zero, beyond the other end of the range; give {key}"
+                faults.add(ONE_END, name, limit.error(message, "joints", name, "limit", key))
+                del ends[key]
+        given |= ends
     try:
         return Limits(**{key: value for key, value in given.items() if math.isfinite(value)})
     except RobotError as error:

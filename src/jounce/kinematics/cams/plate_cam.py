@@ -18,7 +18,7 @@ from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.cams.followers import AbstractFollower, Follower, across, rotated, unit
 from jounce.kinematics.cams.results import Extreme, Geometry, Numbers1, Undercut
 from jounce.kinematics.cams.undercut import Cutter, runs
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory import (
     AbstractMotion,
     Continuity,
@@ -71,6 +71,11 @@ class PlateCam:
     title: str = ""
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        title = f"{self.title}: " if self.title else ""
+        follower = f"{type(self.follower).__name__}, base radius {self.base_radius:g} m"
+        return f"<PlateCam {title}{type(self.law).__name__}, {follower}, {len(self.angle)} angles>"
+
     @property
     def shown_units(self) -> ShownUnits:
         """The units in which the cam is shown and written."""
@@ -79,7 +84,7 @@ class PlateCam:
 
     def at(self, angle: ArrayLike) -> Geometry:
         """Return the cam at any cam angles, rad: exact but for rounding."""
-        return _geometry(self, np.atleast_1d(np.asarray(angle, float)))
+        return _geometry(self, np.atleast_1d(real_numbers("angle", angle, MechanismError)))
 
     @cached_property
     def table(self) -> Geometry:

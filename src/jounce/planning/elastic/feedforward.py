@@ -13,7 +13,7 @@ from jounce.planning.elastic.motor_motion import Feedforward, MotorMotion, motor
 from jounce.planning.elastic.spring_deflection import SpringDeflection
 from jounce.robot.arguments import checked_coordinates, whole_number
 from jounce.robot.robot import Robot
-from jounce.shapes import ArrayLike, real_numbers
+from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 MOST_RATES = 24  # of motor torques: the highest derivative of a law is 30
@@ -179,7 +179,7 @@ def _of_derivatives(robot: Robot, q: object, drives: object, rates: int, losses:
 
 
 def _checked_times(times: ArrayLike, trajectory: JointTrajectory) -> np.ndarray:
-    found = np.atleast_1d(real_numbers("times", times, TrajectoryError))
+    found = np.atleast_1d(seconds("times", times, TrajectoryError))
     if found.ndim != 1 or not len(found) or not np.isfinite(found).all() or (np.diff(found) <= 0).any():
         raise TrajectoryError("must be finite instants that increase", name="times", value=found.tolist())
     if found[0] < trajectory.start or found[-1] > trajectory.stop:

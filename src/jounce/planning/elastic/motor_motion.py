@@ -13,8 +13,9 @@ from jounce.planning.elastic.driven_systems import DrivenSystem
 from jounce.planning.elastic.drives import DriveArrays
 from jounce.planning.elastic.pieces import resolved
 from jounce.planning.elastic.spring_deflection import SpringDeflection
-from jounce.shapes import ArrayLike, real_numbers
+from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.motion import AbstractMotion
+from jounce.trajectory.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray
@@ -140,7 +141,7 @@ class Feedforward(MotorMotion):
         TrajectoryError
             If one lies outside of it.
         """
-        instants, known = np.atleast_1d(real_numbers("times", times, TrajectoryError)), self.system.instants
+        instants, known = np.atleast_1d(seconds("times", times, TrajectoryError)), self.system.instants
         if not (instants.ndim == 1 and ((instants >= known[0]) & (instants <= known[-1])).all()):
             message = f"must be instants from {known[0]:.9g} to {known[-1]:.9g} s, where the motion is known"
             raise TrajectoryError(message, name="times", value=instants.tolist()[:5])
@@ -238,7 +239,7 @@ class Feedforward(MotorMotion):
         import xarray
 
         count = self._levels - 2
-        axes = {"time": ("time", self.time, {"units": "s", "long_name": "time"}), "derivative": np.arange(count)}
+        axes = time_axes(self.time, count)
         variables: dict[str, Any] = {}
         for k, name in enumerate(self.names):
             place, force = (("m", "N"), ("rad", "N*m"))[self._arrays.turning[k]]
@@ -254,7 +255,8 @@ class Feedforward(MotorMotion):
                 "spring_torque": (self.spring_torque, force),
             }
             for word, (values, unit) in table.items():
-                variables[f"{name}_{word}"] = (("time", "derivative"), values[:, :count, k], {"units": unit})
+                told = {"units": unit, "long_name": derivatives_of(f"{name}_{word}")}
+                variables[f"{name}_{word}"] = (("time", "derivative"), values[:, :count, k], told)
         return xarray.Dataset(variables, coords=axes, attrs={"title": self.title, "source": "jounce"})
 
 

@@ -132,7 +132,7 @@ def _jumps(source: RobotQuantities, trajectory: JointTrajectory) -> np.ndarray:
     when = np.full(len(labels.every), np.nan)
     if not (points or source.with_jounce):
         return when
-    followed = FollowedTrajectory(source.robot, trajectory)
+    followed = FollowedTrajectory(source.robot, trajectory, given=False)
     grid = np.linspace(trajectory.start, trajectory.stop, 2001)
     jumps = jumps_of(followed, grid, followed.coordinates(grid, 4))
     if not len(jumps.times):

@@ -12,8 +12,9 @@ from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet
 from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.trajectory_paths import path_of_trajectory
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory import AbstractMotion, Expression, JointTrajectory, PiecewiseMotion, SplineMotion
+from jounce.trajectory.checks import finite
 from jounce.trajectory.knots import knot_jumps
 from jounce.trajectory.seen_jumps import level_sizes, unexplained
 
@@ -199,7 +200,7 @@ def _law(name: str, law: Any) -> AbstractMotion:
     if isinstance(law, AbstractMotion):
         return law
     try:
-        expression = Expression(law if isinstance(law, str) else repr(float(law)))
+        expression = Expression(law if isinstance(law, str) else repr(finite(None, law)))
         expression.check({"s"})
         return PathExpression(expression)
     except JounceError as error:
@@ -207,13 +208,7 @@ def _law(name: str, law: Any) -> AbstractMotion:
 
 
 def _numbers(path: Any) -> np.ndarray:
-    try:
-        points = None if np.iscomplexobj(path) else np.asarray(path, float)
-    except (TypeError, ValueError):
-        points = None
-    if points is None:
-        message = "must be waypoints of real numbers, expressions of s, or a trajectory"
-        raise TrajectoryError(message, name="path", value=path)
+    points = real_numbers("path", path, TrajectoryError, "waypoints of real numbers, expressions of s, or a trajectory")
     if points.ndim != 2 or len(points) < 2:
         message = "waypoints have the shape (points, joints), two points at least"
         raise TrajectoryError(message, name="path", value=f"shape {points.shape}")

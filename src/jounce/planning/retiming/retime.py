@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.dynamics.trajectories import FollowedTrajectory
+from jounce.dynamics.trajectories import FollowedTrajectory, warn_of_degrees
 from jounce.errors import SolveError, TrajectoryError, flag, whole_number
 from jounce.mechanism import Mechanism
 from jounce.planning.retiming.fastest import Search, fastest, slowed_only
@@ -123,6 +123,8 @@ def retime(
         return _repaired(robot, path, limits, order, cells, drives)
     chosen = _order(order, limits_of(robot, limits), robot)
     found = path_of(path, names if names is not None else robot.joint_names, chosen)
+    if not isinstance(path, JointTrajectory):
+        warn_of_degrees(robot, JointTrajectory(dict(found.laws), found.start, found.stop))
     source = RobotQuantities(robot, found, limits, drives=drives)
     checked(found, chosen)
     source.check_range()

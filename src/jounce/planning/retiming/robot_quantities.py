@@ -49,7 +49,7 @@ class RobotQuantities:
     ):
         self.robot, self.path, self.drives = robot, path, drives
         self.limits = limits_of(robot, limits)
-        followed = FollowedTrajectory(robot, JointTrajectory(dict(path.laws), path.start, path.stop))
+        followed = FollowedTrajectory(robot, JointTrajectory(dict(path.laws), path.start, path.stop), given=False)
         self.columns, self.held = followed.columns, followed.held
         names = robot.joint_names
         self.moved = [k for k, name in enumerate(names) if name not in self.held]

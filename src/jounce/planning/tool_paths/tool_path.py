@@ -16,7 +16,7 @@ from jounce.jet.derivatives import plain_derivatives
 from jounce.planning.tool_paths.tool_tasks import Goal, rotation_matrices
 from jounce.rigid.attitude_samples import AttitudeSamples
 from jounce.rigid.rotations import check_sequence, rotation_matrix
-from jounce.shapes import ArrayLike
+from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory import SplineMotion
 from jounce.trajectory.checks import check_samples
 from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
@@ -184,7 +184,9 @@ class ToolPath(Displayed):
         if self._progress is None:
             return self._position.derivatives(times, order)
         return np.moveaxis(
-            np.asarray(plain_derivatives(self.series(np.asarray(times, float), order)["position"])), -1, 0
+            np.asarray(plain_derivatives(self.series(seconds("times", times, TrajectoryError), order)["position"])),
+            -1,
+            0,
         )
 
     def series(self, times: Float[np.ndarray, " time"], order: int) -> Goal:

@@ -23,7 +23,7 @@ from jounce.robot.arguments import whole_number
 from jounce.robot.batches import Batched
 from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
-from jounce.shapes import ArrayLike, real_numbers
+from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory import HermiteMotion
 from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory
 
@@ -260,7 +260,7 @@ class ToolPathMotion(Displayed):
 
 def _instants(path: ToolPath, time: Any) -> np.ndarray:
     given = np.linspace(path.start, path.stop, INSTANTS) if time is None else time
-    instants = np.atleast_1d(real_numbers("time", given, TrajectoryError))
+    instants = np.atleast_1d(seconds("time", given, TrajectoryError))
     slack = 1e-9 * (path.stop - path.start)
     outside = ~((instants >= path.start - slack) & (instants <= path.stop + slack))
     if instants.ndim != 1 or outside.any():

@@ -133,7 +133,8 @@ class Panel {
     pen.font = "12px system-ui, sans-serif";
     pen.textAlign = "right";
     let place = frame.x1;
-    const texts = lines.map((line, c) => (output.components[c] ? output.components[c] + " " : "") + shown(line[nearest], 6));
+    const scaled = (value) => value === null ? null : value / 10 ** exponent; // as the axis is
+    const texts = lines.map((line, c) => (output.components[c] ? output.components[c] + " " : "") + shown(scaled(line[nearest]), 6));
     texts.push("t " + shown(data.times[nearest], 6));
     for (let c = texts.length - 1; c >= 0; c -= 1) {
       pen.fillStyle = c < lines.length ? LINES[c % LINES.length] : "#5b6570";

@@ -138,30 +138,38 @@ function drawSketch() {
     pen.fillText("not solved at this time", 8, 20); }
 }
 function drawNames(pen, wide, tall, X, Y, at, scale) {
-  const taken = [];
+  const taken = [], anchors = scene.labels.map((label) => at(label.points, 1, 0)).map(([x, y]) => [X(x), Y(y)]);
+  const gap = (box, [x, y]) => Math.hypot(Math.max(box[0] - x, 0, x - box[2]), Math.max(box[1] - y, 0, y - box[3]));
   pen.font = "600 12px system-ui, sans-serif";
   pen.textAlign = "center";
   pen.textBaseline = "middle";
-  for (const label of scene.labels) {
-    const [x, y] = at(label.points, 1, 0), half = pen.measureText(label.text).width / 2 + 2;
+  scene.labels.forEach((label, number) => {
+    const own = anchors[number], half = pen.measureText(label.text).width / 2 + 2;
     const reach = 2.2 * scene.unit * scale + 7;
     let best = null;
-    for (const far of [1, 1.8, 2.8]) for (let k = 0; k < 8; k += 1) {
-      const angle = Math.PI * (0.25 + k / 4);
-      const px = X(x) + Math.cos(angle) * (reach * far + 0.7 * half), py = Y(y) - Math.sin(angle) * reach * far;
+    const others = anchors.filter((other) => Math.hypot(other[0] - own[0], other[1] - own[1]) > 2);
+    for (const far of [1, 1.8, 2.8, 4.5, 7]) for (let k = 0; k < 16; k += 1) {
+      const angle = Math.PI * (0.25 + k / 8);
+      const px = own[0] + Math.cos(angle) * (reach * far + 0.7 * half), py = own[1] - Math.sin(angle) * reach * far;
       const box = [px - half, py - 8, px + half, py + 8];
       const clash = taken.filter((b) => box[0] < b[2] && box[2] > b[0] && box[1] < b[3] && box[3] > b[1]).length;
       const outside = box[0] < 0 || box[1] < 0 || box[2] > wide || box[3] > tall ? 1 : 0;
-      const cost = far + 0.02 * k + 6 * clash + 8 * outside;
-      if (!best || cost < best.cost) best = { cost, px, py, box };
+      const wrong = others.some((other) => gap(box, other) <= gap(box, own) + 2) ? 1 : 0; // read as that one's name
+      const cost = far + 0.02 * k + 6 * clash + 7 * wrong + 8 * outside;
+      if (!best || cost < best.cost) best = { cost, px, py, box, line: wrong || far > 2 };
     }
     taken.push(best.box);
+    if (best.line) {
+      pen.lineWidth = 0.8;
+      pen.strokeStyle = label.colour;
+      pen.beginPath(); pen.moveTo(...own); pen.lineTo(best.px, best.py); pen.stroke();
+    }
     pen.lineWidth = 3;
     pen.strokeStyle = "rgba(255, 255, 255, 0.85)";
     pen.strokeText(label.text, best.px, best.py);
     pen.fillStyle = label.colour;
     pen.fillText(label.text, best.px, best.py);
-  }
+  });
 }
 function drawScale(pen, tall, scale) {
   pen.strokeStyle = pen.fillStyle = "#5b6570";
