@@ -1,0 +1,162 @@
+"""Laws of equilibrium: what is exerted has no resultant, and momentum changes by what is applied and by the ground.
+
+Both hold with their rates to the fourth. The second shares nothing with reactions but the motion.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce import drivers, forces, planar, spatial
+from jounce.constraints.base import ROLES, catalogue
+from jounce.dynamics.inverse import MotionForces
+from jounce.mechanism import build
+from tests.contracts.test_frames import MECHANISMS, arm
+from tests.problems.bank import BODIES, INDEX, OWN, pose_of, random_motion
+
+RATES = 4
+ORDER = RATES + 2  # of motions: forces use up two
+INSTANT = 0.3
+
+
+class OwnRatio(jn.AbstractConstraint, space="planar"):
+    """A body whose place along x follows the product of its height over a line and the angle of another, all of them global."""
+
+    def residual(self, body_i, body_j, time):
+        return body_j.position[0] - body_i.angle * (0.5 + body_j.position[1])
+
+
+class OwnPush(jn.AbstractForce, space="planar"):
+    """A force along x by how far a point of one body is beyond the origin of another."""
+
+    point_j: jn.Vector
+
+    def displacement(self, body_i, body_j, time):
+        return body_j.point(self.point_j)[0] - body_i.position[0]
+
+    def force(self, displacement, velocity, time):
+        return time - 3.0 * displacement - 0.2 * velocity
+
+
+class OwnHeight(jn.AbstractConstraint, space="spatial"):
+    """A height over the ground by the way that another body has gone along x."""
+
+    def residual(self, body_i, body_j, time):
+        return body_j.position[2] - 0.3 * body_i.position[0]
+
+
+def by_coordinates():
+    """Joints and drivers of the plane by coordinates of single bodies, in each form, and own ones."""
+    found = {f"coordinate_{word}": planar.Coordinate(BODIES[1:3], word, 0.4) for word in ("angle", "x", "y")}
+    found |= {f"driver_{word}": drivers.CoordinateDriver(BODIES[1:3], word, "t", 0.4) for word in ("angle", "x", "y")}
+    return found | {"own": OwnRatio(BODIES[1:3]), "parabola": OWN(BODIES[1:3], [0.3, -0.2], 0.7)}
+
+
+def subjects(space):
+    """Every joint, driver and force of the catalogue in all its forms, and own ones: each from one moving body to the
+    next, and with one of its bodies the ground.
+    """
+    found = by_coordinates() if space == "planar" else {"own": OwnHeight(BODIES[1:3])}
+    if space == "planar":
+        found["push"] = OwnPush(BODIES[1:3], [0.5, 0.2])
+    for mechanism in (make() for make in MECHANISMS.values()):
+        if mechanism.space == space:
+            given = {**mechanism.joints, **mechanism.drivers, **mechanism.forces}
+            found |= {f"{name}_{len(found)}": element for name, element in given.items()}
+    placed = {}
+    for name, element in found.items():
+        count = len(element.bodies)
+        places = {"": BODIES[1 : 1 + count]}
+        if count > 1:
+            places |= {"_from_ground": BODIES[:count], "_to_ground": (*BODIES[2 : 1 + count], BODIES[0])}
+        for word, bodies in places.items():
+            placed[name + word] = dataclasses.replace(element, bodies=bodies)
+    return placed
+
+
+def moving(space):
+    """All of them between four bodies in a random motion, with random multipliers: nothing that they hold is held."""
+    random = np.random.default_rng(3)
+    elements = subjects(space)
+    roles = {role: {n: e for n, e in elements.items() if (e.role or "joint") == role} for role in ROLES}
+    mechanism = jn.Mechanism(
+        space=space,
+        bodies={name: jn.Body([0.0] * (2 if space == "planar" else 3), mass=1.0) for name in BODIES[1:]},
+        joints=roles["joint"],
+        drivers=roles["driver"],
+        forces=roles["force"],
+    )
+    model = build(mechanism)
+    pose = pose_of(random_motion(random, space, ORDER, degree=3))
+    coordinates = {name: np.stack(jet.dense().coefficients) for name, jet in pose.coordinates().items()}
+    motion = jn.Motion(mechanism, model, np.array([INSTANT]), ORDER, (coordinates, ()), np.zeros(1, int), {})
+    found = MotionForces(motion)
+    found.__dict__["multipliers"] = random.normal(size=(RATES + 1, len(model.rows), 1))
+    return pose, found
+
+
+def convolved(product, a, b):
+    """Taylor coefficients of a product of series, the levels first."""
+    return np.stack([sum(product(a[j], b[k - j]) for j in range(k + 1)) for k in range(min(len(a), len(b)))])
+
+
+def cross(a, b):
+    """The vector product along the first axis; in the plane its third component."""
+    return np.cross(a, b, axis=0) if len(a) == 3 else (a[0] * b[1] - a[1] * b[0])[None]
+
+
+def scalar(a, b):
+    return (a * b).sum(axis=0)
+
+
+@pytest.mark.parametrize("space", ["planar", pytest.param("spatial", marks=pytest.mark.slow)])
+def test_what_is_exerted_has_no_resultant_and_the_power_of_what_it_works_on(space):
+    """About the origin, from moments about random points of all bodies, the ground among them.
+
+    The power on the bodies is that of the multipliers on the residual with its law held, and of the forces.
+    """
+    random = np.random.default_rng(5)
+    pose, found = moving(space)
+    components = 2 if space == "planar" else 3
+    missing = {kind for role in ROLES for kind in catalogue(space, role).values()}
+    spins = pose.angle.differentiate().map(lambda c: c[None]) if components == 2 else pose.global_angular_velocity()
+    spins = np.stack(spins.dense().coefficients)
+    frozen = jn.Jet.constant(np.full((1, 1), INSTANT), ORDER)
+    for name, element in subjects(space).items():
+        force, moment, power, size = 0.0, 0.0, 0.0, 0.0
+        load = element.role == "force" and len(element.bodies) == 1
+        felt = element.bodies if load else (*element.bodies, "ground")
+        for body in dict.fromkeys(felt):
+            point, index = random.uniform(-1, 1, components), INDEX[body]
+            place = pose.take((index,)).point(point[:, None, None])
+            path, speed = (np.stack(x.dense().coefficients)[..., 0] for x in (place, place.differentiate()))
+            part, turning = (np.asarray(x) for x in found.reaction(name, index, None, point))
+            assert part.shape[0] == RATES + 1
+            lever = convolved(cross, path, part)
+            force, moment = force + part, moment + turning + lever
+            power = power + convolved(scalar, part, speed) + convolved(scalar, turning, spins[:, :, index])
+            size = max(size, *(np.abs(x).max() for x in (part, turning, lever)))
+        assert size > 1e-3, name
+        if not load:
+            assert np.abs(force).max() <= 1e-13 * size, name
+            assert np.abs(moment).max() <= 1e-12 * size, name
+        expected = worked(found, name, element, pose, frozen)
+        np.testing.assert_allclose(power, expected, rtol=0, atol=1e-12 * size * np.abs(spins).max(), err_msg=name)
+        missing.discard(type(element))
+    assert not missing
+
+
+def worked(found, name, element, pose, frozen):
+    """Taylor coefficients of the power that a joint, driver or force puts into all bodies, (levels, time)."""
+    if element.role == "force":
+        index, instance = found._force_index(name)
+        clock = jn.Jet.variable(frozen.coefficients[0], ORDER)
+        power = found.model.system.forces[index].power(pose, clock)
+        return np.stack(power.dense().coefficients)[: RATES + 1, instance]
+    place = found.indices[name]
+    rate = found.model.system.groups[place.group].residual(pose, frozen).differentiate()
+    rates = np.stack(rate.dense().coefficients)[:, :, place.instance]
+    return -convolved(scalar, found.multipliers[:, list(place.own_rows)], rates)
