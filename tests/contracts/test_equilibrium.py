@@ -160,3 +160,156 @@ def worked(found, name, element, pose, frozen):
     rate = found.model.system.groups[place.group].residual(pose, frozen).differentiate()
     rates = np.stack(rate.dense().coefficients)[:, :, place.instance]
     return -convolved(scalar, found.multipliers[:, list(place.own_rows)], rates)
+
+
+def pair():
+    """A pinion and a rack by ratios alone, unbalanced, a lift by its height, and a spring and a wind."""
+    massive = {"mass": 1.3, "inertia": 0.2, "center_of_mass": [0.1, -0.05]}
+    return jn.Mechanism(
+        space="planar",
+        gravity=[0.3, -9.81],
+        bodies={
+            "pinion": jn.Body([0.2, 0.1], **massive),
+            "wheel": jn.Body([0.5, 0.1], **massive),
+            "rack": jn.Body([0.0, 0.4], **massive),
+            "lift": jn.Body([-1.0, 0.3], **massive),
+        },
+        joints={
+            "A": planar.Revolute(("ground", "pinion"), [0.2, 0.1], [0, 0]),
+            "B": planar.Revolute(("ground", "wheel"), [0.5, 0.1], [0, 0]),
+            "guide": planar.Prismatic(("ground", "rack"), [0, 0.4], [0, 0], [1, 0], [1, 0]),
+            "mesh": planar.Coordinate(("pinion", "wheel"), "angle", -0.5),
+            "teeth": planar.Coordinate(("pinion", "rack"), "x", -0.1),
+            "post": planar.Prismatic(("ground", "lift"), [-1, 0], [0, 0], [0, 1], [0, 1]),
+        },
+        drivers={
+            "motor": drivers.CoordinateDriver(("ground", "pinion"), "angle", "2*t + sin(3*t)"),
+            "hoist": drivers.CoordinateDriver(("ground", "lift"), "y", "0.3 + 0.1*sin(2*t)"),
+        },
+        forces={
+            "spring": forces.Spring(("ground", "lift"), [0, 0], [0.1, 0], 50.0, 0.4, 2.0),
+            "wind": forces.PointForce("rack", [0.1, 0.2], ["t - x", "0.3 - vx"]),
+        },
+    )
+
+
+def falling():
+    """The same without motor and hoist: it moves by its weight."""
+    driven = pair()
+    start = {name: dataclasses.replace(driver, motion="0.3") for name, driver in driven.drivers.items()}
+    return dataclasses.replace(driven, drivers={}, initial=start)
+
+
+PLANE, SPACE = MECHANISMS["plane"], arm
+MOTIONS = {
+    "pair": lambda: jn.solve(pair(), [0.1, 0.7], ORDER),
+    "pair that falls": lambda: jn.simulate(falling(), [0.0, 0.2], order=ORDER),
+    "plane": lambda: jn.solve(PLANE(), [0.0, 0.3, 0.8], ORDER),
+    "space": lambda: jn.solve(SPACE(), [0.0, 0.8], ORDER),
+}
+
+
+@pytest.mark.parametrize("name", ["pair", *(pytest.param(name, marks=pytest.mark.slow) for name in [*MOTIONS][1:])])
+def test_momentum_changes_by_what_is_applied_and_what_the_ground_gives(name):
+    motion = MOTIONS[name]()
+    assert (motion.status == 0).all()
+    point = np.array([0.3, -0.2, 0.4])[: 2 if motion.mechanism.space == "planar" else 3]
+    changes, applied = balance_of_bodies(motion, point), loads(motion, point)
+    ground = [taylor(x.values) for x in dataclasses.astuple(jn.ground_reaction(motion, point))]
+    for change, load, part in zip(changes, applied, ground, strict=True):
+        size = np.abs(change).max(axis=(1, 2)) + np.abs(load).max(axis=(1, 2)) + np.abs(part).max(axis=(1, 2))
+        assert (size > 0).all()
+        assert (np.abs(change - load + part).max(axis=(1, 2)) <= 1e-11 * np.maximum.accumulate(size)).all()
+    total = np.zeros_like(ground[0])
+    given = {**motion.mechanism.joints, **motion.mechanism.drivers, **motion.mechanism.forces}
+    for word, element in given.items():
+        if not isinstance(element, forces.PointForce | forces.Moment):
+            total = total + taylor(jn.joint_reaction(motion, word, "ground").force.values)
+    np.testing.assert_allclose(total, ground[0], atol=1e-12 * np.abs(total).max())
+
+
+def taylor(derivatives):
+    """Taylor coefficients, (levels, components, time), from plain derivatives, the time first; those of forces."""
+    factorials = np.array([math.factorial(k) for k in range(RATES + 1)])
+    found = np.moveaxis(derivatives, 0, -1)[: RATES + 1]
+    return (found / factorials.reshape(-1, *[1] * (found.ndim - 1))).reshape(RATES + 1, -1, len(derivatives))
+
+
+def rate(series):
+    """Taylor coefficients of the rate of a series."""
+    return series[1:] * np.arange(1, len(series)).reshape(-1, *[1] * (series.ndim - 1))
+
+
+def attitudes(motion):
+    """Taylor coefficients of the attitude matrices of all bodies, (levels, c, c, bodies, time), from angles or Euler
+    parameters alone.
+    """
+    coordinates = motion.poses[1]
+    if "angle" in coordinates:
+        angle = np.asarray(coordinates["angle"])
+        turn = [np.exp(1j * angle[0])]
+        for k in range(1, len(angle)):
+            turn.append(sum(1j * j * angle[j] * turn[k - j] for j in range(1, k + 1)) / k)
+        turn = np.array(turn)
+        return np.stack([np.stack([turn.real, -turn.imag], 1), np.stack([turn.imag, turn.real], 1)], 1)
+    e = np.moveaxis(np.asarray(coordinates["quaternion"]), 1, 0)
+
+    def p(i, j):
+        return convolved(np.multiply, e[i], e[j])
+
+    rows = [
+        [p(0, 0) + p(1, 1) - p(2, 2) - p(3, 3), 2 * (p(1, 2) - p(0, 3)), 2 * (p(1, 3) + p(0, 2))],
+        [2 * (p(1, 2) + p(0, 3)), p(0, 0) - p(1, 1) + p(2, 2) - p(3, 3), 2 * (p(2, 3) - p(0, 1))],
+        [2 * (p(1, 3) - p(0, 2)), 2 * (p(2, 3) + p(0, 1)), p(0, 0) - p(1, 1) - p(2, 2) + p(3, 3)],
+    ]
+    return np.stack([np.stack(row, 1) for row in rows], 1)
+
+
+def balance_of_bodies(motion, point):
+    """Taylor coefficients of the rates of momentum, and of angular momentum about a fixed point, less their weights.
+
+    Momentum is that of mass elements: of a body with second moments S about its centre, ``x x'^T`` sums up to
+    ``A S A'^T`` besides that of the centre.
+    """
+    size = len(point)
+    turned, origins = attitudes(motion), np.asarray(motion.poses[1]["position"])
+    gravity = np.asarray(motion.mechanism.gravity)[:, None]
+    force, moment = 0.0, 0.0
+    for k, body in enumerate(motion.mechanism.bodies.values(), start=1):
+        matrix, center = turned[:, :, :, k], np.asarray(body.center_of_mass or [0.0] * size)
+        path = origins[:, :, k] + np.einsum("lijt,j->lit", matrix, center)
+        path[0] -= point[:, None]
+        push = rate(rate(path)) * body.mass
+        push[0] -= body.mass * gravity
+        if size == 2:
+            spread = np.eye(2) * body.inertia / 2
+        else:
+            spread = np.trace(body.inertia) / 2 * np.eye(3) - np.asarray(body.inertia)
+        spread = np.einsum("lijt,jk->likt", matrix, spread)
+        turning = convolved(lambda a, b: np.einsum("ijt,kjt->ikt", a, b), spread, rate(rate(matrix)))
+        axes = [(0, 1)] if size == 2 else [(1, 2), (2, 0), (0, 1)]
+        spin = np.stack([turning[:, i, j] - turning[:, j, i] for i, j in axes], axis=1)
+        force, moment = force + push, moment + convolved(cross, path, push) + spin
+    return force[: RATES + 1], moment[: RATES + 1]
+
+
+def loads(motion, point):
+    """Taylor coefficients of the total force and moment of the loads on single bodies, which come from outside."""
+    turned, size = attitudes(motion), len(point)
+    force = np.zeros((RATES + 1, size, len(motion.time)))
+    moment = np.zeros((RATES + 1, 1 if size == 2 else 3, len(motion.time)))
+    for name, load in motion.mechanism.forces.items():
+        if len(load.bodies) > 1:
+            continue
+        push = taylor(jn.applied_force(motion, name).values)
+        index = [*motion.mechanism.bodies].index(load.bodies[0]) + 1
+        matrix = turned[:, :, :, index]
+        if getattr(load, "frame", "") == "body":
+            push = convolved(lambda a, b: np.einsum("ijt,jt->it", a, b), matrix, push)
+        if load.unit == "N*m":
+            moment = moment + push
+            continue
+        path = np.asarray(motion.poses[1]["position"])[:, :, index] + np.einsum("lijt,j->lit", matrix, load.point)
+        path[0] -= point[:, None]
+        force, moment = force + push, moment + convolved(cross, path, push)
+    return force, moment
