@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce import drivers, forces, planar, spatial
+from jounce import drivers, forces, planar
 from jounce.constraints.base import ROLES, catalogue
 from jounce.dynamics.inverse import MotionForces
 from jounce.mechanism import build
@@ -23,7 +23,7 @@ INSTANT = 0.3
 
 
 class OwnRatio(jn.AbstractConstraint, space="planar"):
-    """A body whose place along x follows the product of its height over a line and the angle of another, all of them global."""
+    """A place along x that follows the product of a height over a line and the angle of another body, all global."""
 
     def residual(self, body_i, body_j, time):
         return body_j.position[0] - body_i.angle * (0.5 + body_j.position[1])

@@ -17,38 +17,14 @@ from jounce.errors import MechanismError
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.change_points import spoiled
-from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import at_lanes, measures_angle
-from jounce.mechanism.builder import group_rows
+from jounce.mechanism.element_indices import ElementIndex, element_indices, force_names
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.system import Group, law_left_out
 from jounce.shapes import Numbers
 
-
-@dataclasses.dataclass(frozen=True)
-class ElementIndex:
-    """Where a joint or driver is among the groups of a system, and its group and itself among the rows."""
-
-    group: int
-    instance: int
-    rows: slice
-    own_rows: range
-
-
-def element_indices(model: Model) -> dict[str, ElementIndex]:
-    """Return the indices of all joints and drivers, by name."""
-    found = {}
-    for index, (group, rows) in enumerate(zip(model.system.groups, group_rows(model), strict=True)):
-        for instance, name in enumerate(model.rows[rows][: group.instances]):
-            own = range(rows.start + instance, rows.stop, group.instances)
-            found[name.partition(".")[2]] = ElementIndex(index, instance, rows, own)
-    return found
-
-
-def force_names(model: Model) -> list[str]:
-    """Return the names of the applied forces in the order of the groups of a model."""
-    return [name for members in model.forces for name in members]
+NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
 
 
 class MotionForces:
@@ -212,6 +188,11 @@ class MotionForces:
         """Return the slopes of all groups by the bodies of their moving slots."""
         groups = enumerate(self.model.system.groups)
         return [[self._slopes(index, slot, lanes) for slot in group.moving_slots] for index, group in groups]
+
+    def is_loaded(self, name: str) -> bool:
+        """Tell whether a joint or driver exerts anything anywhere in the motion."""
+        sizes = np.abs(np.nan_to_num(np.asarray(self.multipliers[0])))
+        return bool(sizes[list(self.indices[name].own_rows)].max(initial=0.0) > NOTHING * sizes.max(initial=0.0))
 
     def driver_force(self, name: str) -> Float[Numbers, "order 1 time"]:
         """Return what a driver exerts along what it prescribes, as Taylor coefficients."""

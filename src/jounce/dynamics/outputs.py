@@ -1,12 +1,12 @@
 """Forces as outputs: of drivers along what they prescribe, of joints on their bodies, and applied ones, with rates."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
 
 import equinox as eqx
 import numpy as np
 
-from jounce.constraints.base import Vector
+from jounce.constraints.base import Vector, by_ratio_alone
 from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_choice, check_name, did_you_mean
@@ -105,6 +105,14 @@ class _JointOutput(AbstractForceOutput):
             raise MechanismError(message, name="body", value=self.body)
         check_choice("frame", self.frame, ("global", "body", *dict.fromkeys(felt)), MechanismError)
 
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN, and which gears load no bearing of their bodies."""
+        joints = motion.mechanism.joints
+        bodies = {*_exerting(motion.mechanism, self.joint).bodies} - {GROUND}
+        gears = [name for name, x in joints.items() if by_ratio_alone(x) and bodies & {*x.bodies}]
+        loaded = [name for name in gears if MotionForces.of(motion).is_loaded(name)]
+        return "; ".join(filter(None, (super().remark(motion, values), ratio_words(loaded))))
+
     def _values(self, motion: Motion, point: ArrayLike | None, part: int, size: float) -> Numbers:
         """Return force or moment about a point of the body, with rates; about that of the joint unless given."""
         mechanism, forces = motion.mechanism, MotionForces.of(motion)
@@ -118,6 +126,12 @@ class _JointOutput(AbstractForceOutput):
             return forces.reaction(self.joint, index(body), None if frame is None else index(frame), about)[part]
 
         return found(forces) if isinstance(element, AbstractForce) else forces.unique(found, size)
+
+
+def ratio_words(names: Sequence[str]) -> str:
+    """Say of joints that are given by a ratio alone what their reactions leave out; nothing where there are none."""
+    verb = "is" if len(names) == 1 else "are"
+    return f"{', '.join(names)} {verb} given by a ratio alone: bearings show no tooth forces" if names else ""
 
 
 def _exerting(mechanism: Mechanism, name: str) -> Any:
