@@ -200,12 +200,23 @@ def falling():
     return dataclasses.replace(driven, drivers={}, initial=start)
 
 
-PLANE, SPACE = MECHANISMS["plane"], arm
+def loop():
+    """A robot of rods on hinges whose loop is closed, as a mechanism."""
+    rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0.01, 1 / 12, 1 / 12])
+    links = [jn.Link("base"), *(jn.Link(name, rod) for name in ("crank", "rod", "rocker"))]
+    joints = [jn.Joint("A", "base", "crank"), jn.Joint("B", "crank", "rod", position=[1, 0, 0])]
+    joints.append(jn.Joint("D", "base", "rocker", position=[1, 1, 0]))
+    tip = jn.Closure("C", ("rod", "rocker"), points=[[1, 0, 0], [1, 0, 0]])
+    robot = jn.Robot("four-bar", links, joints, gravity=[1.0, -9.0, -2.0], closures=[tip])
+    return robot.mechanism({"B": 0.4}, drivers={"A": "0.1 + 0.4*sin(t)"})
+
+
 MOTIONS = {
     "pair": lambda: jn.solve(pair(), [0.1, 0.7], ORDER),
     "pair that falls": lambda: jn.simulate(falling(), [0.0, 0.2], order=ORDER),
-    "plane": lambda: jn.solve(PLANE(), [0.0, 0.3, 0.8], ORDER),
-    "space": lambda: jn.solve(SPACE(), [0.0, 0.8], ORDER),
+    "plane": lambda: jn.solve(MECHANISMS["plane"](), [0.0, 0.3, 0.8], ORDER),
+    "space": lambda: jn.solve(arm(), [0.0, 0.8], ORDER),
+    "robot with a loop": lambda: jn.solve(loop(), [0.0, 0.8], ORDER),
 }
 
 
@@ -274,9 +285,12 @@ def balance_of_bodies(motion, point):
     size = len(point)
     turned, origins = attitudes(motion), np.asarray(motion.poses[1]["position"])
     gravity = np.asarray(motion.mechanism.gravity)[:, None]
-    force, moment = 0.0, 0.0
+    force, moment = (np.zeros((1, count, 1)) for count in (size, 1 if size == 2 else 3))
     for k, body in enumerate(motion.mechanism.bodies.values(), start=1):
-        matrix, center = turned[:, :, :, k], np.asarray(body.center_of_mass or [0.0] * size)
+        matrix, center = (
+            turned[:, :, :, k],
+            np.zeros(size) if body.center_of_mass is None else np.asarray(body.center_of_mass),
+        )
         path = origins[:, :, k] + np.einsum("lijt,j->lit", matrix, center)
         path[0] -= point[:, None]
         push = rate(rate(path)) * body.mass
@@ -284,7 +298,9 @@ def balance_of_bodies(motion, point):
         if size == 2:
             spread = np.eye(2) * body.inertia / 2
         else:
-            spread = np.trace(body.inertia) / 2 * np.eye(3) - np.asarray(body.inertia)
+            inertia = np.asarray(body.inertia)
+            inertia = np.diag(inertia) if inertia.ndim == 1 else inertia
+            spread = np.trace(inertia) / 2 * np.eye(3) - inertia
         spread = np.einsum("lijt,jk->likt", matrix, spread)
         turning = convolved(lambda a, b: np.einsum("ijt,kjt->ikt", a, b), spread, rate(rate(matrix)))
         axes = [(0, 1)] if size == 2 else [(1, 2), (2, 0), (0, 1)]

@@ -189,9 +189,9 @@ def ground_reaction(
     ...     joints={"guide": jn.planar.Prismatic(("ground", "lift"), [0, 0], [0, 0], [0, 1], [0, 1])},
     ...     drivers={"motor": jn.drivers.CoordinateDriver(("ground", "lift"), "y", motion="t**3")},
     ... )
-    >>> shaking = jn.ground_reaction(jn.solve(lift, [1.0], order=3))
+    >>> shaking = jn.ground_reaction(jn.solve(lift, [1.0], order=4))
     >>> shaking.force.sel(component="y").values.round(12).tolist()  # -2 kg (10 + 6 t) m/s^2
-    [[-32.0, -12.0]]
+    [[-32.0, -12.0, 0.0]]
     """
     check_motion(motion)
     chosen = _choosing(motion, redundant)
