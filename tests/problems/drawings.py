@@ -19,6 +19,8 @@ from jounce.dynamics import (
     BodyPotentialEnergyOutput,
     DriverForceOutput,
     DriverTorqueOutput,
+    GroundForceOutput,
+    GroundTorqueOutput,
     JointForceOutput,
     JointTorqueOutput,
     KineticEnergyOutput,
@@ -190,6 +192,8 @@ def _holder(mechanism, it, key):
     if side in ("1", "2"):  # one of two joints of which the roles say what they join
         parent, child = it.roles[2 * int(side) - 2 : 2 * int(side)]
         return it.bodies["ijmn".index(child if stem == "opposite" else parent)]
+    if isinstance(it, GroundTorqueOutput):
+        return "ground"
     if isinstance(it, JointTorqueOutput):
         return acted_on(mechanism, it)
     return it.bodies["ijm".index(side) if side else 0]
@@ -197,7 +201,7 @@ def _holder(mechanism, it, key):
 
 def acted_on(mechanism, output):
     """Return the name of the body on which a joint or driver acts with the force or torque that is wanted."""
-    bodies = {**mechanism.joints, **mechanism.drivers}[output.joint].bodies
+    bodies = {**mechanism.joints, **mechanism.drivers, **mechanism.forces}[output.joint].bodies
     return output.body or bodies[1]
 
 
@@ -306,13 +310,17 @@ def with_all_outputs(mechanism):
             outputs[f"moment_{name}"] = JointTorqueOutput(name)
         for slot, body in enumerate(joint.bodies):
             frames = ("body", joint.bodies[0]) if slot else (joint.bodies[1], "body")
-            if body != "ground":
-                outputs[f"force_{name}_on_{body}"] = JointForceOutput(name, body, frames[0])
-                outputs[f"moment_{name}_on_{body}"] = JointTorqueOutput(name, body, frames[1], point)
+            outputs[f"force_{name}_on_{body}"] = JointForceOutput(name, body, frames[0])
+            outputs[f"moment_{name}_on_{body}"] = JointTorqueOutput(name, body, frames[1], point)
     for name, driver in mechanism.drivers.items():
         turning = is_turning(driver)
         outputs[f"drive_{name}"] = (DriverTorqueOutput if turning else DriverForceOutput)(name)
         outputs[f"driven_{name}"] = (jn.DriverAngleOutput if turning else jn.DriverDisplacementOutput)(name)
+    for name, force in mechanism.forces.items():
+        if len(force.bodies) > 1:
+            outputs[f"force_{name}_on_{force.bodies[0]}"] = JointForceOutput(name, force.bodies[0], force.bodies[1])
+            outputs[f"moment_{name}_on_{force.bodies[1]}"] = JointTorqueOutput(name, point=point)
+    outputs |= {"ground": GroundForceOutput(), "ground_torque": GroundTorqueOutput(point)}
     body = next(iter(mechanism.bodies))
     outputs |= {f"{kind.__name__}": kind() for kind in ENERGIES} | {
         f"{kind.__name__}": kind(body=body) for kind in ENERGIES_OF_A_BODY

@@ -143,6 +143,13 @@ def _is_ours(kind: type[Any]) -> bool:
     return kind.__module__.partition(".")[0] == __name__.partition(".")[0]
 
 
+def by_ratio_alone(element: AbstractConstraint) -> bool:
+    """Tell whether a joint couples moving bodies by a ratio and nothing else: it does not say where its teeth touch."""
+    fields = value_fields(type(element))
+    given = "ratio" in fields and getattr(element, "ratio", None) is not None and element.role != "driver"
+    return given and len({*element.bodies} - {"ground"}) > 1 and not any(name.startswith("point") for name in fields)
+
+
 def check_bodies(element: Any, counts: tuple[int, ...], does: str = "joins", must: str = "join") -> None:
     """Raise MechanismError unless a joint, driver, force or output has as many bodies as it needs, all different."""
     name = getattr(element, "type_name", "") or type(element).__name__

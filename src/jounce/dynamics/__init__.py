@@ -41,6 +41,8 @@ from jounce.dynamics.outputs import (
     AppliedTorqueOutput as AppliedTorqueOutput,
     DriverForceOutput as DriverForceOutput,
     DriverTorqueOutput as DriverTorqueOutput,
+    GroundForceOutput as GroundForceOutput,
+    GroundTorqueOutput as GroundTorqueOutput,
     JointForceOutput as JointForceOutput,
     JointTorqueOutput as JointTorqueOutput,
 )
@@ -49,6 +51,7 @@ from jounce.dynamics.reactions import (
     Reaction as Reaction,
     applied_force as applied_force,
     driver_force as driver_force,
+    ground_reaction as ground_reaction,
     joint_reaction as joint_reaction,
 )
 from jounce.dynamics.small_motions import linearise as linearise

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.forward import Lanes, Rows
-from jounce.dynamics.inverse import ElementIndex, MotionForces, element_indices
+from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.loads import mass_matrices
 from jounce.dynamics.masses import Masses, masses_of
 from jounce.dynamics.mechanism_state import MotionAtState, at_state
@@ -28,6 +28,7 @@ from jounce.kinematics.chunks import in_chunks
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism
+from jounce.mechanism.element_indices import ElementIndex, element_indices
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose

@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from jounce.dynamics.energies import body_energy
 from jounce.dynamics.forward import Lanes
-from jounce.dynamics.inverse import MotionForces, element_indices
+from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import Masses, required_masses
 from jounce.dynamics.motion_values import Coordinates, cut, labelled, pose_of
 from jounce.errors import MechanismError
@@ -28,6 +28,7 @@ from jounce.kinematics.chunks import in_chunks
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.factors import Factor, factored
 from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.element_indices import element_indices
 from jounce.mechanism.system import System
 from jounce.modules import Module
 from jounce.rigid.pose import Pose

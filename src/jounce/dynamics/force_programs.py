@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 from jaxtyping import Float
 
 from jounce.dynamics import constraint_forces, redundant_forces
@@ -19,13 +20,13 @@ from jounce.dynamics.loads import loads, mass_matrices
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.dynamics.motion_values import Coordinates, in_lots, part_of, pose_of
 from jounce.jet import Jet, cross
-from jounce.jet.algebra import stacked
+from jounce.jet.algebra import stacked, total
 from jounce.kinematics.compilation import compiled
-from jounce.kinematics.jacobian_series import slopes
+from jounce.kinematics.jacobian_series import along_displacements, slopes
 from jounce.kinematics.side_by_side import Prepared, SideBySide
 from jounce.kinematics.store import is_wanted_soon
 from jounce.mechanism.axis_angles import with_turns
-from jounce.mechanism.system import Group, System, with_rows
+from jounce.mechanism.system import Group, System, movable, with_rows
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
@@ -149,10 +150,44 @@ def applied(force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type
     return stacked(with_rows(found))
 
 
+@compiled("pose_type", "slot", "levels", brief=True)
+def force_slopes(
+    force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
+) -> Any:
+    """Return how far applied forces act along as the body in a slot is displaced, as `slopes` does for residuals."""
+    time = Jet.variable(instants[None], levels - 1)
+    built = tuple(movable(pose_of(pose, pose_type, levels - 1)) for pose in poses)
+    still = [jax.tree.map(jnp.zeros_like, pose) for pose in built]
+
+    def acting(change: Any) -> Any:
+        changes = (*still[:slot], change, *still[slot + 1 :])
+        return stacked(with_rows(force.variation(built, changes, time)))
+
+    return along_displacements(built[slot], acting)
+
+
 @compiled(brief=True)
 def wrenches(slope: Slope, forces: Multipliers) -> Any:
     """Return what joints do to the body in a slot: force, global, and moment about its origin, in its axes."""
     return constraint_forces.wrench(slope, forces)
+
+
+@compiled("pose_type", brief=True)
+def passed_on(
+    works: Sequence[Float[Numbers, "levels coordinate batch"]],
+    bodies: Sequence[Coordinates],
+    point: Float[Numbers, "component 1 1"],
+    pose_type: type[Pose],
+) -> Any:
+    """Return the counterpart of what acts on some bodies: force, and moment about a point, both global."""
+    order, found = len(works[0]) - 1, []
+    for work, body in zip(works, bodies, strict=True):
+        pose = pose_of(body, pose_type, order)
+        force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))
+        lever = cross(pose.position - point, force)
+        moment = moment + lever[None] if pose.turns == 1 else pose.direction(moment) + lever
+        found.append(jnp.concatenate([stacked(force), stacked(moment)], axis=1)[:, :, 0])
+    return -total(found)
 
 
 @compiled("pose_type", brief=True)

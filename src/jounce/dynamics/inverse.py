@@ -14,40 +14,17 @@ from jounce.dynamics.masses import check_loads, gravity_of, masses_of
 from jounce.dynamics.motion_values import along_motion, part_of
 from jounce.dynamics.redundant_forces import OPEN, OpenMultipliers
 from jounce.errors import MechanismError
+from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.change_points import spoiled
-from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import at_lanes, measures_angle
-from jounce.mechanism.builder import group_rows
+from jounce.mechanism.element_indices import ElementIndex, element_indices, force_names
 from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.redundant_reactions import resolved_reactions
-from jounce.mechanism.system import law_left_out
+from jounce.mechanism.system import Group, law_left_out
 from jounce.shapes import Numbers
 
-
-@dataclasses.dataclass(frozen=True)
-class ElementIndex:
-    """Where a joint or driver is among the groups of a system, and its group and itself among the rows."""
-
-    group: int
-    instance: int
-    rows: slice
-    own_rows: range
-
-
-def element_indices(model: Model) -> dict[str, ElementIndex]:
-    """Return the indices of all joints and drivers, by name."""
-    found = {}
-    for index, (group, rows) in enumerate(zip(model.system.groups, group_rows(model), strict=True)):
-        for instance, name in enumerate(model.rows[rows][: group.instances]):
-            own = range(rows.start + instance, rows.stop, group.instances)
-            found[name.partition(".")[2]] = ElementIndex(index, instance, rows, own)
-    return found
-
-
-def force_names(model: Model) -> list[str]:
-    """Return the names of the applied forces in the order of the groups of a model."""
-    return [name for members in model.forces for name in members]
+NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
 
 
 class MotionForces:
@@ -212,6 +189,11 @@ class MotionForces:
         groups = enumerate(self.model.system.groups)
         return [[self._slopes(index, slot, lanes) for slot in group.moving_slots] for index, group in groups]
 
+    def is_loaded(self, name: str) -> bool:
+        """Tell whether a joint or driver exerts anything anywhere in the motion."""
+        sizes = np.abs(np.nan_to_num(np.asarray(self.multipliers[0])))
+        return bool(sizes[list(self.indices[name].own_rows)].max(initial=0.0) > NOTHING * sizes.max(initial=0.0))
+
     def driver_force(self, name: str) -> Float[Numbers, "order 1 time"]:
         """Return what a driver exerts along what it prescribes, as Taylor coefficients."""
         place = self.indices[name]
@@ -223,17 +205,79 @@ class MotionForces:
 
         return self._once(chunk, "driver", place.group)[:, place.instance : place.instance + 1]
 
-    def wrench(self, name: str, slot: int) -> Float[Numbers, "order coordinate time"]:
-        """Return what a joint or driver does to the body in a slot, as Taylor coefficients.
+    def reaction(self, name: str, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
+        """Return what a joint, driver or applied force does to a body, as force and moment about a point of it.
+
+        What it does to all bodies together has no resultant, as it moves no mechanism as a whole. So the ground has
+        the counterpart of what the moving bodies have: also of a residual that tells more than relative poses, such
+        as a coordinate of one body, or a ratio of angles, as it is in the frame of the ground that these are measured.
+
+        Parameters
+        ----------
+        name : str
+            Of the joint, driver or force.
+        body, frame : int
+            Indices of the body and of the one in whose axes the result is wanted: 0 is the ground, None global.
+        point : array of shape (c,)
+            In the frame of the body, m.
+
+        Returns
+        -------
+        tuple of two arrays of shape (levels, components, time)
+            Taylor coefficients.
+        """
+        joined = enumerate(self._bodies_of(name))
+        if body:
+            work = total(self._wrench(name, slot) for slot, its in joined if its == body)
+            return self._expressed(work, body, frame, point)
+        moving = {slot: its for slot, its in joined if its}
+        works = [self._wrench(name, slot) for slot in moving]
+
+        def chunk(lanes: np.ndarray) -> Any:
+            poses = [self.coordinates_at((its,), lanes, self.levels) for its in moving.values()]
+            return programs.passed_on([w[..., lanes] for w in works], poses, point[:, None, None], self.pose_type)
+
+        return self._expressed(self.in_chunks(chunk), 0, frame, np.zeros_like(point))
+
+    def point_of(self, name: str, body: int) -> Float[Numbers, " component"]:
+        """Return the point of a joint, driver or force on a body, or the origin of the body where it has none there."""
+        group, instance = self._member(name)
+        slots = [slot for slot, its in enumerate(group.bodies) if its[instance] == body]
+        names = [f"point_{'ijmn'[slot : slot + 1]}" for slot in slots[:1]] + ["point"] * (len(group.bodies) == 1)
+        given = [value for key in names if (value := getattr(group.element, key, None)) is not None]
+        size = self.pose_type.shifts
+        return given[0].reshape(size, -1)[:, instance] if given else np.zeros(size)
+
+    def _bodies_of(self, name: str) -> tuple[int, ...]:
+        """Return the indices of the bodies of a joint, driver or force in their order; 0 is the ground."""
+        group, instance = self._member(name)
+        return tuple(slot[instance] for slot in group.bodies)
+
+    def _member(self, name: str) -> tuple[Group, int]:
+        """Return the group of a joint, driver or force, and which of it that is."""
+        if place := self.indices.get(name):
+            return self.model.system.groups[place.group], place.instance
+        index, instance = self._force_index(name)
+        return self.model.system.forces[index], instance
+
+    def _wrench(self, name: str, slot: int) -> Float[Numbers, "order coordinate time"]:
+        """Return what a joint, driver or force does to the body in a slot, as Taylor coefficients.
 
         Force, global, and moment about the origin of the body, in its axes.
         """
-        place = self.indices[name]
+        place = self.indices.get(name)
+        index, instance = self._force_index(name) if place is None else (place.group, place.instance)
 
-        def chunk(lanes: np.ndarray) -> Any:
-            return programs.wrenches(self._slopes(place.group, slot, lanes), self._of_group(place)[..., lanes])
+        def of_constraint(lanes: np.ndarray) -> Any:
+            return programs.wrenches(self._slopes(index, slot, lanes), self._of_group(place)[..., lanes])
 
-        return self._once(chunk, "joint", place.group, slot)[:, :, place.instance]
+        def of_force(lanes: np.ndarray) -> Any:
+            element, poses, instants = self._acting(index, lanes, self.levels)
+            slope = programs.force_slopes(element, poses, instants, self.pose_type, slot, self.levels)
+            return programs.wrenches(slope, -self._sizes(index)[..., lanes])  # a residual is held against
+
+        kind, chunk = ("force", of_force) if place is None else ("joint", of_constraint)
+        return self._once(chunk, kind, index, slot)[:, :, instance]
 
     def applied_force(self, name: str) -> Numbers:
         """Return an applied force, as Taylor coefficients, (levels, components, time)."""
@@ -271,14 +315,26 @@ class MotionForces:
         raise MechanismError(f"has {at}; {advice}", name=name)
 
     def _applied_force(self, name: str) -> Float[Numbers, "order component time"]:
-        index = next(k for k, names in enumerate(self.model.forces) if name in names)
+        index, instance = self._force_index(name)
+        return self._sizes(index)[:, :, instance]
+
+    def _force_index(self, name: str) -> tuple[int, int]:
+        """Return the group of an applied force, and which of it the force is."""
+        return next((k, names.index(name)) for k, names in enumerate(self.model.forces) if name in names)
+
+    def _sizes(self, index: int) -> Float[Numbers, "order component instance time"]:
+        """Return the applied forces of a group, as Taylor coefficients."""
 
         def chunk(lanes: np.ndarray) -> Any:
-            (group,) = at_lanes((self.motion.forces[index],), lanes)
-            poses = tuple(self.coordinates_at(slot, lanes, self.levels + 1) for slot in group.bodies)
-            return programs.applied(group.element, poses, self.motion.time[lanes], self.pose_type, self.levels)
+            return programs.applied(*self._acting(index, lanes, self.levels + 1), self.pose_type, self.levels)
 
-        return self._once(chunk, "force", index)[:, :, self.model.forces[index].index(name)]
+        return self._once(chunk, "size", index)
+
+    def _acting(self, index: int, lanes: np.ndarray, levels: int) -> tuple[Any, tuple[dict[str, Any], ...], Any]:
+        """Return the forces of a group, where their bodies are to a number of coefficients, and the instants."""
+        (group,) = at_lanes((self.motion.forces[index],), lanes)
+        poses = tuple(self.coordinates_at(slot, lanes, levels) for slot in group.bodies)
+        return group.element, poses, self.motion.time[lanes]
 
     def _once(self, chunk: Callable[[np.ndarray], Any], *key: Any) -> Numbers:
         """Return what a function of indices of instants gives for all of them, kept by a key."""
@@ -286,7 +342,7 @@ class MotionForces:
             self._kept[key] = self.in_chunks(chunk)
         return self._kept[key]
 
-    def expressed(self, work: Numbers, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
+    def _expressed(self, work: Numbers, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
         """Return a wrench on a body as force and moment about a point of it, (levels, components, time).
 
         Parameters

@@ -1,19 +1,22 @@
 """Forces as outputs: of drivers along what they prescribe, of joints on their bodies, and applied ones, with rates."""
 
+from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
 
 import equinox as eqx
 import numpy as np
 
-from jounce.constraints.base import Vector
+from jounce.constraints.base import Vector, by_ratio_alone
 from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_choice, check_name, did_you_mean
+from jounce.forces import AbstractForce
 from jounce.kinematics import Motion, Status
 from jounce.mechanism import AbstractMotionOutput, Mechanism
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve_element
+from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.shapes import ArrayLike, Numbers
 from jounce.trajectory import FollowingMotion
 
@@ -31,7 +34,7 @@ class AbstractForceOutput(AbstractMotionOutput):
 
     def check(self, mechanism: Mechanism) -> None:
         """Raise MechanismError unless the mechanism has what is named, and masses or applied forces."""
-        kinds = {"driver": ("drivers",), "joint": ("joints", "drivers"), "force": ("forces",)}[self.source]
+        kinds = {"driver": ("drivers",), "joint": ("joints", "drivers", "forces"), "force": ("forces",)}[self.source]
         known = {name: element for kind in kinds for name, element in getattr(mechanism, kind).items()}
         name = getattr(self, self.source)
         check_name(self.source, name, known, MechanismError, name=self.source)
@@ -112,31 +115,57 @@ class _JointOutput(AbstractForceOutput):
 
     source = "joint"
 
-    def _check_named(self, element):
-        if self.body is not None and self.body not in element.bodies:
-            message = f"is not joined by '{self.joint}'; {did_you_mean(self.body, element.bodies)}"
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless the mechanism has the joint, its body and masses or applied forces."""
+        super().check(mechanism)
+        element = _exerting(mechanism, self.joint)
+        felt = element.bodies if _is_load(element) else (*element.bodies, GROUND)
+        if self.body is not None and self.body not in felt:
+            message = f"is not joined by '{self.joint}'; {did_you_mean(self.body, felt)}"
             raise MechanismError(message, name="body", value=self.body)
-        check_choice("frame", self.frame, ("global", "body", *element.bodies), MechanismError)
+        check_choice("frame", self.frame, ("global", "body", *dict.fromkeys(felt)), MechanismError)
 
-    def _wrench(self, forces: MotionForces, mechanism: Mechanism, point: ArrayLike | None) -> tuple[Numbers, Numbers]:
-        """Return force and moment about a point of the body, with rates; about that of the joint unless given."""
-        element = {**mechanism.joints, **mechanism.drivers}[self.joint]
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN, and which gears load no bearing of their bodies."""
+        joints = motion.mechanism.joints
+        bodies = {*_exerting(motion.mechanism, self.joint).bodies} - {GROUND}
+        gears = [name for name, x in joints.items() if by_ratio_alone(x) and bodies & {*x.bodies}]
+        loaded = [name for name in gears if MotionForces.of(motion).is_loaded(name)]
+        return "; ".join(filter(None, (super().remark(motion, values), ratio_words(loaded))))
+
+    def _values(self, motion: Motion, point: ArrayLike | None, part: int, size: float) -> Numbers:
+        """Return force or moment about a point of the body, with rates; about that of the joint unless given."""
+        mechanism, forces = motion.mechanism, MotionForces.of(motion)
+        element = _exerting(mechanism, self.joint)
         body = element.bodies[min(1, len(element.bodies) - 1)] if self.body is None else self.body
-        slot = element.bodies.index(body)
         index = [GROUND, *mechanism.bodies].index
         frame = {"global": None, "body": body}.get(self.frame, self.frame)
-        if point is None:
-            place = forces.indices[self.joint]
-            fixed = getattr(forces.model.system.groups[place.group].element, f"point_{'ijmn'[slot : slot + 1]}", None)
-            size = forces.pose_type.shifts
-            point = np.zeros(size) if fixed is None else fixed.reshape(size, -1)[:, place.instance]
-        place_on_body: Any = point
-        work = forces.wrench(self.joint, slot)
-        return forces.expressed(work, index(body), None if frame is None else index(frame), place_on_body)
+        about: Any = forces.point_of(self.joint, index(body)) if point is None else point
+
+        def found(forces: MotionForces) -> Numbers:
+            return forces.reaction(self.joint, index(body), None if frame is None else index(frame), about)[part]
+
+        return found(forces) if isinstance(element, AbstractForce) else forces.unique(found, size)
+
+
+def ratio_words(names: Sequence[str]) -> str:
+    """Say of joints that are given by a ratio alone what their reactions leave out; nothing where there are none."""
+    verb = "is" if len(names) == 1 else "are"
+    return f"{', '.join(names)} {verb} given by a ratio alone: bearings show no tooth forces" if names else ""
+
+
+def _exerting(mechanism: Mechanism, name: str) -> Any:
+    """Return the joint or driver of a name, or the applied force if there is none."""
+    return {**mechanism.forces, **mechanism.joints, **mechanism.drivers}[name]
+
+
+def _is_load(element: Any) -> bool:
+    """Tell whether a force comes from outside: it acts on one body, and on nothing else in turn."""
+    return isinstance(element, AbstractForce) and len(element.bodies) == 1
 
 
 class JointForceOutput(_JointOutput):
-    """Reaction force of a joint, or of a driver, on one of its bodies, N."""
+    """Reaction force of a joint, driver or force between bodies on one of its bodies, or on the ground, N."""
 
     unit = "N"
     rate_names = ("force", *RATES)
@@ -148,11 +177,11 @@ class JointForceOutput(_JointOutput):
 
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
-        return MotionForces.of(motion).unique(lambda forces: self._wrench(forces, motion.mechanism, None)[0])
+        return self._values(motion, None, 0, 1.0)
 
 
 class JointTorqueOutput(_JointOutput):
-    """Reaction torque of a joint, or of a driver, on one of its bodies, about a point of that body, N m.
+    """Reaction torque of a joint, driver or force on one of its bodies, or the ground, about a point of that body, N m.
 
     The point is that of the joint unless given, or the origin of the body where the joint has none there.
     """
@@ -169,11 +198,65 @@ class JointTorqueOutput(_JointOutput):
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the torque, (levels, components, time)."""
         mechanism = motion.mechanism
-        components = 2 if mechanism.space == "planar" else 3
+        components = POSITION_COMPONENTS[mechanism.space]
         values = resolve_element(self, mechanism.parameter_values, components, f"outputs.{self.joint}")
-        return MotionForces.of(motion).unique(
-            lambda forces: self._wrench(forces, mechanism, values["point"])[1], motion.model.length
-        )
+        return self._values(motion, values["point"], 1, motion.model.length)
+
+
+class _GroundOutput(AbstractForceOutput):
+    source = "mechanism"  # the key of a file that says what it is of
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless there are masses or applied forces."""
+        check_loads(mechanism, self.source)
+
+    def _values(self, motion: Motion, point: ArrayLike, part: int, size: float) -> Numbers:
+        """Return total force or moment about a point of the ground, with rates."""
+        mechanism, forces, about = motion.mechanism, MotionForces.of(motion), np.asarray(point)
+        between = [name for name, force in mechanism.forces.items() if not _is_load(force)]
+
+        def found(forces: MotionForces, names: Iterable[str]) -> Numbers:
+            start = np.zeros((forces.levels, (forces.pose_type.shifts, forces.pose_type.turns)[part], len(motion.time)))
+            return sum((forces.reaction(name, 0, None, about)[part] for name in names), start)
+
+        constraints = (*mechanism.joints, *mechanism.drivers)
+        return forces.unique(lambda f: found(f, constraints), size) + found(forces, between)
+
+
+class GroundForceOutput(_GroundOutput):
+    """Total force of a mechanism on the ground, N: of all joints, drivers and forces between bodies (shaking force)."""
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell that the force has components."""
+        del mechanism
+        return True
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the force, (levels, components, time)."""
+        return self._values(motion, np.zeros(len(self.component_labels(motion.mechanism))), 0, 1.0)
+
+
+class GroundTorqueOutput(_GroundOutput):
+    """Total torque of a mechanism on the ground about one of its points, N m (shaking moment)."""
+
+    point: Vector = None  # m; the origin unless given
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)
+
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell whether the torque has components: in space."""
+        return mechanism.space == "spatial"
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the torque, (levels, components, time)."""
+        mechanism = motion.mechanism
+        components = POSITION_COMPONENTS[mechanism.space]
+        point = resolve_element(self, mechanism.parameter_values, components, "outputs.ground")["point"]
+        return self._values(motion, np.zeros(components) if point is None else point, 1, motion.model.length)
 
 
 class _AppliedOutput(AbstractForceOutput):

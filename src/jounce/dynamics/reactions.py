@@ -10,6 +10,8 @@ from jounce.dynamics.outputs import (
     AppliedTorqueOutput,
     DriverForceOutput,
     DriverTorqueOutput,
+    GroundForceOutput,
+    GroundTorqueOutput,
     JointForceOutput,
     JointTorqueOutput,
     is_turning,
@@ -97,14 +99,17 @@ def joint_reaction(
 ) -> Reaction:
     """Return the force and torque that a joint, or a driver, exerts on one of its bodies, with rates.
 
+    All that it exerts has no resultant. What its bodies lack of that is on the ground: a coordinate of one body and a
+    ratio of angles are measured there, so that a joint that is given by these has reactions on the ground too.
+
     Parameters
     ----------
     motion : Motion
         Of a mechanism with masses or applied forces.
     name : str
-        Name of the joint, or of the driver.
+        Name of the joint, of the driver, or of an applied force between bodies.
     body : str, optional
-        On which body; the second one of the joint unless given. ``"ground"`` if the joint stands on it.
+        On which body; the second one of the joint unless given. ``"ground"`` is one of each.
     frame : str, default "global"
         In whose axes: ``"global"``, ``"body"`` (that on which it acts), or the name of a body of the joint. The rates
         are those of the components in these axes.
@@ -124,7 +129,7 @@ def joint_reaction(
     Raises
     ------
     MechanismError
-        If no joint has this name, the body or the frame is not one of its own, or nothing has a mass.
+        If no joint, driver or force has this name, the body or the frame is not one of its own, or nothing has a mass.
 
     Examples
     --------
@@ -145,6 +150,54 @@ def joint_reaction(
     torque = JointTorqueOutput(name, body, frame, point)
     chosen = _choosing(motion, redundant)
     return Reaction(chosen.evaluate(force, name), chosen.evaluate(torque, name))
+
+
+def ground_reaction(
+    motion: Motion, point: ArrayLike | None = None, *, redundant: RedundantReactions | None = None
+) -> Reaction:
+    """Return the total force and torque of a mechanism on the ground, with rates: shaking force and shaking moment.
+
+    They are those of all joints, drivers and forces between bodies. With weights and loads from outside they are what
+    the momentum of the bodies lacks: its rate is weights and loads less this force.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism with masses or applied forces.
+    point : sequence, optional
+        About which point of the ground the torque is taken, m; the origin unless given.
+    redundant : str or mapping, optional
+        As of `joint_reaction`. Where reactions are not unique, their total may be.
+
+    Returns
+    -------
+    Reaction
+        Force and torque, two orders shorter than the motion.
+
+    Raises
+    ------
+    MechanismError
+        If nothing in the mechanism has a mass and no force is applied.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> lift = jn.Mechanism(
+    ...     space="planar",
+    ...     gravity=[0, -10.0],
+    ...     bodies={"lift": jn.Body([0, 0], mass=2.0, inertia=0.1)},
+    ...     joints={"guide": jn.planar.Prismatic(("ground", "lift"), [0, 0], [0, 0], [0, 1], [0, 1])},
+    ...     drivers={"motor": jn.drivers.CoordinateDriver(("ground", "lift"), "y", motion="t**3")},
+    ... )
+    >>> shaking = jn.ground_reaction(jn.solve(lift, [1.0], order=4))
+    >>> shaking.force.sel(component="y").values.round(12).tolist()  # -2 kg (10 + 6 t) m/s^2
+    [[-32.0, -12.0, 0.0]]
+    """
+    check_motion(motion)
+    chosen = _choosing(motion, redundant)
+    return Reaction(
+        chosen.evaluate(GroundForceOutput(), "ground"), chosen.evaluate(GroundTorqueOutput(point=point), "ground")
+    )
 
 
 def _choosing(motion: Motion, redundant: RedundantReactions | None) -> Motion:

@@ -14,12 +14,12 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.forward import Equations
-from jounce.dynamics.inverse import element_indices
 from jounce.dynamics.variations import LEVELS, law_variations, loads_at, masses_at, output_variations, variations
 from jounce.errors import MechanismError, check_name
 from jounce.kinematics.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.element_indices import element_indices
 
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "turn_x", "turn_y", "turn_z")}
 TIE = 0.99  # of the largest: candidates as good as that are taken in the order of the mechanism

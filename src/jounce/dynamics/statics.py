@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.forward import Equations
-from jounce.dynamics.inverse import force_names
 from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.dynamics.reduction import Place
 from jounce.dynamics.start import TOLERANCE
@@ -22,6 +21,7 @@ from jounce.kinematics.host_jacobian import RANK_TOLERANCE
 from jounce.kinematics.initial_turns import Coordinates
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.builder import pose_at, with_reference
+from jounce.mechanism.element_indices import force_names
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers

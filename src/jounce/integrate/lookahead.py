@@ -14,7 +14,6 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.forward import Equations, Flags, Indices, Inverse, Lanes, State, with_ground
-from jounce.dynamics.inverse import force_names
 from jounce.integrate.events import INTERPOLATION, NODES
 from jounce.integrate.methods import evaluated
 from jounce.integrate.turns import Angles
@@ -22,6 +21,7 @@ from jounce.jet import Jet
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.element_indices import force_names
 from jounce.mechanism.system import Group
 from jounce.shapes import Numbers
 

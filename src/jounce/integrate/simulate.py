@@ -10,7 +10,6 @@ from jaxtyping import Bool
 
 from jounce.constraints import AbstractConstraint
 from jounce.dynamics.forward import Equations, Instants, State
-from jounce.dynamics.inverse import force_names
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
@@ -30,6 +29,7 @@ from jounce.kinematics.compilation import compiled
 from jounce.kinematics.motion import check_output, output_group
 from jounce.kinematics.store import expect
 from jounce.mechanism import Mechanism, check_mechanism
+from jounce.mechanism.element_indices import force_names
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete_or
 from jounce.mechanism.time import TimeLike

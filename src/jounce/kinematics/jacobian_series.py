@@ -47,16 +47,29 @@ def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: 
         Taylor coefficients of the derivatives by a shift in global axes, m, and by a turn in axes of the body, rad.
     """
     body = movable(poses[slot].truncate(time.order))
-    shape, size = body.position.shape[1:], body.shifts + body.turns
 
     def residual(pose: Any) -> Any:
         return stacked(with_rows(element.residual(*poses[:slot], pose, *poses[slot + 1 :], time)))
 
+    return along_displacements(body, lambda change: jax.jvp(residual, (body,), (change,))[1])
+
+
+def along_displacements(body: Any, changed: Callable[[Any], Any]) -> Slope:
+    """Return how jets change, shape (order + 1, rows, instances, batch), with each displacement of a body in turn.
+
+    Parameters
+    ----------
+    body : SpatialPose or PlanarPose
+        That is displaced, as `movable` gives it, shape (..., instances, batch).
+    changed : callable
+        Maps a change of the pose to that of the jets.
+    """
+    shape, size, order = body.position.shape[1:], body.shifts + body.turns, body.order
+
     def along(direction: Any) -> Any:
         unit = jnp.broadcast_to(direction[:, None, None], (size, *shape))
-        shift, turn = (Jet.constant(part, time.order).dense() for part in (unit[: body.shifts], unit[body.shifts :]))
-        change = movable(body.varied(shift, turn).truncate(time.order))
-        return jax.jvp(residual, (body,), (jax.lax.optimization_barrier(change),))[1]
+        shift, turn = (Jet.constant(part, order).dense() for part in (unit[: body.shifts], unit[body.shifts :]))
+        return changed(jax.lax.optimization_barrier(movable(body.varied(shift, turn).truncate(order))))
 
     return jnp.moveaxis(jax.vmap(along)(jnp.eye(size)), 0, 1)
 

@@ -9,7 +9,8 @@ from typing import Any, Literal, NotRequired
 import numpy as np
 from typing_extensions import TypedDict
 
-from jounce.constraints.base import value_fields
+from jounce.constraints.base import by_ratio_alone, value_fields
+from jounce.dynamics.outputs import ratio_words
 from jounce.errors import JounceError
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.keys import OUTPUTS, output_holder
@@ -119,6 +120,7 @@ class InspectedMechanism(MechanismFacts):
     laws: list[LawFacts]
     assembly: AssemblyFacts
     ok: bool
+    remarks: list[str]
     range: NotRequired[RangeFacts | None]
 
 
@@ -179,7 +181,16 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
         "laws": laws,
         "assembly": state.assembly,
         "ok": state.ok,
+        "remarks": _remarks(mechanism),
     }
+
+
+def _remarks(mechanism: Mechanism) -> list[str]:
+    """Return what is to be said of forces: what reactions leave out."""
+    if not mechanism.forces and all(body.mass is None for body in mechanism.bodies.values()):
+        return []
+    words = ratio_words([name for name, joint in mechanism.joints.items() if by_ratio_alone(joint)])
+    return [words] if words else []
 
 
 def _time(mechanism: Mechanism) -> dict[str, Any] | None:

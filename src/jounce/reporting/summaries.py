@@ -105,7 +105,7 @@ def _mechanism_start(facts: Facts) -> list[str]:
         lines.append(f"  time: {count(time['count'], 'instant')} from {time['start']:g} s to {time['stop']:g} s")
     else:
         lines.append("  no time grid is given")
-    lines += [f"  {line}" for line in law_words(facts["laws"])]
+    lines += [f"  {line}" for line in (*law_words(facts["laws"]), *facts["remarks"])]
     if freedom["message"] and facts["ok"] and freedom["left"]:
         lines.append("  it has degrees of freedom left: jounce simulate moves it by its forces")
     elif freedom["message"]:

@@ -116,6 +116,8 @@ OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
     ("force", dynamics.JointForceOutput),
     ("reaction", dynamics.JointForceOutput),
     ("torque", dynamics.JointTorqueOutput),
+    ("reaction", dynamics.GroundForceOutput),
+    ("torque", dynamics.GroundTorqueOutput),
     ("force", dynamics.AppliedForceOutput),
     ("torque", dynamics.AppliedTorqueOutput),
     *ENERGY_OUTPUTS,
