@@ -103,6 +103,12 @@ class FollowedTrajectory:
             raise TrajectoryError(f"{message}; choose another law there", name=self.robot.joint_names[joint])
 
 
+def told_drives(drives: bool) -> str:
+    """Return in words what torques of a robot contain."""
+    kinds = "armature, damping and friction"
+    return f"{kinds}, as far as the robot file has them" if drives else f"the bare bodies, without {kinds}"
+
+
 def trajectory_torques(
     robot: Robot, trajectory: JointTrajectory, rates: int = 0, *, times: ArrayLike | None = None, drives: bool = True
 ) -> "xarray.Dataset":
@@ -161,7 +167,9 @@ def trajectory_torques(
         for k, name in enumerate(robot.joint_names)
     }
     axes = {"time": ("time", instants, {"units": "s", "long_name": "time"}), "derivative": np.arange(rates + 1)}
-    return xarray.Dataset(variables, coords=axes, attrs={"title": robot.name, "source": "jounce"})
+    return xarray.Dataset(
+        variables, coords=axes, attrs={"title": robot.name, "source": "jounce", "drives": told_drives(drives)}
+    )
 
 
 def _in_blocks(function: Callable[[np.ndarray], Any], values: np.ndarray) -> np.ndarray:
