@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError
 from jounce.io.robots.faults import Faults
+from jounce.io.robots.followers import with_room
 from jounce.io.robots.named_elements import NamedElements
 from jounce.io.robots.sdf_joints import AXIS_TAGS, SdfJoint, read_joint
 from jounce.io.robots.sdf_left_out import note_left_out
@@ -178,7 +179,8 @@ class _Reader:
         upright = self.place.then(self._place(base)).rotation if base != WORLD else np.eye(3)
         gravity = upright.T @ gravity_of(self.world, elements, inertias)
         try:
-            return Robot(name, self.links, self.joints, gravity, closures, strict=False)
+            joints = with_room(self.joints, self.faults, self.lines.placed)
+            return Robot(name, self.links, joints, gravity, closures, strict=False)
         except RobotError as error:
             raise self.lines.placed(error) from None
 

@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError, RobotFileError, did_you_mean, no_such
 from jounce.io.robots.faults import FOLLOWS_NONE, IDLE, MASSLESS, Faults, left_out
+from jounce.io.robots.followers import with_room
 from jounce.io.robots.named_elements import NamedElements
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
@@ -79,6 +80,7 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
             for part in expanded:
                 lines.add(element, "joints", part.name)
         ordered(_distinct("links", made, root), _distinct("joints", parts, root))
+        parts = with_room(parts, faults, lines.placed)
         robot = Robot(root.attributes.get("name", "robot"), made, parts, strict=False)
         _check_masses(robot, joints, links, faults, massless)
         return robot
@@ -90,7 +92,7 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
 
 def _add_joint(lines: NamedElements, element: Element, name: str) -> None:
     lines.add(element, "joints", name)
-    for tag in ("parent", "child", "axis", "mimic"):
+    for tag in ("parent", "child", "axis", "mimic", "limit"):
         lines.add(element.first(tag), "joints", name, tag)
     for key in ("damping", "friction"):
         lines.add(element.first("dynamics"), "joints", name, key)
