@@ -52,8 +52,8 @@ def with_room(
             against = f" beside {', '.join(beside)}" if joint in rest else ""
             message = (
                 f"its range leaves {leader.name}, which it follows, {low:.6g} to {high:.6g} of "
-                f"{own[0]:.6g} to {own[1]:.6g}{against}: no room to move; correct the limits or the multiplier, or read "
-                "the file without strict"
+                f"{own[0]:.6g} to {own[1]:.6g}{against}: no room to move; correct the limits or the multiplier, "
+                "or read the file without strict"
             )
             error = RobotError(message, name=f"joints.{joint.name}.limit")
             faults.leave_out(NO_ROOM, f"{joint.name}, which follows {leader.name}", placed(error))
