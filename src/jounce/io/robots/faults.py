@@ -16,8 +16,8 @@ HEADINGS = {
     WITHOUT_MASS: "moments of inertia have no mass beside them",
 }
 JOINT_SPRINGS = "springs of joints"
-BALLS = "ball constraints between links"
-BUSHINGS = "bushings between links"
+BALLS = "<drake:ball_constraint> between links"
+BUSHINGS = "<drake:linear_bushing_rpy> between links"
 ROTORS = "inertia of the rotors of drives"
 WEIGHTLESS = "gravity that is switched off for links"
 MASS_OF_SHAPES = "masses that follow from shapes, or from a total mass"

@@ -27,10 +27,10 @@ from jounce.io.robots.xml_elements import Element
 from jounce.robot.model import Joint
 from jounce.robot.robot import Robot
 
-LOOPS = "joints that close a loop"
+LOOPS = "<loop_joint>, which closes a loop"
 IN_GAZEBO = "links and joints that <gazebo> adds"
 PLUGINS = "joints that follow others by a plugin"
-FORCE_ELEMENTS = "force elements"
+FORCE_ELEMENTS = "<force_element>, which is a force"
 QUATERNIONS = "quat_xyzw, of which the version of this file knows nothing"
 OF_MUJOCO = "what <mujoco> says of gravity and fluids"
 OF_FILE = {
