@@ -18,6 +18,7 @@ HEADINGS = {
 JOINT_SPRINGS = "springs of joints"
 BALLS = "<drake:ball_constraint> between links"
 BUSHINGS = "<drake:linear_bushing_rpy> between links"
+PLUGINS = "joints that follow others by a plugin"
 ROTORS = "inertia of the rotors of drives"
 WEIGHTLESS = "gravity that is switched off for links"
 MASS_OF_SHAPES = "masses that follow from shapes, or from a total mass"

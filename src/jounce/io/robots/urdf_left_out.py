@@ -16,20 +16,20 @@ from jounce.io.robots.faults import (
     JOINT_SPRINGS,
     LEAVE,
     MASS_OF_SHAPES,
+    PLUGINS,
     ROTORS,
     WEIGHTLESS,
     Faults,
     left_out,
 )
 from jounce.io.robots.sdf_joints import RATIO, ROTOR
-from jounce.io.robots.sdf_left_out import DECAY, KINEMATIC, STATIC
+from jounce.io.robots.sdf_left_out import DECAY, KINEMATIC, STATIC, follower
 from jounce.io.robots.xml_elements import Element
 from jounce.robot.model import Joint
 from jounce.robot.robot import Robot
 
 LOOPS = "<loop_joint>, which closes a loop"
 IN_GAZEBO = "links and joints that <gazebo> adds"
-PLUGINS = "joints that follow others by a plugin"
 FORCE_ELEMENTS = "<force_element>, which is a force"
 QUATERNIONS = "quat_xyzw, of which the version of this file knows nothing"
 OF_MUJOCO = "what <mujoco> says of gravity and fluids"
@@ -59,10 +59,10 @@ def check_version(root: Element, faults: Faults) -> None:
         The version is none of those that there are, or something is left out and that is an error.
     """
     text = root.attributes.get("version", "1.0")
-    found = re.fullmatch(r"(\d+)\.(\d+)", text, re.ASCII)
+    found = re.fullmatch(r"(\d+)\.(\d+)", text.strip(), re.ASCII)
     if found is None or tuple(map(int, found.groups())) not in VERSIONS:
-        message = no_such("version", text, tuple(f"{major}.{minor}" for major, minor in VERSIONS), "version")
-        raise root.error(f"{message}; the file is read as its version says", "version", value=text)
+        valid = ", ".join(f"{major}.{minor}" for major, minor in VERSIONS)
+        raise root.error(f"there is no such version of URDF; valid: {valid}", "version", value=text)
     if tuple(map(int, found.groups())) > (1, 0):
         return
     for element in root.children:
@@ -193,7 +193,7 @@ def _of_gazebo(
         heading, bears, counts = table.get(part.tag, ("", False, _counts))
         if bears and counts(part):
             shown = about or part.attributes.get("name") or robot.name
-            yield heading, _follower(part) if part.tag == "plugin" else shown, part
+            yield heading, follower(part) if part.tag == "plugin" else shown, part
 
 
 def _counts(element: Element) -> bool:
@@ -204,13 +204,7 @@ def _counts(element: Element) -> bool:
         return True
 
 
-def _follower(plugin: Element) -> str:
-    part = plugin.first("mimicJoint")
-    return "" if part is None else part.content.strip()
-
-
 def _followed(plugin: Element, root: Element) -> bool:
     """Whether a plugin makes a joint follow another that does not do so by itself."""
-    joints = {joint.attributes.get("name"): joint for joint in root.every("joint")}
-    joint = joints.get(_follower(plugin))
+    joint = next((x for x in root.every("joint") if x.attributes.get("name") == follower(plugin)), None)
     return joint is not None and joint.first("mimic") is None
