@@ -263,7 +263,8 @@ def limits_with_followers(name: str, limits: Limits, followers: Iterable[Joint])
     lower, upper = common_range(ranges_at_leader(limits, followers))
     if not has_room(limits, followers):
         others = ", ".join(joint.name for joint in followers)
-        message = f"its range and those of {others}, which follow it, leave it no room to move; correct their limits"
+        word = "no coordinate" if lower > upper else "one coordinate alone"
+        message = f"{word} keeps the range of this joint and of those that follow it ({others}); correct their limits"
         raise RobotError(message, name=name, value=[lower, upper])
     slowing = any(own.deceleration is not None for own, _ in every)
     return dataclasses.replace(
