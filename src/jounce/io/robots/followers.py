@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from jounce.errors import RobotError, RobotFileError
 from jounce.io.robots.faults import Faults
@@ -13,7 +13,7 @@ NO_ROOM = "ranges of joints that leave the joint that they follow no room to mov
 
 
 def with_room(
-    joints: Sequence[Joint], faults: Faults, placed: Callable[[RobotError], RobotFileError], held: Sequence[str] = ()
+    joints: Sequence[Joint], faults: Faults, placed: Callable[[RobotError], RobotFileError], held: Collection[str] = ()
 ) -> list[Joint]:
     """Return the joints, those that leave the joint that they follow no room without their range.
 
@@ -29,7 +29,7 @@ def with_room(
         Takes the ranges that do not count.
     placed : callable
         Makes an error of the file of one of the robot, with the line of what it names.
-    held : sequence of str, optional
+    held : collection of str, optional
         Joints that are held in one place, whatever their range.
 
     Raises
