@@ -197,7 +197,7 @@ def cases(quick: bool) -> Cases:
 
     def case(what: str, order: int, *peers: Contestant) -> Case:
         given = np.ascontiguousarray(q[:, :order])
-        ours = Contestant("jounce", ready(lambda: jn.inverse_dynamics(robot, given)), error)
+        ours = Contestant("jounce", ready(lambda: jn.inverse_dynamics(robot, given, drives=False)), error)
         name = f"{what} of the panda, {samples:,} samples"
         return Case(name, [ours, *peers], count=samples, unit="sample", reference=REFERENCE)
 

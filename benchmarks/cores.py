@@ -30,7 +30,7 @@ def torques(samples: int, threads: int) -> Callable[[], Any]:
     from benchmarks.arm import arm, motion
 
     robot, (q, _) = arm(), motion(samples)
-    return _at_once(lambda: jn.inverse_dynamics(robot, q), threads)
+    return _at_once(lambda: jn.inverse_dynamics(robot, q, drives=False), threads)
 
 
 def derivation(rounds: int, threads: int) -> Callable[[], Any]:

@@ -56,21 +56,21 @@ def cases(quick: bool) -> Cases:
     """Yield accelerations alone, with two and with six rates, and those of chains."""
     robot, samples = arm(), 2000 if quick else 10_000
     q = motion(samples)[0]
-    torque = jn.inverse_dynamics(robot, q)
+    torque = jn.inverse_dynamics(robot, q, drives=False)
     state, alone = np.ascontiguousarray(q[:, :2]), np.ascontiguousarray(torque[:, :1])
 
     def error(found: Any) -> float:
         found = np.asarray(found)
         return largest_error(found if found.shape[1] < 2 else found[:, 2:], q[:, 2:])
 
-    ours = Contestant("jounce", ready(lambda: jn.forward_dynamics(robot, state, alone)), error)
+    ours = Contestant("jounce", ready(lambda: jn.forward_dynamics(robot, state, alone, drives=False)), error)
     python = Contestant(
         "Pinocchio, aba from Python", lambda: pinocchio_accelerations(state, alone), error, "pinocchio", aim=1.5
     )
     mujoco = Contestant("MuJoCo from Python", lambda: mujoco_accelerations(state, alone), error, "mujoco", extra="mjcf")
     name = f"acceleration of the panda from torques, {samples:,} samples"
     yield Case(name, [ours, python, mujoco], count=samples, unit="sample", reference=REFERENCE)
-    ours = Contestant("jounce", ready(lambda: jn.forward_dynamics(robot, state, torque)), error)
+    ours = Contestant("jounce", ready(lambda: jn.forward_dynamics(robot, state, torque, drives=False)), error)
     name = f"acceleration of the panda and two rates, {samples:,} samples"
     yield Case(name, [ours], count=samples, unit="sample", reference=REFERENCE)
     for count in JOINTS[:2] if quick else JOINTS:
@@ -80,11 +80,11 @@ def cases(quick: bool) -> Cases:
 def _chain(count: int, samples: int) -> Case:
     robot = random_robot(1, count, tree=False)
     q = np.random.default_rng(count).uniform(-1, 1, (samples, 3, count))
-    torque = jn.inverse_dynamics(robot, q)
+    torque = jn.inverse_dynamics(robot, q, drives=False)
 
     def error(found: Any) -> float:
         return largest_error(np.asarray(found), q)
 
-    ours = Contestant("jounce", ready(lambda: jn.forward_dynamics(robot, q[:, :2], torque)), error)
+    ours = Contestant("jounce", ready(lambda: jn.forward_dynamics(robot, q[:, :2], torque, drives=False)), error)
     name = f"acceleration of a chain of {count} joints, {samples:,} samples"
     return Case(name, [ours], count=samples, unit="sample", reference=REFERENCE)

@@ -70,8 +70,8 @@ def torques(samples: int, inside: bool) -> Callable[[], Any]:
     """Return what computes torques and two rates of the panda: as called, or within `jax.jit` on the device."""
     robot, (q, _) = arm(), motion(samples)
     if not inside:
-        return lambda: jn.inverse_dynamics(robot, q)
-    compiled, given = jax.jit(lambda q: jn.inverse_dynamics(robot, q)), jax.device_put(q)
+        return lambda: jn.inverse_dynamics(robot, q, drives=False)
+    compiled, given = jax.jit(lambda q: jn.inverse_dynamics(robot, q, drives=False)), jax.device_put(q)
     return lambda: jax.block_until_ready(compiled(given))
 
 

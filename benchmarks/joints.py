@@ -17,7 +17,7 @@ def cases(quick: bool) -> Cases:
         joints = len(robot.joint_names)
         q = np.random.default_rng(joints).normal(size=(samples, 5, joints))
         name = f"{'humanoid' if robot.name == 'humanoid' else 'chain'} of {joints} joints, torque and two rates"
-        run = ready(lambda robot=robot, q=q: jn.inverse_dynamics(robot, q))
+        run = ready(lambda robot=robot, q=q: jn.inverse_dynamics(robot, q, drives=False))
         yield Case(f"{name}, first call", [Contestant("jounce", run)], rounds=0, at={"joints": joints})
         yield Case(
             f"{name}, {samples:,} samples",

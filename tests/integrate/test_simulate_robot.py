@@ -84,7 +84,7 @@ FLIGHT = np.array([0.0, 0.3, 0.6])
 def flown(robot, time, state, base, force):
     """Return a simulation with a force on the last link, also where it is zero: so the program is compiled once."""
     wrench = jn.Wrench(robot.moving_links[-1], force)
-    return jn.simulate(robot, time, 2, state=state, base=base, wrenches=[wrench])
+    return jn.simulate(robot, time, 2, state=state, base=base, wrenches=[wrench], drives=False)
 
 
 @pytest.mark.slow
@@ -136,9 +136,9 @@ def test_arm_is_the_mechanism_that_it_is():
     robot = random_robot(3, 2, tree=False, prismatic=0.0)
     q = np.array([0.4, -0.3])
     time = np.array([0.0, 0.2, 0.4])
-    found = jn.simulate(robot, time, 2, state=[q, np.zeros(2)])
+    found = jn.simulate(robot, time, 2, state=[q, np.zeros(2)], drives=False)
     link = robot.moving_links[-1]
-    whole = jn.simulate(robot.mechanism(q, time=time), time, 2)
+    whole = jn.simulate(robot.mechanism(q, time=time, drives=False), time, 2)
     points = whole.point(*jn.robot.body_point(robot, link)).values
     own = jn.forward_kinematics(robot, found.q, link).position
     assert np.abs(points - own).max() <= 1e-9 * np.abs(own).max()
@@ -155,7 +155,7 @@ def test_driven_joint_and_feedback():
     def damped(time, q, rate):
         return -0.2 * rate
 
-    found = jn.simulate(robot, TIME, 4, torque=damped, driven={names[1]: law})
+    found = jn.simulate(robot, TIME, 4, torque=damped, driven={names[1]: law}, drives=False)
     expected = jn.ExpressionMotion(law)(jn.Jet.variable(TIME, 4)).derivatives().T
     assert np.abs(found.q[:, :, 1] - expected).max() <= 1e-12
     free = [0, 2]
@@ -169,7 +169,7 @@ def test_free_base_keeps_its_momenta_and_energy():
     base = jn.BaseMotion([0, 0, 0], [1, 0, 0, 0], [[0.1, 0.2, 0.3, 3.0, -1.0, 2.0]])
     found = flown(robot, FLIGHT, [[0.1, 0.2], [0.5, -0.5]], base, np.zeros(3))
     assert np.ptp(found.energy) <= 1e-12 * found.energy.max()
-    forces = jn.inverse_dynamics(robot, found.q, base=jn.BaseMotion(*vars(found.base).values()))
+    forces = jn.inverse_dynamics(robot, found.q, base=jn.BaseMotion(*vars(found.base).values()), drives=False)
     assert np.abs(forces[:, 0]).max() <= 1e-11  # nothing pushes the base, nor the joints
     assert np.abs((found.base.quaternion**2).sum(axis=1) - 1).max() <= 1e-14
     there = jn.BaseMotion(found.base.position[-1], found.base.quaternion[-1], found.base.twist[-1, :1])

@@ -57,8 +57,9 @@ class Pair:
 
     @property
     def named(self):
-        """Names of links and joints in the warning."""
-        return {name for warning in self.warnings for name in re.findall(r"(\S+) \(line \d+\)", str(warning.message))}
+        """Names of links and joints in the warning, but for those of what is left out."""
+        told = [str(warning.message).partition("what follows is left out")[0] for warning in self.warnings]
+        return {name for message in told for name in re.findall(r"(\S+) \(line \d+\)", message)}
 
     def torques(self, q):
         """Return torques by Pinocchio, (samples, 1, n), and on a fixed base their rates, (samples, 2, n)."""

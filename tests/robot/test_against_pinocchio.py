@@ -59,7 +59,7 @@ def torque_rate(model, data, q, v, a, j):
 
 def test_torque_and_its_rate(case):
     model, data = case.model, case.data
-    torque = jn.inverse_dynamics(case.robot, case.q)
+    torque = jn.inverse_dynamics(case.robot, case.q, drives=False)
     expected = case.gathered(lambda q, v, a, j: pinocchio.rnea(model, data, q, v, a)) @ case.spread
     assert error(torque[:, 0], expected) <= 1e-13
     expected = case.gathered(lambda *sample: torque_rate(model, data, *sample)) @ case.spread
@@ -163,7 +163,7 @@ def test_floating_base():
         v, a, j = np.concatenate([twist, joints[1:]], axis=1)
         expected.append([pinocchio.rnea(model, data, start, v, a), torque_rate(model, data, start, v, a, j)])
     expected = np.array(expected)
-    torque = jn.inverse_dynamics(robot, q)[:, :, order]
+    torque = jn.inverse_dynamics(robot, q, drives=False)[:, :, order]
     base = jn.joint_wrenches(robot, q)[:, :, robot.moving_links.index("base_link")]
     for level in range(2):
         assert error(torque[:, level], expected[:, level, 6:]) <= 1e-13

@@ -1,5 +1,6 @@
 """Robots as mechanisms: open chains against recursive Newton-Euler, loops against Pinocchio, MuJoCo, closed forms."""
 
+import dataclasses
 import math
 import pickle
 
@@ -369,12 +370,38 @@ def test_bad_requests(ask, says):
     assert str(caught.value).startswith(says)
 
 
-@pytest.mark.parametrize("field", ["armature", "friction"])
-def test_drives_that_a_mechanism_cannot_have(field):
-    robot = four_bar(on_crank={field: 0.5})
-    assert robot.mechanism({"A": 0.1}).joints
-    with pytest.raises(jn.RobotError, match=rf"joints\.B\.{field}: .*no counterpart"):
-        robot.mechanism({"A": 0.1}, drives=True)
+@pytest.mark.slow
+def test_drives_count_within_loops_too():
+    """The driver bears the drives of all joints, by how fast these move for it; nothing else of the motion changes."""
+    drive = {"armature": 0.4, "damping": 0.3, "friction": 0.2}
+    robot, laws = four_bar(on_crank=drive), {"A": "0.3 + 0.5*t + 0.2*t**2"}
+    mechanisms = [robot.mechanism({"B": -1.0}, drivers=laws, time=TIME, drives=drives) for drives in (True, False)]
+    whole, bare = (jn.solve(mechanism, order=3) for mechanism in mechanisms)
+    q = coordinates(whole, robot)
+    assert np.abs(q - coordinates(bare, robot)).max() <= 1e-12
+    a, b = q[..., 0], q[..., 1]
+    share = b[:, 1] / a[:, 1]
+    expected = share * (drive["armature"] * b[:, 2] + drive["damping"] * b[:, 1] + drive["friction"] * np.sign(b[:, 1]))
+    found = torques(whole, robot)[:, 0, 0] - torques(bare, robot)[:, 0, 0]
+    assert np.abs(found - expected).max() <= 1e-12 * np.abs(expected).max()
+
+
+@pytest.mark.slow
+def test_drives_of_a_joint_that_slides_and_of_one_far_from_the_base():
+    robot = branched(armature=0.3, damping=0.7, friction=0.4)
+    joints = [dataclasses.replace(x, armature=0.2, friction=0.1) if x.moving else x for x in robot.joints.values()]
+    robot = jn.Robot("branched", list(robot.links.values()), joints, robot.gravity)
+    agrees_with_newton_euler(robot, waves(robot), order=4)
+    agrees_with_newton_euler(robot, waves(robot), order=2, drives=False)
+
+
+def test_turns_with_drives_stay_joints_of_their_own():
+    rods = [jn.Link("base"), jn.Link("a"), jn.Link("b"), jn.Link("c", ROD)]
+    axes = zip("XYZ", ("base", "a", "b"), "abc", np.eye(3), strict=True)
+    ball = [jn.Joint(name, parent, child, axis=axis, damping=0.1) for name, parent, child, axis in axes]
+    robot = jn.Robot("ball", rods, ball)
+    assert tuple(robot.mechanism().outputs) == ("X", "Y", "Z")
+    assert tuple(robot.mechanism(drives=False).outputs) == ()
 
 
 def test_a_moving_link_named_ground():

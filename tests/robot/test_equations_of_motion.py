@@ -72,11 +72,11 @@ def test_mass_matrix_and_bias(name):
     pair = pair_named(name)
     q = random_states(pair.robot)
     theirs = Theirs(pair, q)
-    assert difference(jn.mass_matrix(pair.robot, q[:, 0]), theirs(mass)) <= BOUND
+    assert difference(jn.mass_matrix(pair.robot, q[:, 0], drives=False), theirs(mass)) <= BOUND
     nonlinear = theirs(lambda model, data, q, v, *_: pinocchio.nonLinearEffects(model, data, q, v))
-    assert difference(jn.bias_forces(pair.robot, q[:, :2]), nonlinear) <= BOUND
+    assert difference(jn.bias_forces(pair.robot, q[:, :2], drives=False), nonlinear) <= BOUND
     gravity = theirs(lambda model, data, q, *_: pinocchio.computeGeneralizedGravity(model, data, q))
-    assert difference(jn.bias_forces(pair.robot, q[:, :2], parts="gravity"), gravity) <= BOUND
+    assert difference(jn.bias_forces(pair.robot, q[:, :2], parts="gravity", drives=False), gravity) <= BOUND
 
 
 @pytest.mark.slow
@@ -85,8 +85,8 @@ def test_first_rates(name):  # Pinocchio has no derivatives for a root made of s
     pair = pair_named(name)
     q = random_states(pair.robot)
     theirs = Theirs(pair, q)
-    assert difference(jn.mass_matrix(pair.robot, q[:, :2], rates=True)[:, 1], theirs(mass_rate)) <= BOUND
-    assert difference(jn.bias_forces(pair.robot, q[:, :3], rates=True)[:, 1], theirs(bias_rate)) <= BOUND
+    assert difference(jn.mass_matrix(pair.robot, q[:, :2], rates=True, drives=False)[:, 1], theirs(mass_rate)) <= BOUND
+    assert difference(jn.bias_forces(pair.robot, q[:, :3], rates=True, drives=False)[:, 1], theirs(bias_rate)) <= BOUND
 
 
 @pytest.mark.slow
@@ -94,12 +94,13 @@ def test_parts():
     pair = Pair(FILES / "ur5.urdf")
     q = random_states(pair.robot)
     theirs = Theirs(pair, q)
-    squares = jn.bias_forces(pair.robot, q, parts=["centrifugal"])
+    squares = jn.bias_forces(pair.robot, q, parts=["centrifugal"], drives=False)
     assert difference(squares, theirs(single)) <= BOUND
-    both = jn.bias_forces(pair.robot, q, parts=("coriolis", "centrifugal"))
-    assert difference(jn.bias_forces(pair.robot, q, parts="coriolis"), both - squares) <= BOUND
-    assert difference(both + jn.bias_forces(pair.robot, q, parts="gravity"), jn.bias_forces(pair.robot, q)) <= BOUND
-    assert not jn.bias_forces(pair.robot, q, parts=()).any()
+    both = jn.bias_forces(pair.robot, q, parts=("coriolis", "centrifugal"), drives=False)
+    assert difference(jn.bias_forces(pair.robot, q, parts="coriolis", drives=False), both - squares) <= BOUND
+    held = jn.bias_forces(pair.robot, q, parts="gravity", drives=False)
+    assert difference(both + held, jn.bias_forces(pair.robot, q, drives=False)) <= BOUND
+    assert not jn.bias_forces(pair.robot, q, parts=(), drives=False).any()
 
 
 @pytest.mark.slow

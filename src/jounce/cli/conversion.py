@@ -25,7 +25,7 @@ def convert(
     drive: list[str] | None = None,
     start: list[str] | None = None,
     hold: bool = False,
-    drives: bool = False,
+    no_drives: bool = False,
     strict: bool = False,
     import_: list[Path] | None = None,
     allow: list[Path] | None = None,
@@ -50,8 +50,8 @@ def convert(
         JOINT=VALUE with a unit, where a joint starts; repeatable.
     hold
         Hold the joints of a robot that are not driven.
-    drives
-        Take over damping and armature of a robot's drives.
+    no_drives
+        Leave out armature, damping and friction of a robot.
     strict
         Refuse a robot whose links are as those of no real one.
     import_
@@ -79,8 +79,8 @@ def convert(
     refuse_existing(target, overwrite=overwrite)
     if suffix in ROBOT_FILES:
         model = RobotReading(strict=strict, allow=allow).robot(source)
-        return _robot(source, model, target, drive, start, hold, drives)
-    given = {"--drive": drive, "--start": start, "--hold": hold, "--drives": drives, "--strict": strict}
+        return _robot(source, model, target, drive, start, hold, not no_drives)
+    given = {"--drive": drive, "--start": start, "--hold": hold, "--no-drives": no_drives, "--strict": strict}
     for option, value in given.items():
         if value:
             raise JounceError("is for robots; a mechanism file keeps its drivers", name=option, path=source)

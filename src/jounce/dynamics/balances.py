@@ -62,7 +62,8 @@ def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     rates = whole_number("rates", rates, error=error_for(system))
     if isinstance(system, Motion):
         return balanced(system, rates, gravity=False)
-    return inverse_dynamics(system.with_gravity((0.0, 0.0, 0.0)), checked_coordinates(system, q, rates + 2, rates + 2))
+    falling, q = system.with_gravity((0.0, 0.0, 0.0)), checked_coordinates(system, q, rates + 2, rates + 2)
+    return inverse_dynamics(falling, q, drives=False)
 
 
 def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:

@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses, second_moments
 from jounce.dynamics.motion_values import Coordinates, check_motion, cut, held, labelled, pose_of
-from jounce.errors import JounceError, MechanismError, RobotError, whole_number
+from jounce.errors import JounceError, MechanismError, RobotError, flag, whole_number
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
@@ -148,7 +148,9 @@ def differentiated(jet: Jet, times: int) -> Jet:
     return jet
 
 
-def acceleration_energy(system: Robot | Motion, q: ArrayLike | None = None, *, order: int = 1) -> Energy:
+def acceleration_energy(
+    system: Robot | Motion, q: ArrayLike | None = None, *, order: int = 1, drives: bool = True
+) -> Energy:
     """Return the acceleration energy of order p of a robot or of a moving mechanism, and its rates.
 
     Negrean 2025, equations 73-78 for order 0, 82-113 for order 1, 107 for any order.
@@ -161,6 +163,9 @@ def acceleration_energy(system: Robot | Motion, q: ArrayLike | None = None, *, o
         Coordinates of a robot and their derivatives, K at least p + 1.
     order : int, default 1
         The order p; 0 is the kinetic energy.
+    drives : bool, default True
+        Of a robot: count the rotors of the drives, ``1/2 I (q^(p+1))^2`` for the armature I of a joint, with the
+        rotation of the link that it moves; those of followers with that of their leader's.
 
     Returns
     -------
@@ -181,7 +186,8 @@ def acceleration_energy(system: Robot | Motion, q: ArrayLike | None = None, *, o
     >>> float(jn.acceleration_energy(robot, [[0.0], [2.0], [3.0]]).total[0].round(12))  # (3^2 + 2^4) / 3 / 2
     4.166666666667
     """
-    return Energy(*energies_of(system, q, order, body_energy))
+    drives = flag("drives", drives, error=error_for(system))
+    return Energy(*energies_of(system, q, order, body_energy, drives))
 
 
 def energy_unit(order: int) -> str:
@@ -201,8 +207,12 @@ def error_for(system: Any) -> type[JounceError]:
     return MechanismError if isinstance(system, Motion) else RobotError
 
 
-def energies_of(system: Robot | Motion, q: ArrayLike | None, order: int, function: EnergyFunction) -> tuple[Any, ...]:
+def energies_of(
+    system: Robot | Motion, q: ArrayLike | None, order: int, function: EnergyFunction, drives: bool = False
+) -> tuple[Any, ...]:
     """Return what `body_energy`, or a function like it, gives for the bodies of a system, their names, and the order.
+
+    The energies of rotors, on request, are added to the last of what the function gives.
 
     Raises
     ------
@@ -218,14 +228,16 @@ def energies_of(system: Robot | Motion, q: ArrayLike | None, order: int, functio
         found = energy_coefficients(system, order, function)
         parts = tuple(labelled(system, x[: system.order - order, 1:], energy_unit(order), body=bodies) for x in found)
         return *parts, bodies, order
-    parts = _of_robot(system, (checked_coordinates(system, q, order + 1),), (), (order, function))
+    leading = tuple(k for k, joint in enumerate(system.moving_joints) if joint.mimic is None) if drives else ()
+    parts = _of_robot(system, (checked_coordinates(system, q, order + 1),), (), (order, function, leading))
     return *parts, system.moving_links, order
 
 
-def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None) -> Energy:
+def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None, *, drives: bool = True) -> Energy:
     """Return the kinetic energy of a robot or of a moving mechanism, and its rates: `acceleration_energy` of order 0.
 
-    Negrean 2025, equations 65-78 (Koenig's theorem).
+    Negrean 2025, equations 65-78 (Koenig's theorem). Of a robot the armature inertia of its joints counts, unless
+    `drives` is False.
 
     Examples
     --------
@@ -234,7 +246,7 @@ def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None) -> Energy
     >>> jn.kinetic_energy(jn.robot.from_screws([slide]), [[0.0], [3.0], [1.0]]).total.tolist()  # energy and power
     [9.0, 6.0]
     """
-    return acceleration_energy(system, q, order=0)
+    return acceleration_energy(system, q, order=0, drives=drives)
 
 
 def robot_energy(tree: Tree, frames: Frames, order: int, function: EnergyFunction = body_energy) -> tuple[Jet, ...]:
@@ -246,10 +258,14 @@ def robot_energy(tree: Tree, frames: Frames, order: int, function: EnergyFunctio
 
 @Batched
 def _of_robot(
-    tree: Tree, arrays: tuple[Series], _: Any, order: int, function: EnergyFunction
+    tree: Tree, arrays: tuple[Series], _: Any, order: int, function: EnergyFunction, leading: tuple[int, ...]
 ) -> tuple[Float[Numbers, "levels body batch"], ...]:
     frames = body_frames(tree, arrays[0]).without_base()
-    return tuple(stacked(part) for part in robot_energy(tree, frames, order, function))
+    *parts, last = (stacked(part) for part in robot_energy(tree, frames, order, function))
+    if leading:  # the bodies that coordinates move, in their order
+        rate = differentiated(Jet(tuple(arrays[0])), order + 1)
+        last = last.at[:, np.array(leading)].add(stacked(rate * rate * (0.5 * jnp.asarray(tree.armature)[:, None])))
+    return *parts, last
 
 
 def energy_coefficients(motion: Motion, order: int, function: EnergyFunction = body_energy) -> tuple[Energies, ...]:

@@ -128,6 +128,8 @@ class LimitReport(LimitRows, Displayed):
         Position, velocity, acceleration, jerk, torque and torque rate there.
     shares : ndarray of shape (time, 6, joints)
         The same as shares of their limits: from -1 at the lower to 1 at the upper one, NaN where there is no limit.
+    drives : bool, default True
+        Whether torques contain armature, damping and friction.
     """
 
     robot: str
@@ -137,6 +139,7 @@ class LimitReport(LimitRows, Displayed):
     times: Float[np.ndarray, " time"]
     values: Float[np.ndarray, "time 6 joint"]
     shares: Float[np.ndarray, "time 6 joint"]
+    drives: bool = True
 
     def __repr__(self) -> str:
         found = f"{len(self.limited)} limits, {len(self.broken)} broken"
@@ -238,7 +241,7 @@ def check_limits(
     )
     for message in followed.doubts:
         warnings.warn(SampleWarning(message), stacklevel=2)
-    return LimitReport(robot.name, robot.joint_names, rows, held, grid, values, bounds.shares(values, grid))
+    return LimitReport(robot.name, robot.joint_names, rows, held, grid, values, bounds.shares(values, grid), drives)
 
 
 class _Bounds:

@@ -32,6 +32,7 @@ def equilibria(
     q: GivenCoordinates = None,
     hold: str | Sequence[str] = (),
     torques: Mapping[str, float] | None = None,
+    drives: bool = True,
 ) -> tuple[Equilibrium, ...]:
     """Return all equilibria that Newton's method finds from many starts, of every assembly of the mechanism.
 
@@ -41,7 +42,7 @@ def equilibria(
 
     Parameters
     ----------
-    mechanism, time, without, q, hold, torques
+    mechanism, time, without, q, hold, torques, drives
         As for `equilibrium`.
     starts : int, default 100
         How many random positions are tried besides the starting guess.
@@ -68,11 +69,11 @@ def equilibria(
     count = whole_number("starts", starts, error=MechanismError)
     random = np.random.default_rng(whole_number("seed", seed, error=MechanismError))
     robot = mechanism if isinstance(mechanism, Robot) else None
-    start = at_rest_from(as_mechanism(mechanism, q, hold, torques), time, without, "newton")
+    start = at_rest_from(as_mechanism(mechanism, q, hold, torques, drives), time, without, "newton")
     places = (
         _closed(start, _random_poses(start, random))
         if robot is None
-        else _closed(start, _random_coordinates(robot, start, random, q, hold))
+        else _closed(start, _random_coordinates(robot, start, random, q, hold, drives))
         for _ in range(count)
     )
     found: list[Equilibrium] = []
@@ -88,7 +89,12 @@ def equilibria(
 
 
 def _random_coordinates(
-    robot: Robot, start: Place, random: np.random.Generator, q: GivenCoordinates, hold: str | Sequence[str]
+    robot: Robot,
+    start: Place,
+    random: np.random.Generator,
+    q: GivenCoordinates,
+    hold: str | Sequence[str],
+    drives: bool,
 ) -> Coordinates:
     """Return where the bodies of a robot are at random coordinates of the joints that are not held."""
     values, limits = given_coordinates(robot, q), robot.limits
@@ -100,7 +106,7 @@ def _random_coordinates(
         low, high = (own if own is not None else reach * sign for own, sign in zip(ends, (-1, 1), strict=True))
         if name not in held:
             values[k] = random.uniform(low, high)
-    opened = robot.opened().mechanism(values)
+    opened = robot.opened().mechanism(values, drives=drives)
     return {name: np.asarray(x) for name, x in build(opened).guess.items()}
 
 

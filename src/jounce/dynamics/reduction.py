@@ -256,14 +256,9 @@ def _magnitudes(place: Place, basis: Float[np.ndarray, "column coordinate"]) -> 
     return [np.einsum("b,bi,bj->ij", weight, moved, moved) for weight in (load, mass * speed)]
 
 
-def with_joints(
-    found: Reduction, names: Sequence[str], extra: tuple[np.ndarray, np.ndarray] | None = None
-) -> Reduction:
-    """Return a reduction whose coordinates have the names of joints, with more inertia and damping of their drives."""
-    matrices = found.matrices.copy()
-    for level, part in zip((2, 1), extra or (), strict=False):
-        matrices[:, found.lanes(level)] += part
-    return dataclasses.replace(found, names=tuple(names), released=tuple(names), matrices=matrices)
+def with_joints(found: Reduction, names: Sequence[str]) -> Reduction:
+    """Return a reduction whose coordinates have the names of joints."""
+    return dataclasses.replace(found, names=tuple(names), released=tuple(names))
 
 
 def null_space(jacobian: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "column direction"]:

@@ -1,5 +1,6 @@
 """Robots as mechanisms that stand still, or that move through a state: what equilibria and small motions start from."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -26,16 +27,18 @@ GivenState = Mapping[str, float] | ArrayLike | None
 
 
 def standing(
-    robot: Robot, q: GivenCoordinates, hold: str | Sequence[str], torques: Mapping[str, float] | None
+    robot: Robot, q: GivenCoordinates, hold: str | Sequence[str], torques: Mapping[str, float] | None, drives: bool
 ) -> Mechanism:
     """Return a robot as a mechanism, joints held at their coordinates, constant torques or forces in others.
+
+    With `drives` it has their armature and damping; Coulomb friction, which would hold it anywhere near, is left out.
 
     Raises
     ------
     RobotError
         If a name or a value does not fit the robot.
     """
-    start = given_coordinates(robot, q)
+    robot, start = _frictionless(robot), given_coordinates(robot, q)
     names = robot.joint_names if hold == "all" else (hold,) if isinstance(hold, str) else tuple(hold)
     for name in names:
         check_name("moving joint", name, robot.joint_names, RobotError, name="hold")
@@ -46,7 +49,7 @@ def standing(
             raise RobotError("this joint is held; its torque follows", name=f"torques.{name}", value=value)
         if not np.isfinite(float(floats(f"torques.{name}", value))):
             raise RobotError("must be finite", name=f"torques.{name}", value=value)
-    parts = RobotParts(robot, {*names, *given}, None, None)
+    parts = RobotParts(robot, {*names, *given}, None, None, drives)
     order = [joint.name for joint in robot.moving_joints]
     forces: dict[str, Any] = {}
     for name, value in given.items():
@@ -60,7 +63,7 @@ def standing(
                 at.bodies, point_i=at.point, point_j=np.zeros(3), vector_i=at.axis_i, law=law
             )
     drivers = {name: float(start[robot.joint_names.index(name)]) for name in names}
-    return robot.mechanism(start, drivers=drivers, forces=forces)
+    return robot.mechanism(start, drivers=drivers, forces=forces, drives=drives)
 
 
 def through_state(
@@ -77,7 +80,7 @@ def through_state(
     coordinates : sequence of str, optional
         Independent joints; all of a tree, and chosen where there are loops, unless given.
     drives : bool
-        Whether the joints have their damping.
+        Whether the joints have their armature and damping; Coulomb friction, which has no slope, is left out.
 
     Raises
     ------
@@ -93,9 +96,16 @@ def through_state(
     places = [robot.joint_names.index(name) for name in names]
     series = zip(names, (levels[:, places] * [[1.0], [1.0], [0.5]]).T.tolist(), strict=True)
     laws = {name: f"{value!r} + {rate!r}*t + {half!r}*t**2" for name, (value, rate, half) in series}
-    mechanism = robot.mechanism(levels[0], drivers=laws, time=[0.0], drives=drives)
+    mechanism = _frictionless(robot).mechanism(levels[0], drivers=laws, time=[0.0], drives=drives)
     model, found = assemble(build(mechanism), 0.0, TOLERANCE)
     return driven(placed(mechanism, model, found, 0.0)), names
+
+
+def _frictionless(robot: Robot) -> Robot:
+    """Return a robot without Coulomb friction."""
+    joints = [dataclasses.replace(joint, friction=0.0) for joint in robot.joints.values()]
+    parts = (list(robot.links.values()), joints, robot.gravity, list(robot.closures.values()), robot.strict)
+    return Robot(robot.name, *parts)
 
 
 def _levels(robot: Robot, state: GivenState) -> Float[np.ndarray, "3 joint"]:
@@ -114,6 +124,6 @@ def _levels(robot: Robot, state: GivenState) -> Float[np.ndarray, "3 joint"]:
 
 def _independent(robot: Robot, q: Float[np.ndarray, " joint"]) -> tuple[str, ...]:
     """Return joints that determine the position of a robot with loops, chosen where its loops are closed near q."""
-    mechanism = robot.mechanism(q)
+    mechanism = robot.mechanism(q, drives=False)
     model, coordinates = assemble(build(mechanism), 0.0, TOLERANCE, free=True)
     return chosen_outputs(placed(mechanism, model, coordinates, 0.0))

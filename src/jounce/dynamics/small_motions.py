@@ -36,7 +36,7 @@ def linearise(
     coordinates: Sequence[str] | None = None,
     release: Sequence[str] = (),
     q: GivenState = None,
-    drives: bool = False,
+    drives: bool = True,
 ) -> Linearisation:
     """Return the equations of small motions of a mechanism: mass, damping and stiffness matrix, state space, modes.
 
@@ -62,8 +62,9 @@ def linearise(
         coordinates, and what they exert beside that force are the first inputs.
     q : array_like of shape (n,), or (k, n) with k to 3, or dict of str to float, optional
         Of a robot: coordinates, their rates and second derivatives; zero unless given.
-    drives : bool, default False
-        Of a robot: count the viscous damping and, of one without loops, the armature inertia of the joints.
+    drives : bool, default True
+        Of a robot: count the viscous damping and the armature inertia of the joints. Coulomb friction, which has no
+        slope where a joint moves and holds it where it rests, is left out.
 
     Returns
     -------
@@ -119,14 +120,10 @@ def linearise(
 def _of_robot(robot: Robot, q: GivenState, coordinates: Sequence[str] | None, drives: bool) -> Linearisation:
     """Return the equations of small motions of a robot about a state, in the coordinates of its joints."""
     wanted = None if coordinates is None else named("coordinates", coordinates)
-    place, names = through_state(robot, q, wanted, drives and bool(robot.closures))
+    place, names = through_state(robot, q, wanted, drives)
     found = reduced(place, released=[name + DRIVE for name in names], drivers=False)
-    extra = None
-    if drives and not robot.closures:
-        chosen = [robot.joint_names.index(name) for name in names]
-        extra = np.diag(robot.tree.armature[chosen]), np.diag(robot.tree.damping[chosen])
     _check(found)
-    return Linearisation(with_joints(found, names, extra), None)
+    return Linearisation(with_joints(found, names), None)
 
 
 def place_along(motion: Motion, time: Real | None) -> Place:

@@ -15,7 +15,7 @@ from jounce.dynamics.robot_states import standing
 from jounce.dynamics.stability import Verdict, judged
 from jounce.dynamics.start import TOLERANCE
 from jounce.dynamics.statics import Found, check_forces, placed, remains, search
-from jounce.errors import MechanismError, SolveError, check_choice, check_name
+from jounce.errors import MechanismError, RobotError, SolveError, check_choice, check_name, flag
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly import assemble, freely_moving
 from jounce.kinematics.pose_outputs import output_values
@@ -177,6 +177,7 @@ def equilibrium(
     q: GivenCoordinates = None,
     hold: str | Sequence[str] = (),
     torques: Mapping[str, float] | None = None,
+    drives: bool = True,
 ) -> Equilibrium:
     """Return a position in which a mechanism stands still under its forces, and whether it is stable.
 
@@ -202,6 +203,9 @@ def equilibrium(
         Of a robot: joints that are held. ``jn.driver_force(found.motion, "JOINT_drive")`` is the torque that it takes.
     torques : dict of str to float, optional
         Of a robot: constant torques, N m, or forces, N, of joints that are not held.
+    drives : bool, default True
+        Of a robot: count the armature inertia and the viscous damping of the joints, in stability and small motions.
+        Coulomb friction, which would hold it anywhere near, is left out.
 
     Returns
     -------
@@ -227,7 +231,7 @@ def equilibrium(
     (-1.0, 'stable')
     """
     robot = isinstance(mechanism, Robot)
-    start = at_rest_from(as_mechanism(mechanism, q, hold, torques), time, without, method)
+    start = at_rest_from(as_mechanism(mechanism, q, hold, torques, drives), time, without, method)
     found = search(start, settle=method == "settle")
     if not found.balanced and method == "settle":
         found = min(found, search(start, settle=False), key=lambda f: not f.balanced)
@@ -241,7 +245,11 @@ def equilibrium(
 
 
 def as_mechanism(
-    subject: Mechanism | Robot, q: GivenCoordinates, hold: str | Sequence[str], torques: Mapping[str, float] | None
+    subject: Mechanism | Robot,
+    q: GivenCoordinates,
+    hold: str | Sequence[str],
+    torques: Mapping[str, float] | None,
+    drives: bool,
 ) -> Mechanism:
     """Return a robot as the mechanism that stands with some joints held, or a mechanism as it is.
 
@@ -251,7 +259,7 @@ def as_mechanism(
         If a name or a value does not fit the robot, or is given for a mechanism.
     """
     if isinstance(subject, Robot):
-        return standing(subject, q, hold, torques)
+        return standing(subject, q, hold, torques, flag("drives", drives, error=RobotError))
     given = {"q": q, "hold": hold or None, "torques": torques}
     if unfit := [k for k, v in given.items() if v is not None]:
         raise MechanismError("is for robots; a mechanism has its own guess, drivers and forces", name=unfit[0])

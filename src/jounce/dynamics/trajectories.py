@@ -127,6 +127,12 @@ def warn_of_degrees(robot: Robot, trajectory: JointTrajectory) -> None:
         warnings.warn(UnitWarning(why), stacklevel=3)
 
 
+def told_drives(drives: bool) -> str:
+    """Return in words what torques of a robot contain."""
+    kinds = "armature, damping and friction"
+    return f"{kinds}, as far as the robot file has them" if drives else f"the bare bodies, without {kinds}"
+
+
 def trajectory_torques(
     robot: Robot, trajectory: JointTrajectory, rates: int = 0, *, times: ArrayLike | None = None, drives: bool = True
 ) -> "xarray.Dataset":
@@ -185,7 +191,8 @@ def trajectory_torques(
         told = {"units": "N*m" if robot.joints[name].turning else "N", "long_name": derivatives_of(name)}
         variables[name] = (("time", "derivative"), values[..., k], told)
     axes = time_axes(instants, rates + 1)
-    return xarray.Dataset(variables, coords=axes, attrs={"title": robot.name, "source": "jounce"})
+    about = {"title": robot.name, "source": "jounce", "drives": told_drives(drives)}
+    return xarray.Dataset(variables, coords=axes, attrs=about)
 
 
 def _in_blocks(function: Callable[[np.ndarray], Any], values: np.ndarray) -> np.ndarray:

@@ -73,7 +73,7 @@ def simulate(
     state: ArrayLike | Mapping[str, float] | None = None,
     torque: GivenLaws | None = None,
     driven: Mapping[str, Any] | None = None,
-    drives: bool = False,
+    drives: bool = True,
     base: BaseMotion | None = None,
     wrenches: Sequence[Wrench] = (),
 ) -> RobotSimulation: ...
@@ -126,10 +126,10 @@ def simulate(
         unless given. `torque`: the forces of its joints, N m or N: n numbers; a function of time, q and q' of one
         sample, by operations of JAX, that returns n; or a mapping of joints to numbers, expressions of ``t``, of the
         names of joints and of their rates as ``NAME_d1``, motion laws, and functions that return one force. `driven`: a
-        mapping of joints to laws of time that they follow, whatever it takes. `drives`: whether armature, damping and
-        friction count. `base`: the `BaseMotion` with which a base that moves freely begins. `wrenches`: a sequence of
-        `Wrench`, whose forces and torques are constant, functions of time, or functions of time, q and q', that return
-        three components.
+        mapping of joints to laws of time that they follow, whatever it takes. `drives`: False leaves out armature,
+        damping and friction, which count otherwise. `base`: the `BaseMotion` with which a base that moves freely
+        begins. `wrenches`: a sequence of `Wrench`, whose forces and torques are constant, functions of time, or
+        functions of time, q and q', that return three components.
 
     Returns
     -------

@@ -49,7 +49,7 @@ def simulate_robot(
     state: ArrayLike | Mapping[str, float] | None = None,
     torque: GivenLaws | None = None,
     driven: Mapping[str, Any] | None = None,
-    drives: bool = False,
+    drives: bool = True,
     base: BaseMotion | None = None,
     wrenches: Sequence[Wrench] = (),
     method: AbstractMethod | None = None,

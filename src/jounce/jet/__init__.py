@@ -29,6 +29,7 @@ from jounce.jet.elementary import (
     expm1 as expm1,
     log1p as log1p,
     next_sine_cosine as next_sine_cosine,
+    sign as sign,
     sin as sin,
     sine_cosine as sine_cosine,
     sinh as sinh,

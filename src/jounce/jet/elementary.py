@@ -191,6 +191,12 @@ def absolute(x: Jet) -> Jet:
     return x.map(lambda c: sign * c)
 
 
+@of_quantities(jnp.sign)
+def sign(x: Jet) -> Jet:
+    """Return -1, 0 or 1, the sign of the value; its derivatives are zero, but for its jump."""
+    return Jet.constant(jnp.sign(x.coefficients[0]), x.order)
+
+
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     function.__name__: function
     for function in (

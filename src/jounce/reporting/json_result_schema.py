@@ -145,6 +145,7 @@ class CheckResult(TrajectoryResult):
     kept: bool
     broken: int
     held: dict[str, float]
+    drives: bool
     limits: list[LimitRow]
 
 
@@ -154,6 +155,7 @@ class TorquesResult(TrajectoryResult):
     command: Literal["torques"]
     rates: int
     held: list[str]
+    drives: bool
     peaks: list[TorquePeak]
 
 

@@ -10,6 +10,7 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits import LimitReport
+from jounce.dynamics.trajectories import told_drives
 from jounce.errors import UNSET, JounceError, show_value
 from jounce.kinematics import Motion, Stretches
 from jounce.reporting.motion_facts import motion_facts
@@ -94,6 +95,7 @@ def limits_result(report: LimitReport, robot: Path, trajectory: Path, written: P
         "broken": len(report.broken),
         "time": {"start": report.times[0], "stop": report.times[-1], "count": len(report.times)},
         "held": dict(report.held),
+        "drives": report.drives,
         "limits": [{key: getattr(row, names.get(key, key)) for key in keys} for row in report.rows],
         "written": written,
     }
@@ -112,6 +114,7 @@ def torques_result(
         "rates": dataset.sizes["derivative"] - 1,
         "time": {"start": times[0], "stop": times[-1], "count": len(times)},
         "held": [name for name in dataset.data_vars if name not in motion.names],
+        "drives": dataset.attrs["drives"] == told_drives(True),
         "peaks": [{"joint": peak.pop("output"), **peak} for peak in told],
         "written": written,
     }

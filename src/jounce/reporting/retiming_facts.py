@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from jounce.dynamics.limits import LimitReport
+from jounce.dynamics.trajectories import told_drives
 from jounce.planning import RetimedTrajectory
 from jounce.reporting.json_results import limits_result
 from jounce.reporting.summaries import count
@@ -64,6 +65,8 @@ def retimed_words(
             f"written: {found.stop:.6g} s in {len(found.times)} rows; splines through them keep the limits too "
             f"({100 * (found.stop / free - 1):.2f} % slower)"
         )
+    if what == "joint" and any(row.unit.startswith("N") for row in found.report.limited):
+        lines.append(f"torques: {told_drives(found.report.drives)}")
     if found.path.deviation > TOLD:
         lines.append(f"the path passes the given trajectory within {found.path.deviation:.1e} rad or m")
     worst = found.report.worst

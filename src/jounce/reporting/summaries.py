@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits import LimitReport
+from jounce.dynamics.trajectories import told_drives
 from jounce.reporting.law_facts import law_words
 from jounce.trajectory import JointTrajectory
 
@@ -134,6 +135,8 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
         units = {row.joint: "m" if row.unit == "N" else "rad" for row in report.rows if row.unit in ("N", "N m")}
         held = [f"{name} at {value:.6g} {units[name]}" for name, value in report.held.items()]
         lines.append(f"not in the trajectory, held still: {', '.join(held)}")
+    if any(row.unit.startswith("N") for row in report.limited):
+        lines.append(f"torques: {told_drives(report.drives)}")
     free: dict[str, list[str]] = {}
     for row in report.rows:
         if row.ratio is None:
@@ -154,6 +157,7 @@ def torques_summary(dataset: xarray.Dataset, motion: JointTrajectory, robot: Pat
         f"({robot.name}, {trajectory.name})",
         f"t = {instants[0]:g} s to {instants[-1]:g} s, {count(len(instants), 'instant')}",
     ]
+    lines.append(f"torques: {dataset.attrs['drives']}")
     still = [str(name) for name in dataset.data_vars if name not in motion.names]
     if still:
         lines.append(f"not in the trajectory, held still: {', '.join(still)}")

@@ -116,7 +116,7 @@ class AbstractRobot(Displayed, abc.ABC):
         Raises
         ------
         RobotError
-            If no coordinate is within the range of a joint and of those that follow it.
+            If no coordinate, or but one, is within the range of a joint and of those that follow it.
         """
         return self.limits_with({})
 
@@ -134,7 +134,7 @@ class AbstractRobot(Displayed, abc.ABC):
         Raises
         ------
         RobotError
-            If no coordinate is within the range of a joint and of those that follow it.
+            If no coordinate, or but one, is within the range of a joint and of those that follow it.
 
         Examples
         --------

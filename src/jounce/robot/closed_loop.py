@@ -33,7 +33,7 @@ def mechanism(
     outputs: Mapping[str, Any] | None = None,
     parameters: Mapping[str, Any] | None = None,
     time: TimeLike | None = None,
-    drives: bool = False,
+    drives: bool = True,
     redundant_reactions: RedundantReactions | None = None,
 ) -> Mechanism:
     """Return a robot as a spatial mechanism, with masses and gravity, its loops closed.
@@ -66,10 +66,11 @@ def mechanism(
         Named values for laws and forces.
     time : array_like or TimeGrid, optional
         Instants to solve for, s; of a trajectory, its own unless given.
-    drives : bool, default False
-        Add the viscous damping of the joints, as forces named ``A_damping``, and the armature inertia of turning joints
-        on the base, as inertia of the link about the axis. Armature of other joints and Coulomb friction cannot be had
-        in a mechanism, and are then refused; without, all three are left out.
+    drives : bool, default True
+        Count the armature inertia of the joints, each as that of a rotor on the ground, the body ``A_rotor``, that the
+        constraint ``A_gear`` turns with the joint; their viscous damping and Coulomb friction, as forces named
+        ``A_damping`` and ``A_friction``. Friction has the sign of the velocity and is zero at rest. Without, all three
+        are left out.
     redundant_reactions : {"unique", "least_norm"} or dict of str to dict, optional
         As of `Mechanism`: reactions without a unique value are NaN, those of least norm, or as stiffnesses of joints
         share them. The redundant equations of closures must then agree, as those of any mechanism: to 1e-9.
@@ -82,8 +83,7 @@ def mechanism(
     Raises
     ------
     RobotError
-        If a name or a value does not fit the robot, the loops cannot be closed near q, or `drives` finds armature or
-        friction.
+        If a name or a value does not fit the robot, or the loops cannot be closed near q.
 
     Examples
     --------
@@ -103,7 +103,8 @@ def mechanism(
     for kind, given in laws.items():
         for name in given:
             check_name("moving joint that follows no other", name, robot.joint_names, RobotError, name=kind)
-    parts = RobotParts(robot, {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}, forces, outputs)
+    kept = {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}
+    parts = RobotParts(robot, kept, forces, outputs, drives)
     wanted = _coordinate_outputs(parts.coordinates) if outputs is None else outputs
     start = _start(robot, q, driven, parameters or {}, time)
     joints = parts.joints()
@@ -114,16 +115,13 @@ def mechanism(
         borne = loops.wrenches if redundant_reactions else [kept for kept, _ in loops.independent(start)]
         found = zip(robot.closures.values(), borne, strict=True)
         joints |= {closure.name: parts.closure(closure, kept) for closure, kept in found if len(kept)}
-    applied = dict(forces or {})
-    if drives:
-        applied |= parts.damping()
     return Mechanism(
         space="spatial",
-        bodies=parts.bodies(start, drives),
+        bodies=parts.bodies(start),
         joints=joints,
         drivers={name + DRIVE: parts.driver(name, law) for name, law in laws["drivers"].items()},
         initial={name + START: parts.driver(name, law) for name, law in laws["initial"].items()},
-        forces=applied,
+        forces={**(forces or {}), **parts.losses()},
         outputs={name: parts.output(name, x) if isinstance(x, str) else x for name, x in wanted.items()},
         parameters=parameters or {},
         gravity=robot.gravity.tolist(),

@@ -164,7 +164,7 @@ def drive_forces(tree: Tree, q: Series, levels: int) -> Float[Numbers, "{levels}
 
 
 def mass_matrix(
-    robot: Robot, q: ArrayLike, *, rates: bool = False, drives: bool = False
+    robot: Robot, q: ArrayLike, *, rates: bool = False, drives: bool = True
 ) -> Float[Numbers, "*batch joint joint"]:
     """Return the mass matrix of a robot, and on request its time derivatives to any order, exact to rounding.
 
@@ -181,7 +181,7 @@ def mass_matrix(
         ``q[..., 0, :]``. With `rates` of shape (..., order + 1, n): the coordinates and their derivatives.
     rates : bool, default False
         Whether derivatives of the coordinates are given and those of the matrix are wanted.
-    drives : bool, default False
+    drives : bool, default True
         Add the armature inertia of the joints, as in `inverse_dynamics`.
 
     Returns
@@ -217,7 +217,7 @@ def mass_matrix(
 
 
 def bias_forces(
-    robot: Robot, q: ArrayLike, *, rates: bool = False, parts: str | Sequence[str] = PARTS, drives: bool = False
+    robot: Robot, q: ArrayLike, *, rates: bool = False, parts: str | Sequence[str] = PARTS, drives: bool = True
 ) -> Float[Numbers, "*batch joint"]:
     """Return the joint torques or forces that velocities and gravity need, and on request their rates.
 
@@ -236,7 +236,7 @@ def bias_forces(
     parts : {"coriolis", "centrifugal", "gravity"} or a sequence of them, default all
         What to add up. Centrifugal forces go with the squares of the velocities of single coordinates, Coriolis forces
         with products of two; the split belongs to the choice of coordinates, and their sum is ``C(q, q') q'``.
-    drives : bool, default False
+    drives : bool, default True
         Add viscous damping and Coulomb friction of the joints, as in `inverse_dynamics`.
 
     Returns

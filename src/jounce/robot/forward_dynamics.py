@@ -35,7 +35,7 @@ def forward_dynamics(
     driven: Sequence[str] = (),
     wrenches: Sequence[Wrench] = (),
     time: ArrayLike | None = None,
-    drives: bool = False,
+    drives: bool = True,
     base: None = None,
     strict: bool = True,
 ) -> Float[Numbers, "*batch derivative joint"]: ...
@@ -48,7 +48,7 @@ def forward_dynamics(
     driven: Sequence[str] = (),
     wrenches: Sequence[Wrench] = (),
     time: ArrayLike | None = None,
-    drives: bool = False,
+    drives: bool = True,
     base: BaseMotion,
     strict: bool = True,
 ) -> tuple[BaseMotion, Float[Numbers, "*batch derivative joint"]]: ...
@@ -60,7 +60,7 @@ def forward_dynamics(
     driven: Sequence[str] = (),
     wrenches: Sequence[Wrench] = (),
     time: ArrayLike | None = None,
-    drives: bool = False,
+    drives: bool = True,
     base: BaseMotion | None = None,
     strict: bool = True,
 ) -> Float[Numbers, "*batch derivative joint"] | tuple[BaseMotion, Float[Numbers, "*batch derivative joint"]]:
@@ -85,7 +85,7 @@ def forward_dynamics(
         Forces and torques from outside; arrays of them hold order + 1 levels.
     time : array_like of shape (...), optional
         Instants of the samples, s; needed where a wrench is a function of time.
-    drives : bool, default False
+    drives : bool, default True
         Let the drives count: armature inertia, viscous damping and Coulomb friction of the joints. Friction has the
         sign of the velocity and is zero at rest.
     base : BaseMotion, optional
@@ -238,7 +238,7 @@ def _check_margins(robot: Robot, margin: Any, driven: np.ndarray) -> None:
         raise SingularityError(f"{message}; give the links and the base inertias", name=robot.name)
     message = (
         f"the bodies that this joint moves have no inertia about its axis{where}, so that its acceleration is not "
-        "determined; give the link an inertia, or the joint an armature with drives=True, or drive it"
+        "determined; give the link an inertia, or the joint an armature, or drive it"
     )
     # the outermost one: what carries it is not known there either
     raise SingularityError(message, name=names[int(joints[-1])])

@@ -29,7 +29,7 @@ def inverse_dynamics(
     *,
     wrenches: Sequence[Wrench] = (),
     time: ArrayLike | None = None,
-    drives: bool = False,
+    drives: bool = True,
     base: BaseMotion | None = None,
 ) -> Float[Numbers, "*batch derivative joint"]:
     """Return the joint torques or forces that a motion needs, and their rates, exact to rounding.
@@ -47,7 +47,7 @@ def inverse_dynamics(
         Forces and torques from outside.
     time : array_like of shape (...), optional
         Instants of the samples, s; needed where a wrench is a function of time.
-    drives : bool, default False
+    drives : bool, default True
         Add what the drives need: armature inertia, viscous damping and Coulomb friction of the joints. Friction has the
         sign of the velocity and is zero at rest; its jumps are not in the rates.
     base : BaseMotion, optional

@@ -1,5 +1,6 @@
 """The bodies, joints, closures and drives that a robot becomes as a mechanism, in the frames of its moving links."""
 
+from collections.abc import Container
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from jounce.constraints import AbstractConstraint, spatial
 from jounce.constraints.drivers import RotationDriver, SpatialSlideDriver
 from jounce.errors import RobotError, check_name
 from jounce.forces import AbstractForce
+from jounce.forces.actuators import SlideForce, SpatialTorque
 from jounce.forces.springs import SlideSpring, SpatialTorsionalSpring
 from jounce.mechanism import AbstractOutput, Body, RelativeAngleOutput
 from jounce.mechanism.mechanism import GROUND
@@ -17,10 +19,11 @@ from jounce.robot.abstract_robot import AbstractRobot
 from jounce.robot.closures import LinkClosure
 from jounce.robot.coupling import JointPlacement, SlideOutput, coupled
 from jounce.robot.kinematics import forward_kinematics
-from jounce.robot.model import Closure
+from jounce.robot.model import Closure, Mimic
 from jounce.robot.tree import axes_with_z_along
 
-DAMPING = "_damping"
+DAMPING, FRICTION, ROTOR, GEAR = "_damping", "_friction", "_rotor", "_gear"
+DRIVES = ("armature", "damping", "friction")
 
 
 def on_body(robot: AbstractRobot, link: str) -> tuple[str, np.ndarray, np.ndarray]:
@@ -46,11 +49,15 @@ class RobotParts:
         Joints whose coordinates are wanted, so that they are not merged into a free body or a ball.
     forces, outputs
         What may name links that are otherwise merged.
+    drives : bool
+        Whether armature, damping and friction of the joints are wanted.
     """
 
-    def __init__(self, robot: AbstractRobot, kept: set[str], forces: Any, outputs: Any):
+    def __init__(self, robot: AbstractRobot, kept: set[str], forces: Any, outputs: Any, drives: bool):
         self.robot, self.tree = robot, robot.opened().tree
         self.moving = robot.moving_joints
+        self.driven = [x for x in self.moving if any(getattr(x, field) for field in DRIVES)] if drives else []
+        kept = kept.union(joint.name for joint in self.driven)
         if GROUND in robot.moving_links:
             raise RobotError("a link of this name moves; rename it, it stands for the base", name="links", value=GROUND)
         elements = [*(forces or {}).values(), *(x for x in (outputs or {}).values() if not isinstance(x, str))]
@@ -63,6 +70,10 @@ class RobotParts:
                 if first >= 0 and self._is_free(first, count, kept, links) and first not in self._inner():
                     self.merged[k] = count
                     break
+        self.rotors: dict[str, str] = {}  # what the bodies are called, by joint
+        for joint in self.driven:
+            if joint.armature:
+                self.rotors[joint.name] = _unused(joint.name + ROTOR, {*robot.links, *self.rotors.values()})
         inner = self._inner()
         merged = {self.moving[k].name for k in inner.union(self.merged)}
         self.coordinates = tuple(name for name in robot.joint_names if name not in merged)
@@ -128,15 +139,18 @@ class RobotParts:
         for joint in self.moving:
             if joint.mimic is not None:
                 pair = (self._named(joint.mimic.joint), self._named(joint.name))
-                found[self._unused(f"{joint.name}_mimic", found)] = coupled(
+                found[self._named_apart(f"{joint.name}_mimic", found)] = coupled(
                     *pair, joint.mimic.multiplier, joint.mimic.offset
                 )
+        origin, x, _, z = np.zeros(3), *np.eye(3)
+        for name, rotor in self.rotors.items():
+            turning = JointPlacement((GROUND, rotor), True, origin, z, z, x, x)
+            found[self._named_apart(name + ROTOR, found)] = spatial.Revolute(turning.bodies, origin, origin, z, z)
+            found[self._named_apart(name + GEAR, found)] = coupled(self._named(name), turning, 1.0, 0.0)
         return found
 
-    def _unused(self, name: str, taken: Any) -> str:
-        while name in taken or name in self.robot.joints or name in self.robot.closures:
-            name += "_"
-        return name
+    def _named_apart(self, name: str, taken: Any) -> str:
+        return _unused(name, {*taken, *self.robot.joints, *self.robot.closures})
 
     def closure(self, closure: Closure, wrenches: np.ndarray) -> LinkClosure:
         """Return what closes a loop, in the directions of the wrenches given in the frame of the first link."""
@@ -165,36 +179,27 @@ class RobotParts:
             return RelativeAngleOutput(at.bodies, at.axis_i, at.vector_i, at.vector_j)
         return SlideOutput(at.bodies, at.point, np.zeros(3), at.axis_i)
 
-    def damping(self) -> dict[str, AbstractForce]:
-        """Return the dampers of the joints; refuse what a mechanism cannot have."""
+    def losses(self) -> dict[str, AbstractForce]:
+        """Return the dampers of the joints, and their dry friction."""
         found: dict[str, AbstractForce] = {}
-        for k, joint in enumerate(self.moving):
-            for field in ("armature", "friction"):
-                on_base = joint.turning and self.robot.frames[joint.parent].body < 0
-                if getattr(joint, field) and not (field == "armature" and on_base):
-                    message = (
-                        f"{field} of this drive has no counterpart in a mechanism; leave drives=False and add its part "
-                        "to the force of the driver, or set it to zero"
-                    )
-                    raise RobotError(message, name=f"joints.{joint.name}.{field}", value=getattr(joint, field))
-            if not joint.damping:
-                continue
-            at, damper = self.placed(k), {"stiffness": 0.0, "damping": joint.damping}
-            if at.turning:
-                turn = {"axis_i": at.axis_i, "vector_i": at.vector_i, "vector_j": at.vector_j}
-                found[joint.name + DAMPING] = SpatialTorsionalSpring(at.bodies, **turn, **damper)
-            else:
-                ends = {"point_i": at.point, "point_j": np.zeros(3), "vector_i": at.axis_i}
-                found[joint.name + DAMPING] = SlideSpring(at.bodies, **ends, **damper)
+        for joint in self.driven:
+            at, law = self._named(joint.name), f"-{joint.friction!r}*sign(v)"
+            turn = {"axis_i": at.axis_i, "vector_i": at.vector_i, "vector_j": at.vector_j}
+            ends = {"point_i": at.point, "point_j": np.zeros(3), "vector_i": at.axis_i}
+            if joint.damping:
+                kind, places = (SpatialTorsionalSpring, turn) if at.turning else (SlideSpring, ends)
+                found[joint.name + DAMPING] = kind(at.bodies, **places, stiffness=0.0, damping=joint.damping)
+            if joint.friction:
+                kind, places = (SpatialTorque, turn) if at.turning else (SlideForce, ends)
+                found[joint.name + FRICTION] = kind(at.bodies, **places, law=law)
         return found
 
-    def bodies(self, q: np.ndarray, drives: bool) -> dict[str, Body]:
+    def bodies(self, q: np.ndarray) -> dict[str, Body]:
         """Return the moving bodies with their masses, at the pose that the coordinates give.
 
-        A drive on the base turns as fast as its link does about an axis that is fixed in it: its armature is inertia of
-        the link.
+        Armature is inertia against the rate of a coordinate alone, of which the links know nothing: it is that of a
+        rotor on the ground, without mass, that turns by as many radians as the coordinate has radians or metres.
         """
-        armature = {joint.child: joint.armature * np.outer(joint.axis, joint.axis) for joint in self.moving if drives}
         robot, tree = self.robot, self.robot.opened()
         masses: dict[str, list[Inertia]] = {name: [] for name in self.links}
         for name, link in robot.links.items():
@@ -209,7 +214,19 @@ class RobotParts:
                 at.position[0].tolist(),
                 orientation=from_rotation_matrices(np.asarray(at.rotation[0])).tolist(),
                 mass=None if whole is None else whole.mass,
-                inertia=None if whole is None else whole.tensor + armature.get(name, 0.0),
+                inertia=None if whole is None else whole.tensor,
                 center_of_mass=None if whole is None else whole.center_of_mass,
             )
+        for name, rotor in self.rotors.items():
+            mimic = robot.joints[name].mimic or Mimic(name)
+            angle = mimic.multiplier * q[robot.joint_names.index(mimic.joint)] + mimic.offset
+            attitude = {"axis": [0.0, 0.0, 1.0], "angle": float(angle)}
+            inertia = [robot.joints[name].armature] * 3
+            found[rotor] = Body([0.0] * 3, orientation=attitude, mass=0.0, inertia=inertia)
         return found
+
+
+def _unused(name: str, taken: Container[str]) -> str:
+    while name in taken:
+        name += "_"
+    return name

@@ -58,6 +58,7 @@ class Limits:
 
 
 UNLIMITED = Limits()
+POINT = 1e-4  # of the narrowest range: what ranges have in common, if it is as little, is meant to be one point
 
 
 @dataclasses.dataclass(frozen=True)
@@ -213,6 +214,35 @@ class Joint:
         return self.type in ("revolute", "continuous")
 
 
+def ranges_at_leader(limits: Limits, followers: Iterable[Joint]) -> list[tuple[float, float]]:
+    """Return the range of a joint, and those of the joints that follow it as they bind it; infinite where none is."""
+    found = []
+    every = [(limits, Mimic("")), *((x.limits, x.mimic) for x in followers if x.mimic and x.mimic.multiplier)]
+    for own, mimic in every:
+        ends = (-math.inf if own.lower is None else own.lower, math.inf if own.upper is None else own.upper)
+        low, high = sorted((x - mimic.offset) / mimic.multiplier + 0.0 for x in ends)  # no -0
+        found.append((low, high))
+    return found
+
+
+def common_range(ranges: Iterable[tuple[float, float]]) -> tuple[float, float]:
+    """Return what ranges have in common; its ends are exchanged where that is nothing."""
+    lower, upper = zip(*ranges, strict=True)
+    return max(lower), min(upper)
+
+
+def has_room(limits: Limits, followers: Iterable[Joint]) -> bool:
+    """Whether joints that follow another leave it more than a point of its range, unless its own is one.
+
+    What is left is a point also where rounding of what a file says makes it a little more.
+    """
+    ranges = ranges_at_leader(limits, followers)
+    widths = [high - low for low, high in ranges]
+    lower, upper = common_range(ranges)
+    narrowest = min(filter(math.isfinite, widths), default=0.0)
+    return upper - lower > POINT * narrowest or (widths[0] == 0 and upper >= lower)
+
+
 def limits_with_followers(name: str, limits: Limits, followers: Iterable[Joint]) -> Limits:
     """Return limits of a joint that keep those of the joints that follow it too.
 
@@ -222,8 +252,9 @@ def limits_with_followers(name: str, limits: Limits, followers: Iterable[Joint])
     Raises
     ------
     RobotError
-        If no coordinate is within all ranges.
+        If no coordinate, or but one, is within all ranges.
     """
+    followers = list(followers)
     every = [(limits, Mimic(name))]
     every += [(other.limits, other.mimic) for other in followers if other.mimic and other.mimic.multiplier]
     if len(every) == 1:
@@ -234,13 +265,11 @@ def limits_with_followers(name: str, limits: Limits, followers: Iterable[Joint])
         given = [(next((x for f in fields if (x := getattr(own, f)) is not None), None), mimic) for own, mimic in every]
         return min((x / abs(mimic.multiplier) for x, mimic in given if x is not None), default=None)
 
-    lower, upper = -math.inf, math.inf
-    for own, mimic in every:
-        ends = (-math.inf if own.lower is None else own.lower, math.inf if own.upper is None else own.upper)
-        low, high = sorted((x - mimic.offset) / mimic.multiplier for x in ends)
-        lower, upper = max(lower, low), min(upper, high)
-    if lower > upper:
-        message = "no coordinate keeps the range of this joint and of those that follow it; correct their limits"
+    lower, upper = common_range(ranges_at_leader(limits, followers))
+    if not has_room(limits, followers):
+        others = ", ".join(joint.name for joint in followers)
+        word = "no coordinate" if lower > upper else "one coordinate alone"
+        message = f"{word} keeps the range of this joint and of those that follow it ({others}); correct their limits"
         raise RobotError(message, name=name, value=[lower, upper])
     slowing = any(own.deceleration is not None for own, _ in every)
     return dataclasses.replace(

@@ -240,6 +240,8 @@ class _Reader:
             return whole if operation != "atan2" else replace(whole, dimension=ANGLE, doubt=0)
         if operation in ("*", "/"):
             return self._product(first, second, 1 if operation == "*" else -1)
+        if operation == "sign":
+            return _Part(NUMBER)
         if operation == "sqrt":
             return self._power(first, Fraction(1, 2))
         if operation == "**":

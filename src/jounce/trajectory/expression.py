@@ -20,9 +20,11 @@ from jounce.errors import ExpressionError, JounceError, did_you_mean, show_value
 CONSTANTS: dict[str, float] = {"pi": math.pi, "deg": math.pi / 180.0}
 """Constants that every expression knows."""
 
-_NAMES = "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs".split()
+_NAMES = "sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt".split()
 FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
-    name: (2 if name == "atan2" else 1, math.fabs if name == "abs" else getattr(math, name)) for name in _NAMES
+    **{name: (2 if name == "atan2" else 1, getattr(math, name)) for name in _NAMES},
+    "abs": (1, math.fabs),
+    "sign": (1, lambda x: float((x > 0) - (x < 0))),
 }
 """Functions that every expression knows: number of arguments, and what to call on plain numbers."""
 
@@ -83,8 +85,8 @@ class Expression:
     """A formula of numbers, names and the usual functions, safe to read from a file.
 
     Allowed are numbers, names, ``+ - * / **``, parentheses, the constants ``pi`` and ``deg`` (pi/180), and the
-    functions sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs. Angles are in radians. An expression is
-    frozen, and two of them are equal when their texts are.
+    functions sin cos tan asin acos atan atan2 sinh cosh tanh exp log sqrt abs sign. Angles are in radians. An
+    expression is frozen, and two of them are equal when their texts are.
 
     Parameters
     ----------

@@ -18,6 +18,7 @@ MOST_CROSSINGS = 10_000
 INTERVALS = 4000  # at a leader, for where it passes a knot of the law that follows it
 STEPS = 60  # of bisection
 SLACK = 1e-6  # of the time between two looks, by which a crossing at an end may be beyond it
+BROKEN = {"abs": "kinks", "sign": "jumps"}  # what functions of expressions have where their argument is zero
 ROUNDING = 1e-9  # of the way of a profile by its duration to the power of the order: a smaller jump is none
 
 
@@ -189,10 +190,9 @@ def _jumps(
         case AbstractProfile():
             return *_within(*_profile_jumps(law, order), first, last), ""
         case ExpressionMotion():
-            kinks = "abs" in str(
-                law.expression.folded(lambda _: "", lambda _: "", lambda word, parts: f"{word} {parts}")
-            )
-            return *none, "it may have kinks where abs is of zero" if kinks else ""
+            words = str(law.expression.folded(lambda _: "", lambda _: "", lambda word, parts: f"{word} {parts}"))
+            kinks = [f"{kind} where {word} is of zero" for word, kind in BROKEN.items() if word in words]
+            return *none, f"it may have {' and '.join(kinks)}" if kinks else ""
         case FunctionMotion():
             return *none, "it is a Python function"
     return *none, f"nothing is known of a {type(law).__name__}"

@@ -64,7 +64,7 @@ def independent(robot: Robot) -> tuple[str, ...]:
     for chosen in islice(combinations(names, freedom), MOST_TRIED):
         still = {name: float(start[robot.joint_names.index(name)]) for name in chosen}
         try:
-            solve(robot.mechanism(start, drivers=still, time=[0.0]), order=0)
+            solve(robot.mechanism(start, drivers=still, time=[0.0], drives=False), order=0)
         except JounceError:
             continue
         return tuple(name for name in robot.joint_names if name in chosen)

@@ -104,7 +104,7 @@ def small(tmp_path, type_and_more, child=INERTIAL):
     """Return a robot of one joint."""
     path = tmp_path / "small.urdf"
     path.write_text(
-        f'<robot name="small"><link name="base"/><link name="arm">{child}</link>'
+        f'<robot name="small" version="1.1"><link name="base"/><link name="arm">{child}</link>'
         f'<joint name="j" {type_and_more}<parent link="base"/><child link="arm"/></joint></robot>'
     )
     return path

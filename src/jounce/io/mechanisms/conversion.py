@@ -191,7 +191,7 @@ def robot_mechanism(
     laws: Mapping[str, Any],
     *,
     hold: bool = False,
-    drives: bool = False,
+    drives: bool = True,
     time: TimeGrid | None = None,
 ) -> Mechanism:
     """Return a robot as a mechanism for a file: coordinates as outputs, and what its drivers must exert.

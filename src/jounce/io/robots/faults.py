@@ -18,6 +18,13 @@ HEADINGS = {
     WITHOUT_MASS: "moments of inertia have no mass beside them",
 }
 JOINT_SPRINGS = "springs of joints"
+BALLS = "<drake:ball_constraint> between links"
+BUSHINGS = "<drake:linear_bushing_rpy> between links"
+PLUGINS = "joints that follow others by a plugin"
+ROTORS = "inertia of the rotors of drives"
+WEIGHTLESS = "gravity that is switched off for links"
+MASS_OF_SHAPES = "masses that follow from shapes, or from a total mass"
+LEAVE = "motions and forces are computed without {}; take it out of the file, or read it without strict"
 SHOWN = 200  # names for each fault
 FEW = 6  # names for each part that is left out
 

@@ -65,8 +65,9 @@ def load_robot(
     RobotWarning
         Links are as those of no real robot: negative moments of inertia, one that exceeds the sum of the other two by
         more than rounding, moments without mass, links that move and have no mass, links of SDF without a mass and all
-        moments. All is computed with the numbers of the file. Or the file has forces that are left out: springs,
-        compensated gravity, fluids, what tendons add. One warning names the links, joints and other parts.
+        moments. All is computed with the numbers of the file. Or the file has what is left out: springs, compensated
+        gravity, fluids, what tendons add, what simulators add to URDF and SDF, such as loops and links without weight;
+        or ranges of joints that leave the joint that they follow no room. One warning names links, joints and parts.
 
     Examples
     --------

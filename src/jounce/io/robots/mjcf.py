@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError, RobotError, RobotFileError
 from jounce.io.robots.faults import Faults, left_out
+from jounce.io.robots.followers import with_room
 from jounce.io.robots.mjcf_files import check_assets, check_copies, included, line_of, quiet_mujoco
 from jounce.io.robots.mjcf_left_out import LeftOut, left_out_of_model, left_out_of_spec
 from jounce.io.robots.mjcf_ties import NO_CLOSURE, Ties, tied_tendons
@@ -199,12 +200,16 @@ class _Reader:
                 self._body(k)
             gravity = (0.0, 0.0, 0.0) if self._switched_off("GRAVITY") else model.opt.gravity
             name = self.root.attributes.get("model") or "robot"
-            robot = Robot(name, self.links, self.joints, gravity, self.closures)
+            joints = with_room(self.joints, self.faults, self._placed, self.ties.held)
+            robot = Robot(name, self.links, joints, gravity, self.closures)
             return robot.locked(self.ties.held) if self.ties.held else robot
         except RobotFileError:
             raise
         except RobotError as error:
-            raise self.error(error.message, error.name or "", value=error.value) from None
+            raise self._placed(error) from None
+
+    def _placed(self, error: RobotError) -> RobotFileError:
+        return self.error(error.message, error.name or "", value=error.value)
 
     def tell(self, found: Iterable[LeftOut], parts: Iterable[Element]) -> None:
         """Note what is left out, in tendons and actuators as found, and in what is compiled."""

@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError
 from jounce.io.robots.faults import Faults
+from jounce.io.robots.followers import with_room
 from jounce.io.robots.named_elements import NamedElements
 from jounce.io.robots.sdf_joints import AXIS_TAGS, SdfJoint, read_joint
 from jounce.io.robots.sdf_left_out import note_left_out
@@ -40,6 +41,7 @@ AXIS_TOLERANCE = 1e-5  # files give directions with six digits
 MODEL_PARTS = ("static", "self_collide", "allow_auto_disable", "enable_wind", "pose", "link", "joint", "frame")
 MODEL_PARTS += ("plugin", "gripper", "include", "model")
 ROOT = ("model", "world")
+DRAKE_MIMIC = "drake:mimic"
 
 
 def read_sdf(root: Element, faults: Faults) -> Robot:
@@ -53,7 +55,8 @@ def read_sdf(root: Element, faults: Faults) -> Robot:
     weld. A joint of the tree whose child is nearer the base is taken the other way round, about the opposite axis, so
     that its coordinate stays that of the file. A universal joint becomes two turns, a ball three about moving axes z,
     y, x, with massless links between. A joint whose axis passes beside the origin of its child has a massless link
-    there. A gearbox makes the second of its two joints follow the first. A link without ``<inertial>`` weighs 1 kg, as
+    there. A gearbox makes the second of its two joints follow the first; so does ``drake:mimic``, and rotors that Drake
+    reads are armature. A link without ``<inertial>`` weighs 1 kg, as
     SDF says; there is a warning of it. Sensors and plugins are left out, and limits of a joint that closes a loop; of
     springs, of damping and friction there, and of decaying velocities, which are left out too, there is a warning. So
     there is of a static model whose joints move: a simulator holds it still, and here its joints have coordinates.
@@ -178,7 +181,8 @@ class _Reader:
         upright = self.place.then(self._place(base)).rotation if base != WORLD else np.eye(3)
         gravity = upright.T @ gravity_of(self.world, elements, inertias)
         try:
-            return Robot(name, self.links, self.joints, gravity, closures, strict=False)
+            joints = with_room(self.joints, self.faults, self.lines.placed)
+            return Robot(name, self.links, joints, gravity, closures, strict=False)
         except RobotError as error:
             raise self.lines.placed(error) from None
 
@@ -268,7 +272,8 @@ class _Reader:
             start = made[-1].child if made else joint.parent
             direction = rotation.T @ axis.direction
             kept: dict[str, Any] = {"axis": direction, "limits": axis.limits, "mimic": mimics.get(name)}
-            made.append(Joint(name, start, end, kind, damping=axis.damping, friction=axis.friction, **kept))
+            kept |= {field: getattr(axis, field) for field in ("armature", "damping", "friction")}
+            made.append(Joint(name, start, end, kind, **kept))
         return made
 
     def _turns(self, joint: SdfJoint, child: str) -> list[Joint]:
@@ -288,6 +293,7 @@ class _Reader:
             message = f"a {joint.kind} joint closes a loop here; make it two revolute joints with a link between"
             raise joint.element.error(message, "joints", joint.name, value=joint.kind)
         mimics = [x for axis in joint.element.every("axis") for x in axis.every("mimic")]
+        mimics += joint.element.every(DRAKE_MIMIC)
         if mimics:
             message = "closes a loop, and so has no coordinate that could follow another"
             raise mimics[0].error(message, "joints", joint.name, "mimic")
@@ -318,6 +324,9 @@ class _Reader:
                 )
                 found[name] = Mimic(leader, factor, offset - factor * reference)
                 self.lines.add(mimic, *where)
+        for joint in tree:
+            if (given := only(joint.element, DRAKE_MIMIC, "joints", joint.name)) is not None:
+                self._drake_mimic(joint, given, found)
         for gear in gears:
             name, mimic = self._gearing(gear, tree)
             if name in found:
@@ -325,6 +334,18 @@ class _Reader:
                 raise gear.element.error(message, "joints", gear.name)
             found[name] = mimic
         return leaders(found)
+
+    def _drake_mimic(self, joint: SdfJoint, mimic: Element, found: dict[str, Mimic]) -> None:
+        """Add what Drake writes as attributes of an element of the joint."""
+        where = ("joints", joint.name, DRAKE_MIMIC)
+        if len(joint.axes) != 1 or joint.name in found:
+            message = "is for a joint of one axis, and one that follows no other already"
+            raise mimic.error(message, *where, value=joint.kind)
+        factor, offset = (
+            mimic.number(key, *where, default=float(key == "multiplier")) for key in ("multiplier", "offset")
+        )
+        found[joint.name] = Mimic(mimic.text("joint", *where), factor, offset)
+        self.lines.add(mimic, "joints", joint.name, "mimic")
 
     def _leader(self, mimic: Element, *where: str) -> str:
         """Return the coordinate that one follows, which may be about the first or the second axis of a joint."""

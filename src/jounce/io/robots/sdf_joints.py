@@ -31,6 +31,7 @@ JOINT = ("parent", "child", "pose", "axis", "axis2", "physics", "sensor", "plugi
 JOINT += ("screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body")
 AXIS = ("xyz", "limit", "dynamics", "use_parent_model_frame", "mimic", "initial_position")
 LIMIT = ("lower", "upper", "effort", "velocity", "stiffness", "dissipation")
+ROTOR, RATIO = "drake:rotor_inertia", "drake:gear_ratio"
 DYNAMICS = ("damping", "friction", "spring_reference", "spring_stiffness")
 
 
@@ -43,6 +44,7 @@ class SdfAxis:
     limits: Limits
     damping: float
     friction: float
+    armature: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,11 +84,28 @@ def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, 
         raise element.error("must join two different links", *where, value=ends[0])
     origin = frames.place(name)
     tags = AXIS_TAGS[: 2 if kind == "gearbox" else AXES[kind]]
-    axes = tuple(_axis(needed(element, tag, *where), origin, frames, version, *where, tag) for tag in tags)
+    armature = rotor_of(element, *where) if len(tags) == 1 else 0.0
+    axes = tuple(_axis(needed(element, tag, *where), origin, frames, version, armature, *where, tag) for tag in tags)
     return SdfJoint(name, kind, ends[0], ends[1], origin.position, axes, element)
 
 
-def _axis(axis: Element, place: Place, frames: Frames, version: tuple[int, ...], *where: str) -> SdfAxis:
+def rotor_of(element: Element, *where: str) -> float:
+    """Return the inertia of the rotor of a joint, seen at the joint, as Drake reads it.
+
+    Raises
+    ------
+    RobotFileError
+        A value is no number, or the inertia is negative.
+    """
+    inertia, ratio = (number_of(element, key, *where, default=default) for key, default in ((ROTOR, 0.0), (RATIO, 1.0)))
+    if inertia < 0:
+        raise needed(element, ROTOR, *where).error("must be zero or greater", *where, ROTOR, value=inertia)
+    return inertia * ratio**2
+
+
+def _axis(
+    axis: Element, place: Place, frames: Frames, version: tuple[int, ...], armature: float, *where: str
+) -> SdfAxis:
     check_known(axis, AXIS, *where)
     xyz = only(axis, "xyz", *where)
     direction = np.array([0.0, 0.0, 1.0]) if xyz is None else vector_of(xyz, *where, "xyz")
@@ -106,7 +125,7 @@ def _axis(axis: Element, place: Place, frames: Frames, version: tuple[int, ...],
     for key, value in (("damping", damping), ("friction", friction)):
         if value < 0:
             raise (dynamics or axis).error("must be zero or greater", *where, "dynamics", key, value=value)
-    return SdfAxis(axis.tag, rotation @ direction, _limits(limit, *where), damping, friction)
+    return SdfAxis(axis.tag, rotation @ direction, _limits(limit, *where), damping, friction, armature)
 
 
 def _limits(limit: Element | None, *where: str) -> Limits:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
-from jounce.io.robots.faults import JOINT_SPRINGS, Faults, left_out
-from jounce.io.robots.sdf_joints import SdfJoint
+from jounce.io.robots.faults import BALLS, BUSHINGS, JOINT_SPRINGS, LEAVE, PLUGINS, ROTORS, Faults, left_out
+from jounce.io.robots.sdf_joints import ROTOR, SdfJoint, rotor_of
 from jounce.io.robots.sdf_poses import flag_of, needed, number_of, only
 from jounce.io.robots.xml_elements import Element
 
@@ -14,6 +14,8 @@ KINEMATIC = "<kinematic>, by which no force moves these links"
 DECAY = "the decay of the velocities of links"
 IN_LOOPS = {"damping": "damping of joints that close a loop", "friction": "friction of joints that close a loop"}
 DECAYS = {"linear": DECAY, "angular": DECAY}
+MIMICS = ("mimic", "drake:mimic")
+OF_MODEL = {"drake:ball_constraint": BALLS, "drake:linear_bushing_rpy": BUSHINGS}
 SPRING = {"spring_stiffness": JOINT_SPRINGS}
 
 
@@ -38,7 +40,7 @@ def note_left_out(
     RobotFileError
         A value is no number, or none that it may be; or something is left out and that is an error.
     """
-    tree = list(tree)
+    tree, closing = list(tree), list(closing)
     if flag_of(model, "static", "static") and any(joint.kind != "fixed" for joint in tree):
         error = needed(model, "static").error(left_out(STATIC, "false"), "static", value=True)
         faults.leave_out(STATIC, model.attributes.get("name", "robot"), error)
@@ -47,6 +49,7 @@ def note_left_out(
             for axis in joint.axes:
                 where = ("joints", joint.name, axis.tag, "dynamics")
                 _note_numbers(only(needed(joint.element, axis.tag), "dynamics"), joint.name, headings, faults, *where)
+    _note_extensions(model, tree, closing, faults)
     for name, link in links.items():
         if flag_of(link, "kinematic", "links", name):
             error = needed(link, "kinematic").error(
@@ -54,6 +57,27 @@ def note_left_out(
             )
             faults.leave_out(KINEMATIC, name, error)
         _note_numbers(only(link, "velocity_decay"), name, DECAYS, faults, "links", name, "velocity_decay")
+
+
+def _note_extensions(model: Element, tree: Sequence[SdfJoint], closing: Sequence[SdfJoint], faults: Faults) -> None:
+    """Note what Drake adds to a model, and followers that are those of a plugin alone."""
+    for tag, heading in OF_MODEL.items():
+        for element in model.every(tag):
+            faults.leave_out(heading, f"<{tag}>", element.error(LEAVE.format(heading), tag))
+    free = {joint.name for joint in tree if not any(x.tag in MIMICS for x in joint.element.walk())}
+    for plugin in model.every("plugin"):
+        if (name := follower(plugin)) in free:
+            faults.leave_out(PLUGINS, name, plugin.error(LEAVE.format(PLUGINS), "joints", name))
+    for joint in (*closing, *(joint for joint in tree if len(joint.axes) != 1 and joint.kind != "fixed")):
+        if inertia := rotor_of(joint.element, "joints", joint.name):
+            error = joint.element.error(left_out(ROTORS), "joints", joint.name, ROTOR, value=inertia)
+            faults.leave_out(ROTORS, joint.name, error)
+
+
+def follower(plugin: Element) -> str:
+    """Return the joint that a plugin makes follow another, empty if it is of another kind."""
+    part = plugin.first("mimicJoint")
+    return "" if part is None else part.content.strip()
 
 
 def _note_numbers(holder: Element | None, shown: str, headings: Mapping[str, str], faults: Faults, *where: str) -> None:

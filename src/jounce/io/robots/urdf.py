@@ -11,7 +11,9 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError, RobotFileError, did_you_mean, no_such
 from jounce.io.robots.faults import BELOW_ZERO, FOLLOWS_NONE, IDLE, MASSLESS, ONE_END, Faults, left_out
+from jounce.io.robots.followers import with_room
 from jounce.io.robots.named_elements import NamedElements
+from jounce.io.robots.urdf_left_out import check_version, note_left_out, rotors
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
 from jounce.robot.floating_base import floating_joints
@@ -24,7 +26,7 @@ TYPES = ("continuous", "fixed", "prismatic", "revolute", *EXPANDED)
 LINK_PARTS = ("inertial", "visual", "collision", "contact", "material", "sensor")
 INERTIAL_PARTS = ("origin", "mass", "inertia")
 JOINT_PARTS = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller")
-OF_SEVERAL = {key: f"{key} of planar and floating joints" for key in ("damping", "friction")}
+OF_SEVERAL = {key: f"{key} of planar and floating joints" for key in ("damping", "friction", "armature")}
 SIZES = ("velocity", "acceleration", "deceleration", "jerk", "effort")
 _Pose = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -38,6 +40,9 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     and friction is left out, since it does not say to which of the coordinates it belongs; of damping and friction
     there is a warning. An ``<inertial>`` of zero mass and zero inertia is a frame. Limits that are zero are not given,
     nor is a range from zero to zero. A joint that follows one which itself follows another follows that one.
+    Rotors that Drake reads from transmissions are armature: ``drake:rotor_inertia`` times the square of
+    ``drake:gear_ratio``. Of other elements by which simulators change motions or forces there is a warning: loops,
+    springs, links without weight.
 
     Parameters
     ----------
@@ -58,6 +63,7 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     RobotFileError
         Something is missing or impossible; the message has the line.
     """
+    check_version(root, faults)
     links, joints = _named(root, "link"), _named(root, "joint")
     if not links:
         raise root.error("a robot needs at least one <link>")
@@ -70,17 +76,21 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
         _check_joint(element, name, links)
         _add_joint(lines, element, name)
     parts: list[Joint] = []
-    mimics = _mimics(joints, faults)
+    mimics, armatures = _mimics(joints, faults), rotors(root, faults)
+    named: dict[str, list[Joint]] = {}
     try:
         for name, element in joints.items():
-            more, expanded = _joints(name, element, mimics, faults)
+            more, expanded = _joints(name, element, mimics, armatures.get(name, 0.0), faults)
+            named[name] = expanded
             made += more
             parts += expanded
             for part in expanded:
                 lines.add(element, "joints", part.name)
         ordered(_distinct("links", made, root), _distinct("joints", parts, root))
+        parts = with_room(parts, faults, lines.placed)
         robot = Robot(root.attributes.get("name", "robot"), made, parts, strict=False)
         _check_masses(robot, joints, links, faults, massless)
+        note_left_out(root, robot, named, faults)
         return robot
     except RobotFileError:
         raise
@@ -90,7 +100,7 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
 
 def _add_joint(lines: NamedElements, element: Element, name: str) -> None:
     lines.add(element, "joints", name)
-    for tag in ("parent", "child", "axis", "mimic"):
+    for tag in ("parent", "child", "axis", "mimic", "limit"):
         lines.add(element.first(tag), "joints", name, tag)
     for key in ("damping", "friction"):
         lines.add(element.first("dynamics"), "joints", name, key)
@@ -192,7 +202,9 @@ def _ends(element: Element) -> tuple[str, str]:
     return parent, child
 
 
-def _joints(name: str, element: Element, mimics: dict[str, Mimic], faults: Faults) -> tuple[list[Link], list[Joint]]:
+def _joints(
+    name: str, element: Element, mimics: dict[str, Mimic], armature: float, faults: Faults
+) -> tuple[list[Link], list[Joint]]:
     """Return a joint of the file, or those that it is expanded to and the massless links between them."""
     where = ("joints", name)
     kind, (parent, child), (position, rotation) = element.attributes["type"], _ends(element), _pose(element, *where)
@@ -205,10 +217,10 @@ def _joints(name: str, element: Element, mimics: dict[str, Mimic], faults: Fault
     )
     if kind == "fixed":
         return [], [Joint(name, parent, child, kind, position, rotation)]
-    for key, value in (("damping", damping), ("friction", friction)):
-        if kind in EXPANDED and value and dynamics is not None:
-            heading = OF_SEVERAL[key]
-            faults.leave_out(heading, name, dynamics.error(left_out(heading), *where, "dynamics", key, value=value))
+    for key, value in (("damping", damping), ("friction", friction), ("armature", armature)):
+        if kind in EXPANDED and value:
+            heading, place = OF_SEVERAL[key], element if dynamics is None or key == "armature" else dynamics
+            faults.leave_out(heading, name, place.error(left_out(heading), *where, "dynamics", key, value=value))
     if kind == "floating":
         links, parts = floating_joints(child, prefix=name)
         first = dataclasses.replace(parts[0], parent=parent, position=position, rotation=rotation)
@@ -218,7 +230,7 @@ def _joints(name: str, element: Element, mimics: dict[str, Mimic], faults: Fault
     if kind == "planar":
         return _planar(name, (parent, child), (position, rotation), np.array(direction))
     kept: dict[str, Any] = {"limits": _limits(name, limit, kind, bounds, faults), "mimic": mimics.get(name)}
-    kept |= {"axis": np.array(direction), "damping": damping, "friction": friction}
+    kept |= {"axis": np.array(direction), "armature": armature, "damping": damping, "friction": friction}
     return [], [Joint(name, parent, child, kind, position, rotation, **kept)]
 
 
@@ -258,6 +270,7 @@ def _planar(
 def _bound(limit: Element, key: str, name: str) -> float:
     """Return a bound of a joint, zero where none is given; an infinite one bounds nothing."""
     place = ("joints", name, "limit", key)
+    key = key if key in limit.attributes else f"drake:{key}"
     given = limit.numbers(key, 1, *place, infinite=True)
     if given not in (None, [-math.inf if key == "lower" else math.inf]):
         limit.numbers(key, 1, *place)

@@ -100,7 +100,7 @@ def robot_drives(robot: Robot, drives: object, losses: bool) -> DriveArrays:
 
 def link_forces(robot: Robot, q: Numbers, losses: bool) -> Float[Numbers, "*batch level joint"]:
     """Return forces of joints on their links with rates, two levels fewer than q: with damping, without rotors."""
-    forces = inverse_dynamics(robot, q)
+    forces = inverse_dynamics(robot, q, drives=False)
     if losses:
         forces = forces + robot.tree.damping * q[..., 1 : 1 + forces.shape[-2], :]
     return forces

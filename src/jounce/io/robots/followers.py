@@ -1,0 +1,69 @@
+"""Joints of a file whose ranges leave the joint that they follow no room: that one keeps its own."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Collection, Sequence
+
+from jounce.errors import RobotError, RobotFileError
+from jounce.io.robots.faults import Faults
+from jounce.robot.model import Joint, has_room, ranges_at_leader
+
+NO_ROOM = "ranges of joints that leave the joint that they follow no room to move"
+
+
+def with_room(
+    joints: Sequence[Joint], faults: Faults, placed: Callable[[RobotError], RobotFileError], held: Collection[str] = ()
+) -> list[Joint]:
+    """Return the joints, those that leave the joint that they follow no room without their range.
+
+    A range of which nothing or one point is left, seen from the leader, is a fault of the file: a copied block of
+    limits, or one without the sign of the multiplier. A range that suits the leader alone goes before one that does
+    not; of those that suit it but not one another none counts.
+
+    Parameters
+    ----------
+    joints : sequence of Joint
+        Of the file.
+    faults : Faults
+        Takes the ranges that do not count.
+    placed : callable
+        Makes an error of the file of one of the robot, with the line of what it names.
+    held : collection of str, optional
+        Joints that are held in one place, whatever their range.
+
+    Raises
+    ------
+    RobotFileError
+        If such a range is an error.
+    """
+    found = {joint.name: joint for joint in joints}
+    for leader in joints:
+        followers = [joint for joint in joints if _follows(joint, leader)]
+        if not followers or leader.name in held:
+            continue
+        bad = [joint for joint in followers if not has_room(leader.limits, [joint])]
+        rest = [joint for joint in followers if joint not in bad]
+        for joint in followers:
+            beside = [x.name for x in rest if x is not joint and not has_room(leader.limits, [joint, x])]
+            if not (joint in bad or beside):
+                continue
+            own, (low, high) = ranges_at_leader(leader.limits, [joint])
+            against = f" beside {', '.join(beside)}" if joint in rest else ""
+            message = (
+                f"its range leaves {leader.name}, which it follows, {low:.6g} to {high:.6g} of "
+                f"{own[0]:.6g} to {own[1]:.6g}{against}: no room to move; correct the limits or the multiplier, "
+                "or read the file without strict"
+            )
+            error = RobotError(message, name=f"joints.{joint.name}.limit")
+            faults.leave_out(NO_ROOM, f"{joint.name}, which follows {leader.name}", placed(error))
+            found[joint.name] = dataclasses.replace(
+                joint, limits=dataclasses.replace(joint.limits, lower=None, upper=None)
+            )
+    return list(found.values())
+
+
+def _follows(joint: Joint, leader: Joint) -> bool:
+    """Whether a joint follows another, with a range of its own."""
+    ranged = (joint.limits.lower, joint.limits.upper) != (None, None)
+    return joint.moving and joint.mimic is not None and joint.mimic.joint == leader.name and ranged

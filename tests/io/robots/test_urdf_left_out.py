@@ -1,0 +1,167 @@
+"""What URDF files hold beside links and joints: rotors are read, what else bears on motions is told of."""
+
+import warnings
+
+import numpy as np
+import pinocchio
+import pytest
+
+import jounce as jn
+from jounce.errors import RobotFileError
+from jounce.io.robots.loader import load_robot
+
+MASS = '<mass value="1"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.04"/>'
+GAZEBO = '<gazebo reference="{}">{}</gazebo>'
+ROTOR = '<transmission name="t">{}<actuator name="m">{}</actuator></transmission>'
+TURN = (0.2, 0.2, 0.2, 0.938083151964686)
+CASES = {  # what follows the links and joints of a file; what is said of it, if it is
+    "a loop": ('<loop_joint name="tip" type="revolute"/>', r"<loop_joint>, which closes a loop: tip \(line 4\)"),
+    "a ball": ('<drake:ball_constraint name="b"/>', r"<drake:ball_constraint> between links: b \(line 4\)"),
+    "a bushing": ("<drake:linear_bushing_rpy/>", r"<drake:linear_bushing_rpy> between links: "),
+    "a force": ('<force_element name="f"/>', r"<force_element>, which is a force: f \(line 4\)"),
+    "a spring": (GAZEBO.format("j", "<springStiffness>3</springStiffness>"), r"springs of joints: j \(line 4\)"),
+    "no spring": (GAZEBO.format("j", "<springStiffness>0.0</springStiffness>"), None),
+    "a spring of a fixed joint": (GAZEBO.format("rigid", "<springStiffness>3</springStiffness>"), None),
+    "no weight": (GAZEBO.format("l", "<gravity>false</gravity>"), r"gravity that is switched off for links: l "),
+    "no weight, as a number": (GAZEBO.format("l", "<gravity> 0 </gravity>"), r"switched off for links: l "),
+    "no weight, as it was": (GAZEBO.format("l", "<turnGravityOff>true</turnGravityOff>"), r"off for links: l "),
+    "weight": (GAZEBO.format("l", "<gravity>true</gravity><turnGravityOff>0</turnGravityOff>"), None),
+    "no weight of the base": (GAZEBO.format("base", "<gravity>false</gravity>"), None),
+    "a kinematic link": (GAZEBO.format("l", "<kinematic>true</kinematic>"), r"<kinematic>, .*: l \(line 4\)"),
+    "a static model": ("<gazebo><static>true</static></gazebo>", r"<static>, .*: p \(line 4\)"),
+    "decay": (GAZEBO.format("l", "<dampingFactor>0.1</dampingFactor>"), r"decay of the velocities of links: l "),
+    "decay apart": (
+        GAZEBO.format("l", "<velocity_decay><linear>0</linear><angular>0.1</angular></velocity_decay>"),
+        r"decay of the velocities of links: l ",
+    ),
+    "a joint": ('<gazebo><joint name="k" type="ball"/></gazebo>', r"links and joints that <gazebo> adds: k "),
+    "a follower": ("<gazebo><plugin><mimicJoint>j</mimicJoint></plugin></gazebo>", r"by a plugin: j \(line 4\)"),
+    "a plugin": ("<gazebo><plugin><joint>j</joint><gravity>false</gravity></plugin></gazebo>", None),
+    "contact": (GAZEBO.format("l", "<mu1>0.2</mu1><selfCollide>true</selfCollide>"), None),
+    "two rotors in one": (
+        ROTOR.format('<joint name="j"/><joint name="rigid"/>', '<drake:rotor_inertia value="2"/>'),
+        r"inertia of the rotors of drives: t \(line 4\)",
+    ),
+    "gravity of MuJoCo": ('<mujoco><option gravity="0 0 0"/></mujoco>', r"<mujoco> says .*: gravity 0 0 0 \(line 4\)"),
+    "shapes of MuJoCo": ('<mujoco><compiler inertiafromgeom="true"/></mujoco>', r"masses that follow from shapes"),
+    "meshes of MuJoCo": ('<mujoco><compiler meshdir="a" balanceinertia="true"/></mujoco>', None),
+}
+
+
+def write(tmp_path, more="", version="", kind="revolute", dynamics="", turn=""):
+    """Write a robot of one moving joint and a fixed one; what is added stands in line 4."""
+    limit = '<limit lower="-3" upper="3" effort="1" velocity="1" drake:acceleration="7"/>'
+    text = f"""<robot name="p"{version} xmlns:drake="http://drake.mit.edu">
+<link name="base"/><link name="l"><inertial><origin xyz="0.1 0.2 0.3" {turn}/>{MASS}</inertial></link><link name="tip"/>
+<joint name="rigid" type="fixed"><parent link="l"/><child link="tip"/></joint>
+{more}
+<joint name="j" type="{kind}"><parent link="base"/><child link="l"/><origin xyz="0 0 0" {turn}/><axis xyz="1 0 0"/>
+{limit}{dynamics}</joint></robot>"""
+    path = tmp_path / "p.urdf"
+    path.write_text(text)
+    return path
+
+
+def told(path, says):
+    """Check that one warning says something, that it is an error if the file is read strictly, and return the robot."""
+    with pytest.warns(jn.RobotWarning, match=says) as caught:
+        robot = load_robot(path)
+    assert len(caught) == 1
+    with pytest.raises(RobotFileError) as refused:
+        load_robot(path, strict=True)
+    assert refused.value.line is not None
+    return robot
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_bears_on_motions_is_told_of_once_and_nothing_else_is(tmp_path, case):
+    more, says = CASES[case]
+    path = write(tmp_path, more)
+    if says is None:
+        load_robot(path, strict=True)
+    else:
+        told(path, says)
+
+
+@pytest.mark.parametrize(
+    "dynamics, says",
+    [
+        ('stiffness="3"', r"springs of joints: j"),
+        ('spring_stiffness="3"', r"springs of joints: j"),
+        ('rotor_inertia="3"', r"inertia of the rotors of drives: j"),
+        ('armature="3"', r"inertia of the rotors of drives: j"),
+    ],
+)
+def test_attributes_of_dynamics_of_other_simulators(tmp_path, dynamics, says):
+    told(write(tmp_path, dynamics=f"<dynamics {dynamics}/>"), says)
+    load_robot(write(tmp_path, dynamics='<dynamics damping="1" D="1" K="7000" mu_coulomb="0"/>'), strict=True)
+
+
+@pytest.mark.parametrize("rotors", [[(1.321e-4, 160)], [(2e-3, None)], [(1e-4, 50), (2e-4, -30)]])
+def test_rotors_of_transmissions_are_armature_as_drake_reads_them(tmp_path, rotors):
+    """Reflected inertia is rotor inertia times the square of the gear ratio, which is 1 unless given."""
+    more = ""
+    for inertia, ratio in rotors:
+        gear = "" if ratio is None else f'<drake:gear_ratio value="{ratio}"/>'
+        parts = f'<drake:rotor_inertia value="{inertia}"/>{gear}<mechanicalReduction>3</mechanicalReduction>'
+        more += ROTOR.format('<joint name="j"/>', parts)
+    robot = load_robot(write(tmp_path, more), strict=True)
+    reflected = sum(inertia * (ratio or 1) ** 2 for inertia, ratio in rotors)
+    assert robot.joints["j"].armature == pytest.approx(reflected, rel=1e-15)
+    bare, whole = (float(jn.mass_matrix(robot, [0.3], drives=drives)[0, 0]) for drives in (False, True))
+    assert whole - bare == pytest.approx(reflected, rel=1e-12)
+    assert robot.limits["j"].acceleration == 7.0
+
+
+@pytest.mark.parametrize(
+    "joint, parts, name",
+    [
+        ('<joint name="jj"/>', '<drake:rotor_inertia value="1"/>', "transmissions.t.joint"),
+        ('<joint name="j"/>', '<drake:rotor_inertia value="-1"/>', "transmissions.t.drake:rotor_inertia"),
+        ('<joint name="j"/>', '<drake:rotor_inertia value="much"/>', "transmissions.t.drake:rotor_inertia"),
+        ('<joint name="j"/>', "<drake:rotor_inertia/>", "transmissions.t.drake:rotor_inertia"),
+    ],
+)
+def test_rotors_that_cannot_be_are_refused(tmp_path, joint, parts, name):
+    with pytest.raises(RobotFileError) as caught:
+        load_robot(write(tmp_path, ROTOR.format(joint, parts)))
+    assert (caught.value.name, caught.value.line) == (name, 4)
+
+
+def test_a_rotor_of_a_joint_of_several_coordinates(tmp_path):
+    rotor = ROTOR.format('<joint name="j"/>', '<drake:rotor_inertia value="1"/>')
+    told(write(tmp_path, rotor, kind="planar"), r"armature of planar and floating joints: j")
+
+
+def pinocchio_torque(path):
+    model = pinocchio.buildModelFromUrdf(str(path))
+    return float(pinocchio.rnea(model, model.createData(), np.array([0.2]), np.zeros(1), np.zeros(1))[0])
+
+
+@pytest.mark.parametrize("version", ["", "1.0", "1.1", "1.2", "01.1"])
+def test_quaternions_count_from_version_1_1_on_as_in_the_reference_parser(tmp_path, version):
+    version = f' version="{version}"' if version else ""
+    path = write(tmp_path, version=version, turn=f'quat_xyzw="{" ".join(map(str, TURN))}"')
+    old = "1.1" not in version and "1.2" not in version
+    robot = told(path, r"quat_xyzw, of which the version .*: l \(line 2\), j \(line 5\)") if old else load_robot(path)
+    found = float(jn.inverse_dynamics(robot, [[0.2], [0.0], [0.0]])[0, 0])
+    assert found == pytest.approx(pinocchio_torque(path), rel=1e-13)
+
+
+@pytest.mark.parametrize("version", ["abc", "2.0", "1.3", "1", "0.9", "1.1.1", "", "-1.0"])
+def test_versions_that_there_are_not_are_refused_as_in_the_reference_parser(tmp_path, version):
+    path = write(tmp_path, version=f' version="{version}"')
+    with pytest.raises(RobotFileError, match=r"no such version of URDF") as caught:
+        load_robot(path)
+    assert (caught.value.name, caught.value.line) == ("version", 1)
+    with pytest.raises(ValueError, match="valid URDF"):
+        pinocchio.buildModelFromUrdf(str(path))
+
+
+def test_all_that_is_left_out_is_in_one_warning(tmp_path):
+    more = "".join(text for text, says in CASES.values() if says)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        load_robot(write(tmp_path, more))
+    assert len(caught) == 1
+    assert str(caught[0].message).count("what follows is left out") == 1
