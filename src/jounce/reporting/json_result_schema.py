@@ -211,7 +211,9 @@ class RetimeResult(Result):
     written: str | None
     duration: float
     before: float | None
+    path: str | None
     deviation: float
+    deviation_allowed: float | None
     kept: bool
     limits: list[LimitRow]
     binding: list[BindingLimit]

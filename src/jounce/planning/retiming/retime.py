@@ -13,15 +13,17 @@ from jounce.planning.retiming.limits import GivenLimits, MotionLimits, limits_of
 from jounce.planning.retiming.mechanism import retime_mechanism
 from jounce.planning.retiming.motion_limits_check import check_motion
 from jounce.planning.retiming.path import Path
-from jounce.planning.retiming.paths import GivenPath, cells_needed, checked, path_of
+from jounce.planning.retiming.paths import Between, GivenPath, cells_needed, checked, path_of
 from jounce.planning.retiming.program import require_solver
 from jounce.planning.retiming.quantities import Curves
 from jounce.planning.retiming.rate_law import Conditions, RateLaw
 from jounce.planning.retiming.rate_motion import RateMotion
 from jounce.planning.retiming.retimed import RetimedTrajectory, active_limits
 from jounce.planning.retiming.robot_quantities import RobotQuantities
+from jounce.planning.retiming.sampled_paths import path_of_samples
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike
 from jounce.trajectory import FollowingMotion, JointTrajectory
 
 CELLS = 160
@@ -42,6 +44,9 @@ def retime(
     cells: int | None = None,
     drives: bool = True,
     repair: bool = False,
+    deviation: float | None = None,
+    parameter: ArrayLike | None = None,
+    degree: int | None = None,
 ) -> RetimedTrajectory:
     """Return the fastest motion along a path that keeps limits.
 
@@ -77,6 +82,18 @@ def retime(
     repair : bool, default False
         Return the given trajectory, which must be one, with the smallest slowing that keeps the limits: it is nowhere
         faster than it was, and as it was where that keeps them.
+    deviation : float, optional
+        How far from the straight lines between samples or waypoints the path may be, rad or m (of several joints the
+        root of the sum of squares). Samples of a trajectory unless given 0.001, or a thousandth of the diagonal of the
+        box that holds them if that is less: splines go through them where these keep within it, stand still where the
+        samples do, and are supported by the samples to the order; else a spline whose control points lie on the lines,
+        which rounds corners and what noise and rounding make of dwells. Through waypoints go splines unless it is
+        given. A path of expressions or laws is itself what is deviated from, so that kinks can be rounded.
+    parameter : array_like of shape (points,), optional
+        Values of s at waypoints, increasing; the lengths of the chords between them, from 0 to 1, unless given.
+    degree : int, optional
+        Of the splines through waypoints, with not-a-knot ends; 5 unless given. With a parameter and degree 3 the path
+        is that of TOPP-RA's ``SplineInterpolator``.
 
     Returns
     -------
@@ -109,10 +126,13 @@ def retime(
     require_solver()
     if cells is not None:
         cells = whole_number("cells", cells, 20, 5000, error=TrajectoryError)
+    between = Between(deviation, parameter, degree)
     if isinstance(robot, Mechanism):
-        if path is not None or repair:
+        given = {"repair": repair, "path": path is not None, "deviation": deviation is not None}
+        if any(given.values()):
             message = "the path of a mechanism is that of its drivers, which is not repaired; leave this out"
-            raise TrajectoryError(message, name="repair" if repair else "path")
+            raise TrajectoryError(message, name=next(name for name, x in given.items() if x))
+        between.check_without_points()
         return retime_mechanism(robot, _of_mechanism(limits), _rates(rates), order, cells or CELLS)
     if not isinstance(robot, Robot):
         raise TrajectoryError("must be a Robot or a Mechanism", name="robot", value=type(robot).__name__)
@@ -120,9 +140,9 @@ def retime(
     if isinstance(path, JointTrajectory):
         FollowedTrajectory(robot, path)  # checks its joints and units
     if repair:
-        return _repaired(robot, path, limits, order, cells, drives)
+        return _repaired(robot, path, limits, order, cells, drives, between)
     chosen = _order(order, limits_of(robot, limits), robot)
-    found = path_of(path, names if names is not None else robot.joint_names, chosen)
+    found = path_of(path, names if names is not None else robot.joint_names, chosen, between)
     source = RobotQuantities(robot, found, limits, drives=drives)
     checked(found, chosen)
     source.check_range()
@@ -139,13 +159,14 @@ def _repaired(
     order: int | None,
     cells: int | None,
     drives: bool,
+    between: Between,
 ) -> RetimedTrajectory:
     if not isinstance(trajectory, JointTrajectory):
         raise TrajectoryError("only a trajectory can be repaired", name="path", value=type(trajectory).__name__)
-    path = Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
+    between.check_without_points()
+    chosen = _order(order, limits_of(robot, limits), robot)
+    path = checked(path_of_samples(trajectory, chosen, between.deviation, timed=True), chosen)
     source = RobotQuantities(robot, path, limits, drives=drives)
-    chosen = _order(order, source.limits, robot)
-    checked(path, chosen)
     source.check_range()
     cells = cells or cells_needed(path, chosen)
     speeds = np.abs(path.derivatives(np.linspace(path.start, path.stop, 501), 1)[:, 1]).max(axis=1)

@@ -71,12 +71,13 @@ def fit_to_samples(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SampleWarning)
             read = JointTrajectory.from_samples(times, positions, found.names, degree)
-            report = check_motion(robot, read, limits, drives=drives)
+            report = worst = check_motion(robot, read, limits, drives=drives)
         if report.kept:
-            found.report = check_motion(robot, found, limits, drives=drives)
-            return found, report
-        over = ((report.worst.ratio or 1.0) if report.worst else 1.0) - 1
-        told = "" if report.worst is None else f" of the {report.worst.quantity} of {report.worst.joint}"
+            found.report = worst = check_motion(robot, found, limits, drives=drives)
+            if worst.kept:
+                return found, report
+        over = ((worst.worst.ratio or 1.0) if worst.worst else 1.0) - 1
+        told = "" if worst.worst is None else f" of the {worst.worst.quantity} of {worst.worst.joint}"
         slowed = max(slowed, float(periods) * period / trajectory.stop) * (1 + min(over / 2, 0.05)) + period / 10
     message = (
         f"splines of degree {degree} through samples at this rate break the limit{told}; "
