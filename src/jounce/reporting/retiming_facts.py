@@ -98,7 +98,7 @@ def retiming_result(
 ) -> dict[str, Any]:
     """Return what `jounce retime` tells."""
     told = limits_result(found.report, files[0], files[1] or files[0], written[0])
-    del told["held"], told["broken"]
+    del told["held"], told["broken"], told["between"]
     return {
         **told,
         "trajectory": files[1],

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits import LimitReport
+from jounce.dynamics.trajectory_ends import TrajectoryEnd
 from jounce.reporting.law_facts import law_words
+from jounce.reporting.motion_ends import between_words, breaks_words, ends_words
 from jounce.trajectory import JointTrajectory
 
 if TYPE_CHECKING:
@@ -142,11 +144,14 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
         limited = {row.quantity for row in report.limited}
         told = [f"{word} of {', '.join(names)}" if word in limited else word for word, names in free.items()]
         lines.append(f"without a limit: {', '.join(told)}")
+    lines += [*between_words(motion), *ends_words(report.ends)]
     return "\n".join(_wrapped(line) for line in lines)
 
 
-def torques_summary(dataset: xarray.Dataset, motion: JointTrajectory, robot: Path, trajectory: Path) -> str:
-    """Word of which joints torques were computed, when, and which stand still."""
+def torques_summary(
+    dataset: xarray.Dataset, motion: JointTrajectory, ends: Sequence[TrajectoryEnd], robot: Path, trajectory: Path
+) -> str:
+    """Word of which joints torques were computed, when, which stand still, and what is met at the ends."""
     rates, instants = dataset.sizes["derivative"] - 1, dataset["time"].values
     told = f", with {count(rates, 'rate')}" if rates else ""
     lines = [
@@ -157,6 +162,7 @@ def torques_summary(dataset: xarray.Dataset, motion: JointTrajectory, robot: Pat
     still = [str(name) for name in dataset.data_vars if name not in motion.names]
     if still:
         lines.append(f"not in the trajectory, held still: {', '.join(still)}")
+    lines += [*between_words(motion), *ends_words(ends)]
     return "\n".join(_wrapped(line) for line in lines)
 
 
@@ -166,9 +172,14 @@ def verdict(report: LimitReport) -> str:
     assert worst is not None
     size = "infinite by a jump" if worst.infinite else f"{worst.ratio:.4g} of its limit"
     place = f"{worst.joint} {worst.quantity}, {size} at t = {worst.time:.5g} s"
+    ends = [] if report.hand_over else breaks_words(report.ends)
     if report.kept:
         return f"All limits kept ({number}).\nClosest: {place}"
-    return f"{len(report.broken)} of {count(number, 'limit')} broken.\nWorst: {place}"
+    if report.broken:
+        return "\n".join([f"{len(report.broken)} of {count(number, 'limit')} broken.\nWorst: {place}", *ends])
+    told = [f"Limits broken at the ends, not within the motion ({number}). Closest there: {place}", *ends]
+    hint = "If the robot moves before the start and after the stop, say so with --hand-over."
+    return "\n".join([*map(_wrapped, told), hint])
 
 
 def _wrapped(line: str) -> str:
