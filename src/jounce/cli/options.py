@@ -42,6 +42,7 @@ OPTIONS = {
     "workers",
     "chunk",
     "deviation",
+    "hand_over",
 }
 """Arguments that are options of the same name."""
 

@@ -37,6 +37,7 @@ def retime(
     *,
     limits: Path | None = None,
     repair: bool = False,
+    hand_over: bool = False,
     rate: str = "1 kHz",
     order: int | None = None,
     cells: int | None = None,
@@ -63,6 +64,8 @@ def retime(
         File of limits, which go before those of the robot file.
     repair
         Keep the times of a trajectory, and slow it where it must be.
+    hand_over
+        Repair also what starts or stops in motion.
     rate
         Of the rows, as 1kHz, 500Hz; a plain number is in Hz.
     order
@@ -105,7 +108,9 @@ def retime(
         else:
             if path is None:
                 raise JounceError("a robot needs a path; give its file", name="path")
-            result = _of_robot(file, path, limits, frequency, asked | {"repair": repair}, reading, output)
+            result = _of_robot(
+                file, path, limits, frequency, asked | {"repair": repair, "hand_over": hand_over}, reading, output
+            )
     _told(result, (file, path), figure, output)
     return 0 if result.found.report.kept else 1
 

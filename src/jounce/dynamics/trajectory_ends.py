@@ -17,7 +17,8 @@ SMALL = 1e-6  # of the size of a derivative: less is rest
 LEAST = np.array([0.0, 1e-9, 1e-6, 1e-3])  # the same, by s to the power of the order: rad or m
 LOOKS = 201
 INSIDE = 1e-10  # of the duration: how far from the ends these are looked at
-UNSUPPORTED = 0.1  # of its peak: the error of a derivative that samples say nothing of
+UNSUPPORTED = 0.5  # of its peak: the error of a derivative that samples say nothing of
+SAFE = 2.0  # times the estimated error: less is none
 FEW = 2  # times the degree: of fewer samples it is not noise that hides the derivatives, the spline tells what it makes
 
 
@@ -102,7 +103,8 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
     for column, name, own in zip(followed.columns, trajectory.names, errors.T, strict=True):
         law = trajectory.laws[name]
         if isinstance(law, SplineMotion) and law.samples.value and len(law.samples.value[0]) > FEW * law.degree + 1:
-            near[:, column] = np.where(own > UNSUPPORTED, np.inf, np.maximum(near[:, column], own * sizes[:, column]))
+            noise = np.where(own > UNSUPPORTED, np.inf, SAFE * own * sizes[:, column])
+            near[:, column] = np.maximum(near[:, column], noise)
     moving[:, 1:] = np.where(np.abs(moving) > near, moving, 0.0)[:, 1:]
     rest = moving.copy()
     rest[:, 1:] = 0.0

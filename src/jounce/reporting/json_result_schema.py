@@ -136,7 +136,7 @@ class BrokenAtEnd(TypedDict):
 
 
 class EndFacts(TypedDict):
-    """What is met at the start or the stop of a trajectory: joints that do not rest, SI, and limits that this breaks."""
+    """What is met at the start or the stop of a trajectory: what does not rest, SI, and the limits that this breaks."""
 
     end: Literal["start", "stop"]
     time: float

@@ -13,6 +13,7 @@ from jounce.planning.retiming.straight_lines import polynomials_at
 from jounce.trajectory import HermiteMotion, JointTrajectory, SplineMotion
 
 LOOKS = 8  # between two points
+TOLD = 1e-9  # rad or m: less is rounding
 SHOWN = 3  # joints of an end
 UNITS = {"velocities": "rad/s or m/s", "accelerations": "rad/s^2 or m/s^2"}
 
@@ -33,7 +34,7 @@ def _moving(end: TrajectoryEnd) -> str:
     told = ", ".join(f"{name} {value:.4g}" for name, value in largest[:SHOWN])
     more = f" and {len(largest) - SHOWN} more" if len(largest) > SHOWN else ""
     how = "in motion" if end.velocities else "at rest, but with acceleration"
-    return f"{how}: {told}{more} {UNITS[word]}"
+    return f"{how}: {told}{more}, {UNITS[word]},"
 
 
 def breaks_words(ends: Iterable[TrajectoryEnd]) -> list[str]:
@@ -110,7 +111,7 @@ def between_words(trajectory: JointTrajectory) -> list[str]:
     told = between_facts(trajectory)
     if told is None:
         return []
-    if told["joint"] is None:
-        return [f"{told['words']}"]
+    if told["deviation"] <= TOLD:
+        return [told["words"]]
     place = f"{told['joint']} at t = {told['at']:.5g} s"
-    return [f"{told['words']}, at most {told['deviation']:.2g} rad or m from the straight lines between them ({place})"]
+    return [f"{told['words']}, at most {told['deviation']:.2g} rad or m from straight lines, {place}"]

@@ -11,6 +11,7 @@ from jounce.dynamics.limits import LimitReport
 from jounce.planning import RetimedTrajectory
 from jounce.planning.retiming.path import Path as JointPath
 from jounce.reporting.json_results import limits_result
+from jounce.reporting.motion_ends import ends_words
 from jounce.reporting.summaries import count
 from jounce.reporting.tables import Table, number
 
@@ -65,7 +66,7 @@ def retimed_words(
             f"written: {found.stop:.6g} s in {len(found.times)} rows; splines through them keep the limits too "
             f"({100 * (found.stop / free - 1):.2f} % slower)"
         )
-    lines += path_words(found.path)
+    lines += [*path_words(found.path), *ends_words(found.report.ends)]
     worst = found.report.worst
     if worst is not None and worst.ratio is not None:
         kept = f"all {len(found.report.limited)} limits kept, between rows too; nearest"

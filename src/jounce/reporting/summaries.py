@@ -33,7 +33,7 @@ def motion_summary(facts: Facts, file: str) -> str:
         head = f"{facts['space']}: {bodies}, {joints}, {count(len(facts['forces']), 'force')}"
         taken = f"{instants} {span} in {count(facts['steps'], 'step')}, {order}"
         lines = [title, head, facts["mobility"], taken, *_kept(facts), *facts["remarks"]]
-        return "\n".join(_wrapped(line) for line in lines)
+        return "\n".join(wrapped(line) for line in lines)
     equations, drives = facts["equations_of_joints"], facts["equations_of_drivers"]
     bodies, joints = f"{bodies} ({facts['coordinates']} coordinates)", f"{joints} ({count(equations, 'equation')})"
     lines = [title, f"{facts['space']}: {bodies}, {joints}", freedom_words(drives, facts["drivers"])]
@@ -42,7 +42,7 @@ def motion_summary(facts: Facts, file: str) -> str:
         passed = ", ".join(f"{t:g} s" for t in facts["change_points"][:6])
         more = ", ..." if len(facts["change_points"]) > 6 else ""
         lines.append(f"passes a change point, where another motion could branch off, at t = {passed}{more}")
-    lines += [_wrapped(remark) for remark in facts["remarks"]]
+    lines += [wrapped(remark) for remark in facts["remarks"]]
     return "\n".join(lines)
 
 
@@ -145,7 +145,7 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
         told = [f"{word} of {', '.join(names)}" if word in limited else word for word, names in free.items()]
         lines.append(f"without a limit: {', '.join(told)}")
     lines += [*between_words(motion), *ends_words(report.ends)]
-    return "\n".join(_wrapped(line) for line in lines)
+    return "\n".join(wrapped(line) for line in lines)
 
 
 def torques_summary(
@@ -163,7 +163,7 @@ def torques_summary(
     if still:
         lines.append(f"not in the trajectory, held still: {', '.join(still)}")
     lines += [*between_words(motion), *ends_words(ends)]
-    return "\n".join(_wrapped(line) for line in lines)
+    return "\n".join(wrapped(line) for line in lines)
 
 
 def verdict(report: LimitReport) -> str:
@@ -179,10 +179,10 @@ def verdict(report: LimitReport) -> str:
         return "\n".join([f"{len(report.broken)} of {count(number, 'limit')} broken.\nWorst: {place}", *ends])
     told = [f"Limits broken at the ends, not within the motion ({number}). Closest there: {place}", *ends]
     hint = "If the robot moves before the start and after the stop, say so with --hand-over."
-    return "\n".join([*map(_wrapped, told), hint])
+    return "\n".join([*map(wrapped, told), hint])
 
 
-def _wrapped(line: str) -> str:
+def wrapped(line: str) -> str:
     """Break a long line after commas and colons only."""
     import textwrap
 

@@ -93,9 +93,10 @@ def _ends(
         ]
         fourth = [(robot.joint_names[j], "jounce") for j in source.with_jounce if jumps.above(4)[k, j]]
         state = (jumps.after if end.end == "start" else jumps.before)[[k]]
-        fast = [source.point(state, p)[:, 1].any() for p in points]
         forced = [
-            (p.link, "acceleration of the point") for p, x in zip(points, fast, strict=True) if x and p.acceleration
+            (p.link, "acceleration of the point")
+            for p in points
+            if p.acceleration and source.point(state, p)[:, 1].any()
         ]
         found.append(dataclasses.replace(end, breaks=(*end.breaks, *more, *fourth, *forced)))
     return tuple(found)

@@ -47,6 +47,7 @@ def retime(
     deviation: float | None = None,
     parameter: ArrayLike | None = None,
     degree: int | None = None,
+    hand_over: bool = False,
 ) -> RetimedTrajectory:
     """Return the fastest motion along a path that keeps limits.
 
@@ -94,6 +95,8 @@ def retime(
     degree : int, optional
         Of the splines through waypoints, with not-a-knot ends; 5 unless given. With a parameter and degree 3 the path
         is that of TOPP-RA's ``SplineInterpolator``.
+    hand_over : bool, default False
+        Whether a trajectory that is repaired may start and stop in motion, as of a robot that moves already.
 
     Returns
     -------
@@ -136,11 +139,12 @@ def retime(
         return retime_mechanism(robot, _of_mechanism(limits), _rates(rates), order, cells or CELLS)
     if not isinstance(robot, Robot):
         raise TrajectoryError("must be a Robot or a Mechanism", name="robot", value=type(robot).__name__)
+    hand_over = flag("hand_over", hand_over, error=TrajectoryError)
     drives, repair = flag("drives", drives, error=TrajectoryError), flag("repair", repair, error=TrajectoryError)
     if isinstance(path, JointTrajectory):
         FollowedTrajectory(robot, path)  # checks its joints and units
     if repair:
-        return _repaired(robot, path, limits, order, cells, drives, between)
+        return _repaired(robot, path, limits, order, cells, drives, between, hand_over=hand_over)
     chosen = _order(order, limits_of(robot, limits), robot)
     found = path_of(path, names if names is not None else robot.joint_names, chosen, between)
     source = RobotQuantities(robot, found, limits, drives=drives)
@@ -149,7 +153,7 @@ def retime(
     cells = cells or cells_needed(found, chosen)
     conditions = Conditions(chosen, _rates(rates))
     law, search = fastest(source, source.labels, found.start, found.stop, conditions, cells)
-    return _certified(robot, found, law, search, source, drives)
+    return _certified(robot, found, law, search, source, drives, hand_over=any(conditions.rates))
 
 
 def _repaired(
@@ -160,6 +164,8 @@ def _repaired(
     cells: int | None,
     drives: bool,
     between: Between,
+    *,
+    hand_over: bool,
 ) -> RetimedTrajectory:
     if not isinstance(trajectory, JointTrajectory):
         raise TrajectoryError("only a trajectory can be repaired", name="path", value=type(trajectory).__name__)
@@ -174,7 +180,17 @@ def _repaired(
     first, last = (1.0 if as_it_was else None for as_it_was in keeps.tolist())
     conditions = Conditions(chosen, (first, last), highest=1.0)
     law, search = slowed_only(source, source.labels, path.start, path.stop, conditions, cells)
-    return _certified(robot, path, law, search, source, drives)
+    found = _certified(robot, path, law, search, source, drives, hand_over=hand_over)
+    for end in () if hand_over else found.report.ends:
+        if end.breaks:
+            owner, quantity = end.breaks[0]
+            message = (
+                f"the trajectory does not rest at its {end.end}: from rest, or to it, the {quantity} of {owner} is "
+                "infinite there, which slowing it does not cure; let it rest there, retime it without repair, or say "
+                "hand_over if the robot moves already"
+            )
+            raise TrajectoryError(message, name="repair")
+    return found
 
 
 def keeps_limits(source: RobotQuantities, s: np.ndarray) -> np.ndarray:
@@ -185,7 +201,14 @@ def keeps_limits(source: RobotQuantities, s: np.ndarray) -> np.ndarray:
 
 
 def _certified(
-    robot: Robot, path: Path, law: RateLaw, search: Search, source: RobotQuantities, drives: bool
+    robot: Robot,
+    path: Path,
+    law: RateLaw,
+    search: Search,
+    source: RobotQuantities,
+    drives: bool,
+    *,
+    hand_over: bool,
 ) -> RetimedTrajectory:
     """Return the trajectory of a law, once it keeps the limits as its own derivatives in time tell them."""
     for attempt in range(ATTEMPTS):
@@ -193,7 +216,7 @@ def _certified(
         progress = FollowingMotion(law.parameter, motion)
         laws = {name: FollowingMotion(own, progress) for name, own in path.laws.items()}
         bare = JointTrajectory(laws, 0.0, motion.duration, np.linspace(0.0, motion.duration, law.basis.cells + 1))
-        report = check_motion(robot, bare, source.limits, drives=drives)
+        report = check_motion(robot, bare, source.limits, drives=drives, hand_over=hand_over)
         over = (report.worst.ratio or 0.0) - 1 if report.worst else 0.0
         if over <= KEPT:
             return RetimedTrajectory(laws, bare.stop, path, progress, report, active_limits(search, law, motion))
