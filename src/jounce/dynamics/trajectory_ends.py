@@ -18,7 +18,9 @@ LEAST = np.array([0.0, 1e-9, 1e-6, 1e-3])  # the same, by s to the power of the 
 LOOKS = 201
 INSIDE = 1e-10  # of the duration: how far from the ends these are looked at
 UNSUPPORTED = 0.5  # of its peak: the error of a derivative that samples say nothing of
-SAFE = 2.0  # times the estimated error: less is none
+SAFE = 3.0  # times the estimated error: less is none
+SLOW, FAR = 0.02, 4.0  # of the largest velocity, and deviations: less is none where noise hides what splines say
+FITTED, PART = 12, 20  # samples at each end that tell its velocity then: so many, or so small a part of all
 FEW = 2  # times the degree: of fewer samples it is not noise that hides the derivatives, the spline tells what it makes
 
 
@@ -99,16 +101,38 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
     least[: len(LEAST)] = LEAST[: order + 1]
     near = np.maximum(SMALL * sizes, least[:, None])
     near[:-1] = np.maximum(near[:-1], 2 * inside * sizes[1:])
-    errors = trajectory.estimate_error(order)
-    for column, name, own in zip(followed.columns, trajectory.names, errors.T, strict=True):
+    near = np.stack([near, near])
+    span = float(times[1] - times[0])
+    for column, name in zip(followed.columns, trajectory.names, strict=True):
         law = trajectory.laws[name]
-        if isinstance(law, SplineMotion) and law.samples.value and len(law.samples.value[0]) > FEW * law.degree + 1:
-            noise = np.where(own > UNSUPPORTED, np.inf, SAFE * own * sizes[:, column])
-            near[:, column] = np.maximum(near[:, column], noise)
+        if not isinstance(law, SplineMotion) or not law.samples.value:
+            continue
+        if len(law.samples.value[0]) <= FEW * law.degree + 1:
+            continue
+        errors = trajectory.estimate_error(order, [name])[:, 0]
+        wave = np.ptp(values[:, 0, column]) / 2 * (2 * np.pi / span) ** np.arange(order + 1)  # as errors count peaks
+        noise = np.where(errors > UNSUPPORTED, np.inf, SAFE * errors * np.maximum(sizes[:, column], wave))
+        near[:, :, column] = np.maximum(near[:, :, column], noise)
+        if noise[1] > SLOW * sizes[1, column]:
+            for k, end in enumerate((1, -1)):
+                speed, scatter = _fitted_speed(*(x[::end] for x in law.samples.value))
+                moving[k, 1, column] = speed
+                near[k, 1, column] = max(FAR * scatter, SLOW * sizes[1, column])
     moving[:, 1:] = np.where(np.abs(moving) > near, moving, 0.0)[:, 1:]
     rest = moving.copy()
     rest[:, 1:] = 0.0
     return Jumps(times, np.stack([rest[0], moving[1]]), np.stack([moving[0], rest[1]]))
+
+
+def _fitted_speed(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> tuple[float, float]:
+    """Return the velocity at the first of samples by a parabola through the noise of some, and its deviation."""
+    count = min(len(times), max(FITTED, len(times) // PART))
+    reach = times[count - 1] - times[0]
+    table = np.vander((times[:count] - times[0]) / reach, 3, increasing=True)
+    found, *_ = np.linalg.lstsq(table, values[:count], rcond=None)
+    left = values[:count] - table @ found
+    spread = np.linalg.inv(table.T @ table)[1, 1] * (left @ left) / max(count - 3, 1)
+    return float(found[1] / reach), float(np.sqrt(spread) / abs(reach))
 
 
 def told_ends(names: Sequence[str], jumps: Jumps) -> tuple[TrajectoryEnd, TrajectoryEnd]:
