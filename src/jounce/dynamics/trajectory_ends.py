@@ -39,6 +39,15 @@ class TrajectoryEnd:
         after the stop; rad or m by s to the power of the order.
     breaks : tuple of (str, str)
         Joints, or links, and the quantities of theirs that have a limit and are infinite by such a jump.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> pin = jn.Joint("pin", "base", "rod", limits=jn.Limits(velocity=2.0, acceleration=9.0))
+    >>> robot = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", jn.Inertia(1.0))], [pin])
+    >>> report = jn.check_limits(robot, jn.JointTrajectory({"pin": "t"}, start=0.0, stop=1.0))
+    >>> report.ends[0].at_rest, report.ends[0].breaks, report.kept
+    (False, (('pin', 'acceleration'),), False)
     """
 
     end: str
