@@ -153,7 +153,7 @@ def test_mjcf_robots_are_checked_too(run, files):
 
 def test_the_figure_is_written(run, files, tmp_path):
     robot, trajectory = files(pendulum_urdf=PENDULUM, wave_yaml="joints: {pin: sin(t)/2}\ntime: {stop: 1, step: 0.1}")
-    status, out, _ = run(robot, trajectory, "--out", tmp_path / "limits.svg")
+    status, out, _ = run(robot, trajectory, "--hand-over", "--out", tmp_path / "limits.svg")
     assert status == 0
     assert out.endswith(f"Written to {tmp_path / 'limits.svg'}\n")
     text = (tmp_path / "limits.svg").read_text(encoding="utf-8")
@@ -164,7 +164,7 @@ def test_the_figure_is_written(run, files, tmp_path):
 def test_samples_that_do_not_support_the_jerk_are_a_warning_in_one_line(run, files):
     noise = np.random.default_rng(0).normal(scale=1e-5, size=101)
     robot, trajectory = files(pendulum_urdf=PENDULUM, noisy_csv=samples(lambda t: 0.1 * t + noise[round(100 * t)]))
-    status, out, err = run(robot, trajectory)
+    status, out, err = run(robot, trajectory, "--hand-over")
     assert status == 0
     assert err.startswith("warning: samples of 'pin' do not support its derivative of order ")
     assert err.count("\n") == 1
@@ -176,7 +176,7 @@ def test_the_degree_of_the_splines_is_an_option(run, files):
     status, _, err = run(robot, trajectory)
     assert status == 2
     assert "a spline of degree 5 needs at least 6 samples, got 5; give more, or lower the degree" in err
-    assert run(robot, trajectory, "--degree", "3")[0] == 0
+    assert run(robot, trajectory, "--degree", "3", "--hand-over")[0] == 0
 
 
 def test_a_terminal_gets_a_coloured_table(run, monkeypatch, files):

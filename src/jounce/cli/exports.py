@@ -60,7 +60,10 @@ def export(
         examples/trajectories/ur5_stack.yaml --format ros --rate 50Hz \
         --torques --out stack.yaml
     """
+    from jounce.dynamics.trajectory_ends import trajectory_ends
     from jounce.io import export_trajectory
+    from jounce.reporting.motion_ends import between_words, ends_words
+    from jounce.reporting.summaries import wrapped
 
     frequency = None if rate is None else frequency_of(rate)
     names = None if joints is None else [name.strip() for name in joints.split(",")]
@@ -80,7 +83,9 @@ def export(
                 header_units=header_units,
                 overwrite=overwrite,
             )
+            ends = trajectory_ends(model, motion)
     recorded_cautions(caught)
     first, last = float(times[0]), float(times[-1])
     say(f"{len(times)} rows from {first:g} s to {last:g} s written to {out}")
+    say("\n".join(wrapped(line) for line in [*between_words(motion), *ends_words(ends)]))
     return 0

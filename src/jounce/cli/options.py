@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from jounce.cli.file_kinds import expecting
-from jounce.errors import JounceError, OutputError, RobotError
+from jounce.errors import JounceError, OutputError, RobotError, UnitError
 from jounce.reporting.terminal import say, say_json
 
 if TYPE_CHECKING:
     from jounce.mechanism import Mechanism
     from jounce.robot import Robot
     from jounce.trajectory import JointTrajectory
+    from jounce.trajectory.dimensions import Dimension
     from jounce.trajectory.shown_units import ShownUnits
 
 Overwrite = Annotated[bool, Parameter(alias="--force")]
@@ -40,6 +41,8 @@ OPTIONS = {
     "scheduler",
     "workers",
     "chunk",
+    "deviation",
+    "hand_over",
 }
 """Arguments that are options of the same name."""
 
@@ -282,6 +285,25 @@ def errors_about(file: Path, robot: Path | None = None) -> Iterator[None]:
             raise
         about_robot = robot is not None and isinstance(error, RobotError)
         raise error.located(path=robot if about_robot else file) from None
+
+
+def positive_quantity(option: str, text: str, dimensions: Collection[Dimension], words: str) -> float:
+    """Return a number greater than zero in SI units, of a text that may have a unit of one of some dimensions."""
+    from jounce.trajectory.units import parse_value
+
+    try:
+        number: Any = float(text)
+    except ValueError:
+        number = text
+    try:
+        found = parse_value(number)
+    except JounceError as error:
+        raise error.located(name=option, value=text) from None
+    if found.dimension is not None and found.dimension not in dimensions:
+        raise UnitError(f"must be {words}", name=option, value=text)
+    if not isinstance(found.value, float) or found.value <= 0:
+        raise JounceError("must be greater than zero", name=option, value=text)
+    return found.value
 
 
 CURVE_OPTIONS = {"driver": "--driver", "order": "--order", "count": "--points", "length": "--length", "time": "--time"}

@@ -15,6 +15,7 @@ from jounce.cli.options import (
     TableOutput,
     allowed,
     errors_about,
+    positive_quantity,
     spare_inputs,
     written,
 )
@@ -36,9 +37,11 @@ def retime(
     *,
     limits: Path | None = None,
     repair: bool = False,
+    hand_over: bool = False,
     rate: str = "1 kHz",
     order: int | None = None,
     cells: int | None = None,
+    deviation: str | None = None,
     figure: Path | None = None,
     reading: RobotReading = PLAIN_ROBOT,
     output: TableOutput = NO_TABLE,
@@ -61,12 +64,18 @@ def retime(
         File of limits, which go before those of the robot file.
     repair
         Keep the times of a trajectory, and slow it where it must be.
+    hand_over
+        Repair also what starts or stops in motion.
     rate
         Of the rows, as 1kHz, 500Hz; a plain number is in Hz.
     order
         Highest derivative that is continuous [as the limits ask].
     cells
         Of the spline of the rate, 20 or more [160].
+    deviation
+        Of the path from straight lines between samples, as 0.1deg, 1mm; a
+        plain number is in rad or m [0.001, or 0.001 of its size if less];
+        between waypoints go splines unless it is given.
     figure
         Draw which limits bind where: .png, .svg or .pdf.
 
@@ -87,20 +96,30 @@ def retime(
 
         check_figure(figure, overwrite=output.overwrite)
     frequency = frequency_of(rate)
-    asked = {"order": order} | ({} if cells is None else {"cells": cells})
+    asked: dict[str, Any] = {"order": order} | ({} if cells is None else {"cells": cells})
+    asked |= {} if deviation is None else {"deviation": deviation_of(deviation)}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)
         if file.suffix.lower() in DATA_FILES:
-            if path is not None or repair:
-                name = "--repair" if repair else "path"
+            if path is not None or repair or deviation is not None:
+                name = "--repair" if repair else "path" if path is not None else "--deviation"
                 raise JounceError("the path of a mechanism is that of its drivers, which is not repaired", name=name)
             result = _of_mechanism(file, limits, frequency, asked, reading)
         else:
             if path is None:
                 raise JounceError("a robot needs a path; give its file", name="path")
-            result = _of_robot(file, path, limits, frequency, asked | {"repair": repair}, reading, output)
+            result = _of_robot(
+                file, path, limits, frequency, asked | {"repair": repair, "hand_over": hand_over}, reading, output
+            )
     _told(result, (file, path), figure, output)
-    return 0
+    return 0 if result.found.report.kept else 1
+
+
+def deviation_of(text: str) -> float:
+    """Return an angle or a length, rad or m."""
+    from jounce.trajectory.dimensions import ANGLE, LENGTH
+
+    return positive_quantity("--deviation", text, (ANGLE, LENGTH), "an angle or a length, such as 0.1deg or 1mm")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -28,6 +28,7 @@ def check(
     /,
     *,
     limits: Path | None = None,
+    hand_over: bool = False,
     out: Path | None = None,
     reading: RobotReading = PLAIN_ROBOT,
     overwrite: bool = False,
@@ -35,7 +36,8 @@ def check(
 ) -> int:
     r"""Compare a trajectory with the limits of a robot, to torque rate.
 
-    The exit status is 0 where all limits are kept, 1 where one is broken.
+    The exit status is 0 where all limits are kept, 1 where one is broken,
+    also by a jump from rest at the start or to rest at the stop.
 
     Parameters
     ----------
@@ -45,6 +47,8 @@ def check(
         Samples (.csv), laws or a motion (.yaml, .toml, .json).
     limits
         File of limits, which go before those of the robot file.
+    hand_over
+        The robot moves already at the start, and goes on at the stop.
     out
         Draw the joints' shares of their limits: .png, .svg or .pdf.
     overwrite
@@ -82,7 +86,7 @@ def check(
         motion = reading.trajectory(trajectory)
         with errors_about(trajectory, robot):
             spare_inputs(out, overwrite=overwrite)
-            report = check_motion(model, motion, bounds)
+            report = check_motion(model, motion, bounds, hand_over=hand_over)
     if report.worst is None:
         raise JounceError("there are no limits to compare with; give a file of limits with --limits", path=robot)
     if not json:
@@ -95,7 +99,7 @@ def check(
         from jounce.plot import draw_limits, save
 
         written(lambda: save(draw_limits(report, f"{report.robot}: {trajectory.name}"), out, overwrite=overwrite))
-    tell("check", lambda: limits_result(report, robot, trajectory, out), out, json=json)
+    tell("check", lambda: limits_result(report, robot, trajectory, out, motion), out, json=json)
     return 0 if report.kept else 1
 
 
@@ -132,6 +136,7 @@ def torques(
         examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg"
     """
     from jounce.dynamics.trajectories import trajectory_torques
+    from jounce.dynamics.trajectory_ends import trajectory_ends
     from jounce.reporting.json_results import torques_result
     from jounce.reporting.peaks import table_peaks
     from jounce.reporting.summaries import torques_summary
@@ -143,9 +148,10 @@ def torques(
     spare_inputs(output.out, overwrite=output.overwrite)
     with errors_about(trajectory, robot):
         found = trajectory_torques(model, motion, rates, drives=not no_drives)
+        ends = trajectory_ends(model, motion)
     if not output.json:
-        say(torques_summary(found, motion, robot, trajectory))
+        say(torques_summary(found, motion, ends, robot, trajectory))
         show_peaks(table_peaks(found))
     output.write(lambda: found)
-    output.tell("torques", lambda: torques_result(found, motion, robot, trajectory, output.out))
+    output.tell("torques", lambda: torques_result(found, motion, ends, robot, trajectory, output.out))
     return 0

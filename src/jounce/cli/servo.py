@@ -14,9 +14,10 @@ from jounce.cli.options import (
     MechanismReading,
     TableOutput,
     errors_about,
+    positive_quantity,
     spare_inputs,
 )
-from jounce.errors import JounceError, UnitError, check_name
+from jounce.errors import JounceError, check_name
 from jounce.reporting.terminal import Bar, say, show_peaks
 
 if TYPE_CHECKING:
@@ -92,21 +93,7 @@ def servo(
 
 def frequency_of(text: str) -> float:
     """Return a rate in 1/s."""
-    from jounce.trajectory.units import parse_value
-
-    try:
-        number: Any = float(text)
-    except ValueError:
-        number = text
-    try:
-        found = parse_value(number)
-    except JounceError as error:
-        raise error.located(name="--rate", value=text) from None
-    if found.dimension not in (None, PER_TIME):
-        raise UnitError("must be a frequency, such as 1kHz", name="--rate", value=text)
-    if not isinstance(found.value, float) or found.value <= 0:
-        raise JounceError("must be greater than zero", name="--rate", value=text)
-    return found.value
+    return positive_quantity("--rate", text, (PER_TIME,), "a frequency, such as 1kHz")
 
 
 def _at_rate(mechanism: Mechanism, frequency: float, order: int, bar: Bar) -> Motion:

@@ -12,6 +12,7 @@ from jounce.display import Displayed
 from jounce.dynamics.highest import local_maxima
 from jounce.dynamics.limit_jumps import Infinite, infinite_quantities, jumps_of
 from jounce.dynamics.trajectories import FollowedTrajectory, why_not
+from jounce.dynamics.trajectory_ends import TrajectoryEnd, end_jumps, told_ends
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
@@ -130,6 +131,10 @@ class LimitReport(LimitRows, Displayed):
         The same as shares of their limits: from -1 at the lower to 1 at the upper one, NaN where there is no limit.
     drives : bool, default True
         Whether torques contain armature, damping and friction.
+    ends : tuple of TrajectoryEnd
+        What is met at the start and at the stop, and which limits a jump from rest, or to it, breaks there.
+    hand_over : bool
+        Whether the robot moves before the start and after the stop as the trajectory does there: nothing jumps then.
     """
 
     robot: str
@@ -140,6 +145,13 @@ class LimitReport(LimitRows, Displayed):
     values: Float[np.ndarray, "time 6 joint"]
     shares: Float[np.ndarray, "time 6 joint"]
     drives: bool = True
+    ends: tuple[TrajectoryEnd, ...] = ()
+    hand_over: bool = False
+
+    @property
+    def kept(self) -> bool:
+        """Whether no limit is broken, neither within the motion nor by a jump from rest, or to it, at its ends."""
+        return not self.broken and (self.hand_over or not any(end.breaks for end in self.ends))
 
     def __repr__(self) -> str:
         found = f"{len(self.limited)} limits, {len(self.broken)} broken"
@@ -157,6 +169,7 @@ def check_limits(
     *,
     times: ArrayLike | None = None,
     drives: bool = True,
+    hand_over: bool = False,
 ) -> LimitReport:
     """Compare a trajectory, and the torques and torque rates that it needs, with the limits of the joints.
 
@@ -172,6 +185,10 @@ def check_limits(
     of Python functions are looked for between the instants. There, what is below 1e-5 of the largest value or a fourth
     of the change from one instant to the next is not found, nor a second one between the same two.
 
+    Before the start and after the stop the robot is taken to rest. If a joint moves there, what is above the derivative
+    that jumps is infinite: the rows are those of the motion itself, but `LimitReport.ends` tells it, and limits of it
+    are not kept. What a spline through samples makes of their errors at the ends is no jump.
+
     Parameters
     ----------
     robot : Robot
@@ -185,6 +202,8 @@ def check_limits(
         Increasing instants to look at, s, instead of those above.
     drives : bool, default True
         Whether torques contain armature inertia, damping and friction of the drives.
+    hand_over : bool, default False
+        Whether the robot moves already as the trajectory starts, and goes on moving as it stops.
 
     Returns
     -------
@@ -214,7 +233,7 @@ def check_limits(
     >>> report.kept, [(row.quantity, round(row.ratio, 4), round(row.time, 4)) for row in report.limited]
     (False, [('velocity', 0.5, 0.0), ('torque', 1.2263, 0.0)])
     """
-    drives = flag("drives", drives, error=RobotError)
+    drives, hand_over = flag("drives", drives, error=RobotError), flag("hand_over", hand_over, error=RobotError)
     followed = FollowedTrajectory(robot, trajectory)
     held = followed.held
 
@@ -239,9 +258,13 @@ def check_limits(
         _row(robot, bounds, quantity, joint, *bounds.or_infinite(infinite, quantity, joint, *worst))
         for (quantity, joint), *worst in zip(wanted, at.tolist(), found.tolist(), shown.tolist(), strict=True)
     )
+    ends = _ends(followed, values[:, : ORDER + 1], bounds, drives)
     for message in followed.doubts:
         warnings.warn(SampleWarning(message), stacklevel=2)
-    return LimitReport(robot.name, robot.joint_names, rows, held, grid, values, bounds.shares(values, grid), drives)
+    shares = bounds.shares(values, grid)
+    return LimitReport(
+        robot.name, robot.joint_names, rows, held, grid, values, shares, drives=drives, ends=ends, hand_over=hand_over
+    )
 
 
 class _Bounds:
@@ -363,14 +386,38 @@ def _row(
     robot: Robot, bounds: _Bounds, quantity: int, joint: int, time: float, value: float, weight: float
 ) -> LimitRow:
     name = robot.joint_names[joint]
-    turning = robot.joints[name].turning
-    field, units = FIELDS[quantity], TURNING if turning else SLIDING
-    word = field.replace("effort", "torque" if turning else "force").replace("_", " ")
+    word, unit = word_of(robot, quantity, joint)
     if not bounds.limited[quantity, joint]:
-        return LimitRow(name, word, units[field], value, time)
+        return LimitRow(name, word, unit, value, time)
     above, below = (float(x) for x in bounds.sides(np.array(value * weight), (quantity, joint)))
     limit = (bounds.upper if above >= below else bounds.lower)[quantity, joint] / (weight or 1.0)
-    return LimitRow(name, word, units[field], value, time, float(limit), max(above, below, 0.0))
+    return LimitRow(name, word, unit, value, time, float(limit), max(above, below, 0.0))
+
+
+def _ends(
+    followed: FollowedTrajectory, values: Float[np.ndarray, "time derivative joint"], bounds: _Bounds, drives: bool
+) -> tuple[TrajectoryEnd, ...]:
+    """Return what is met at both ends, and the limits that are broken there."""
+    robot, jumps = followed.robot, end_jumps(followed, values)
+    if np.array_equal(jumps.before, jumps.after):
+        return told_ends(robot.joint_names, jumps)
+    infinite = infinite_quantities(followed, jumps, drives)
+    weights = bounds.weights(infinite.before, infinite.times)
+    broken = (infinite.signs != 0) & (weights > 0) & bounds.limited
+    return tuple(
+        dataclasses.replace(
+            end, breaks=tuple((robot.joint_names[j], word_of(robot, q, j)[0]) for j, q in np.argwhere(own.T).tolist())
+        )
+        for end, own in zip(told_ends(robot.joint_names, jumps), broken, strict=True)
+    )
+
+
+def word_of(robot: Robot, quantity: int, joint: int) -> tuple[str, str]:
+    """Return the word for a quantity of a joint, and its unit."""
+    turning = robot.joints[robot.joint_names[joint]].turning
+    field = FIELDS[quantity]
+    word = field.replace("effort", "torque" if turning else "force").replace("_", " ")
+    return word, (TURNING if turning else SLIDING)[field]
 
 
 def _merged(robot: Robot, limits: Mapping[str, Limits] | None) -> dict[str, Limits]:

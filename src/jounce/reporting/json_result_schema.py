@@ -128,13 +128,42 @@ class LimitRow(TypedDict):
     broken: bool
 
 
+class BrokenAtEnd(TypedDict):
+    """A joint or a link, and a quantity of it that has a limit and is infinite at an end."""
+
+    name: str
+    quantity: str
+
+
+class EndFacts(TypedDict):
+    """What is met at the start or the stop of a trajectory: what does not rest, SI, and the limits that this breaks."""
+
+    end: Literal["start", "stop"]
+    time: float
+    at_rest: bool
+    velocities: dict[str, float]
+    accelerations: dict[str, float]
+    breaks: list[BrokenAtEnd]
+
+
+class BetweenFacts(TypedDict):
+    """What was taken to happen between points, and how far, where, that leads from the straight lines between them."""
+
+    words: str
+    deviation: float
+    joint: str | None
+    at: float | None
+
+
 class TrajectoryResult(Result):
-    """What is told of a robot on a trajectory."""
+    """What is told of a robot on a trajectory; between is null where its laws say what happens between points."""
 
     robot: str
     file: str
     trajectory: str
     time: Grid
+    ends: list[EndFacts]
+    between: BetweenFacts | None
     written: str | None
 
 
@@ -147,6 +176,7 @@ class CheckResult(TrajectoryResult):
     held: dict[str, float]
     drives: bool
     limits: list[LimitRow]
+    hand_over: bool
 
 
 class TorquesResult(TrajectoryResult):
@@ -213,9 +243,13 @@ class RetimeResult(Result):
     written: str | None
     duration: float
     before: float | None
+    path: str | None
     deviation: float
+    deviation_allowed: float | None
     kept: bool
     limits: list[LimitRow]
+    ends: list[EndFacts]
+    hand_over: bool
     binding: list[BindingLimit]
     figure: str | None
 

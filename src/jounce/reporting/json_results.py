@@ -5,14 +5,16 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits import LimitReport
 from jounce.dynamics.trajectories import told_drives
+from jounce.dynamics.trajectory_ends import TrajectoryEnd
 from jounce.errors import UNSET, JounceError, show_value
 from jounce.kinematics import Motion, Stretches
+from jounce.reporting.motion_ends import between_facts, ends_facts
 from jounce.reporting.motion_facts import motion_facts
 from jounce.reporting.peaks import Peak, peaks, table_peaks
 from jounce.trajectory import JointTrajectory
@@ -83,7 +85,9 @@ def told_peak(peak: Peak) -> dict[str, Any]:
     return told
 
 
-def limits_result(report: LimitReport, robot: Path, trajectory: Path, written: Path | None) -> dict[str, Any]:
+def limits_result(
+    report: LimitReport, robot: Path, trajectory: Path, written: Path | None, motion: JointTrajectory | None = None
+) -> dict[str, Any]:
     """Return what `jounce check` tells of a trajectory and the limits of a robot."""
     names = {"worst": "value", "at": "time"}
     keys = ("joint", "quantity", "unit", "worst", "limit", "ratio", "at", "broken")
@@ -97,12 +101,20 @@ def limits_result(report: LimitReport, robot: Path, trajectory: Path, written: P
         "held": dict(report.held),
         "drives": report.drives,
         "limits": [{key: getattr(row, names.get(key, key)) for key in keys} for row in report.rows],
+        "ends": ends_facts(report.ends),
+        "hand_over": report.hand_over,
+        "between": None if motion is None else between_facts(motion),
         "written": written,
     }
 
 
 def torques_result(
-    dataset: xarray.Dataset, motion: JointTrajectory, robot: Path, trajectory: Path, written: Path | None
+    dataset: xarray.Dataset,
+    motion: JointTrajectory,
+    ends: Sequence[TrajectoryEnd],
+    robot: Path,
+    trajectory: Path,
+    written: Path | None,
 ) -> dict[str, Any]:
     """Return what `jounce torques` tells of a robot on a trajectory."""
     times = dataset["time"].values
@@ -116,5 +128,7 @@ def torques_result(
         "held": [name for name in dataset.data_vars if name not in motion.names],
         "drives": dataset.attrs["drives"] == told_drives(True),
         "peaks": [{"joint": peak.pop("output"), **peak} for peak in told],
+        "ends": ends_facts(ends),
+        "between": between_facts(motion),
         "written": written,
     }

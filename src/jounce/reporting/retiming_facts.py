@@ -10,7 +10,9 @@ import numpy as np
 from jounce.dynamics.limits import LimitReport
 from jounce.dynamics.trajectories import told_drives
 from jounce.planning import RetimedTrajectory
+from jounce.planning.retiming.path import Path as JointPath
 from jounce.reporting.json_results import limits_result
+from jounce.reporting.motion_ends import ends_words
 from jounce.reporting.summaries import count
 from jounce.reporting.tables import Table, number
 
@@ -67,15 +69,28 @@ def retimed_words(
         )
     if what == "joint" and any(row.unit.startswith("N") for row in found.report.limited):
         lines.append(f"torques: {told_drives(found.report.drives)}")
-    if found.path.deviation > TOLD:
-        lines.append(f"the path passes the given trajectory within {found.path.deviation:.1e} rad or m")
+    lines += [*path_words(found.path), *ends_words(found.report.ends)]
     worst = found.report.worst
     if worst is not None and worst.ratio is not None:
+        kept = f"all {len(found.report.limited)} limits kept, between rows too; nearest"
         lines.append(
-            f"all {len(found.report.limited)} limits kept, between rows too; nearest: {worst.joint} {worst.quantity}, "
+            f"{kept if found.report.kept else 'NOT all limits kept; worst'}: {worst.joint} {worst.quantity}, "
             f"{worst.ratio:.6f} of its limit at t = {worst.time:.5g} s"
         )
     return "\n".join(lines)
+
+
+def path_words(path: JointPath) -> list[str]:
+    """Word what a path is between the points that were given, and how far it is from the straight lines there."""
+    if path.words.startswith("within"):
+        return [f"path: {path.words}; at most {path.deviation:.2g} from them"]
+    if path.words:
+        bound = "" if path.allowed is None else f" ({path.allowed:.3g} allowed)"
+        away = f"at most {path.deviation:.2g} rad or m{bound}"
+        return [f"path: {path.words}; {away} from the straight lines between them"]
+    if path.deviation > TOLD:
+        return [f"path: within {path.deviation:.1e} rad or m of the given trajectory"]
+    return []
 
 
 def retiming_result(
@@ -87,13 +102,15 @@ def retiming_result(
 ) -> dict[str, Any]:
     """Return what `jounce retime` tells."""
     told = limits_result(found.report, files[0], files[1] or files[0], written[0])
-    del told["held"], told["broken"]
+    del told["held"], told["broken"], told["between"]
     return {
         **told,
         "trajectory": files[1],
         "duration": free,
         "before": before,
+        "path": found.path.words or None,
         "deviation": found.path.deviation,
+        "deviation_allowed": found.path.allowed,
         "binding": binding_facts(found),
         "figure": written[1],
     }

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits import LimitReport
 from jounce.dynamics.trajectories import told_drives
+from jounce.dynamics.trajectory_ends import TrajectoryEnd
 from jounce.reporting.law_facts import law_words
+from jounce.reporting.motion_ends import between_words, breaks_words, ends_words
 from jounce.trajectory import JointTrajectory
 
 if TYPE_CHECKING:
@@ -32,7 +34,7 @@ def motion_summary(facts: Facts, file: str) -> str:
         head = f"{facts['space']}: {bodies}, {joints}, {count(len(facts['forces']), 'force')}"
         taken = f"{instants} {span} in {count(facts['steps'], 'step')}, {order}"
         lines = [title, head, facts["mobility"], taken, *_kept(facts), *facts["remarks"]]
-        return "\n".join(_wrapped(line) for line in lines)
+        return "\n".join(wrapped(line) for line in lines)
     equations, drives = facts["equations_of_joints"], facts["equations_of_drivers"]
     bodies, joints = f"{bodies} ({facts['coordinates']} coordinates)", f"{joints} ({count(equations, 'equation')})"
     lines = [title, f"{facts['space']}: {bodies}, {joints}", freedom_words(drives, facts["drivers"])]
@@ -41,7 +43,7 @@ def motion_summary(facts: Facts, file: str) -> str:
         passed = ", ".join(f"{t:g} s" for t in facts["change_points"][:6])
         more = ", ..." if len(facts["change_points"]) > 6 else ""
         lines.append(f"passes a change point, where another motion could branch off, at t = {passed}{more}")
-    lines += [_wrapped(remark) for remark in facts["remarks"]]
+    lines += [wrapped(remark) for remark in facts["remarks"]]
     return "\n".join(lines)
 
 
@@ -145,11 +147,14 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
         limited = {row.quantity for row in report.limited}
         told = [f"{word} of {', '.join(names)}" if word in limited else word for word, names in free.items()]
         lines.append(f"without a limit: {', '.join(told)}")
-    return "\n".join(_wrapped(line) for line in lines)
+    lines += [*between_words(motion), *ends_words(report.ends)]
+    return "\n".join(wrapped(line) for line in lines)
 
 
-def torques_summary(dataset: xarray.Dataset, motion: JointTrajectory, robot: Path, trajectory: Path) -> str:
-    """Word of which joints torques were computed, when, and which stand still."""
+def torques_summary(
+    dataset: xarray.Dataset, motion: JointTrajectory, ends: Sequence[TrajectoryEnd], robot: Path, trajectory: Path
+) -> str:
+    """Word of which joints torques were computed, when, which stand still, and what is met at the ends."""
     rates, instants = dataset.sizes["derivative"] - 1, dataset["time"].values
     told = f", with {count(rates, 'rate')}" if rates else ""
     lines = [
@@ -161,7 +166,8 @@ def torques_summary(dataset: xarray.Dataset, motion: JointTrajectory, robot: Pat
     still = [str(name) for name in dataset.data_vars if name not in motion.names]
     if still:
         lines.append(f"not in the trajectory, held still: {', '.join(still)}")
-    return "\n".join(_wrapped(line) for line in lines)
+    lines += [*between_words(motion), *ends_words(ends)]
+    return "\n".join(wrapped(line) for line in lines)
 
 
 def verdict(report: LimitReport) -> str:
@@ -170,12 +176,17 @@ def verdict(report: LimitReport) -> str:
     assert worst is not None
     size = "infinite by a jump" if worst.infinite else f"{worst.ratio:.4g} of its limit"
     place = f"{worst.joint} {worst.quantity}, {size} at t = {worst.time:.5g} s"
+    ends = [] if report.hand_over else breaks_words(report.ends)
     if report.kept:
         return f"All limits kept ({number}).\nClosest: {place}"
-    return f"{len(report.broken)} of {count(number, 'limit')} broken.\nWorst: {place}"
+    if report.broken:
+        return "\n".join([f"{len(report.broken)} of {count(number, 'limit')} broken.\nWorst: {place}", *ends])
+    told = [f"Limits broken at the ends, not within the motion ({number}). Closest there: {place}", *ends]
+    hint = "If the robot moves before the start and after the stop, say so with --hand-over."
+    return "\n".join([*map(wrapped, told), hint])
 
 
-def _wrapped(line: str) -> str:
+def wrapped(line: str) -> str:
     """Break a long line after commas and colons only."""
     import textwrap
 

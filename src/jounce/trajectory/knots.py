@@ -27,8 +27,8 @@ def knot_jumps(law: SplineMotion, order: int) -> Jumps:
     left, right = (_derivatives(powers, sines, at, order) for at in (lengths, np.zeros(len(begins))))
     before, after, instants = left[:, :-1], right[:, 1:], begins[1:]
     found = after - before
-    smooth = law.degree - 1 if getattr(law, "samples", None) and law.samples.value is not None else -1
-    found[: smooth + 1] = 0.0  # a spline through samples is smooth within: what is left is rounding
+    smooth = law.joined
+    found[: smooth + 1] = 0.0  # a spline is smooth within: what is left is rounding
     if law.beyond == "repeat":
         wrapped = left[:, -1:] - np.append(float(law.advance), np.zeros(order))[:, None]
         closing = right[:, :1] - wrapped

@@ -176,6 +176,11 @@ class SplineMotion(AbstractMotion):
         self.degree, self.beyond, self.samples = len(coefficients) - 1, beyond, Untraced(samples)
 
     @property
+    def joined(self) -> int:
+        """Up to which derivative its pieces are known to meet smoothly, whatever rounding makes of that; -1 if none."""
+        return self.degree - 1 if self.samples.value is not None else -1
+
+    @property
     def errors(self) -> np.ndarray:
         """Estimated errors of the derivatives, relative to their peaks, (degree + 1,); 0 for a law without samples."""
         if self.samples.value is None:

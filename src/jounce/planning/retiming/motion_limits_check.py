@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from jounce.dynamics.highest import local_maxima
-from jounce.dynamics.limit_jumps import jumps_of
-from jounce.dynamics.limits import LimitReport, LimitRow, check_limits
+from jounce.dynamics.limit_jumps import infinite_quantities, jumps_of
+from jounce.dynamics.limits import FIELDS, LimitReport, LimitRow, check_limits, word_of
 from jounce.dynamics.trajectories import FollowedTrajectory
+from jounce.dynamics.trajectory_ends import TrajectoryEnd, end_jumps
 from jounce.errors import SampleWarning
 from jounce.planning.retiming.limits import MotionLimits, limits_of
 from jounce.planning.retiming.path import Path
@@ -24,11 +25,12 @@ EVEN = np.array([1.0, 0.0, 0.0, 0.0])  # z and its derivatives where the paramet
 ZOOM, ZOOMS = 9, 8
 SMALL = 1e-9  # of the size of a velocity of a point: a smaller jump is rounding
 
+_PARTNERS = {"acceleration": "deceleration"}
 _Infinite = Mapping[tuple[str, str], float]  # when a quantity of a joint is infinite, s
 
 
 def check_motion(
-    robot: Robot, trajectory: JointTrajectory, limits: MotionLimits, *, drives: bool = True
+    robot: Robot, trajectory: JointTrajectory, limits: MotionLimits, *, drives: bool = True, hand_over: bool = False
 ) -> LimitReport:
     """Compare a trajectory with limits of all kinds, as `check_limits` does with constant ones.
 
@@ -42,6 +44,8 @@ def check_motion(
         With rows of their own in the report: limits of jounce, of points, and those that depend on the position.
     drives : bool, default True
         Whether torques contain armature inertia, damping and friction of the drives.
+    hand_over : bool, default False
+        Whether the robot moves already as the trajectory starts, and goes on moving as it stops.
 
     Returns
     -------
@@ -50,7 +54,7 @@ def check_motion(
     """
     given = limits_of(robot, limits)
     constant = {name: _without(entry, given.varying.get(name, {})) for name, entry in given.joints.items()}
-    report = check_limits(robot, trajectory, constant, drives=drives)
+    report = check_limits(robot, trajectory, constant, drives=drives, hand_over=hand_over)
     infinite = {(row.joint, row.quantity): row.time for row in report.rows if row.infinite}
     alone = {name: Limits() for name in robot.joint_names}
     partner = {  # an acceleration and its deceleration are judged together
@@ -60,10 +64,42 @@ def check_motion(
     others = dataclasses.replace(given, joints=alone | partner)
     if not (others.jounce or others.varying or others.points):
         return report
-    extra = _rows(robot, trajectory, others, infinite, drives=drives)
+    source = RobotQuantities(
+        robot, Path(dict(trajectory.laws), trajectory.start, trajectory.stop), others, drives=drives
+    )
+    extra = _rows(source, trajectory, infinite)
     told = {(row.joint, row.quantity) for row in extra}
     rows = tuple(row for row in report.rows if (row.joint, row.quantity) not in told)
-    return dataclasses.replace(report, rows=(*rows, *extra))
+    return dataclasses.replace(report, rows=(*rows, *extra), ends=_ends(source, trajectory, report.ends, drives=drives))
+
+
+def _ends(
+    source: RobotQuantities, trajectory: JointTrajectory, ends: tuple[TrajectoryEnd, ...], *, drives: bool
+) -> tuple[TrajectoryEnd, ...]:
+    """Return what is met at both ends, with the limits that are told here among those that are broken."""
+    robot, limits, points = source.robot, source.limits, source.limits.points
+    followed = FollowedTrajectory(robot, trajectory)
+    jumps = end_jumps(followed, followed.coordinates(np.linspace(trajectory.start, trajectory.stop, 2001), 4))
+    if np.array_equal(jumps.before, jumps.after):
+        return ends
+    signs = infinite_quantities(followed, jumps, drives).signs
+    found = []
+    for k, end in enumerate(ends):
+        more = [
+            (name, word_of(robot, quantity, joint)[0])
+            for joint, name in enumerate(robot.joint_names)
+            for quantity, field in enumerate(FIELDS)
+            if signs[k, quantity, joint] and {field, _PARTNERS.get(field, field)} & set(limits.varying.get(name, {}))
+        ]
+        fourth = [(robot.joint_names[j], "jounce") for j in source.with_jounce if jumps.above(4)[k, j]]
+        state = (jumps.after if end.end == "start" else jumps.before)[[k]]
+        forced = [
+            (p.link, "acceleration of the point")
+            for p in points
+            if p.acceleration and source.point(state, p)[:, 1].any()
+        ]
+        found.append(dataclasses.replace(end, breaks=(*end.breaks, *more, *fourth, *forced)))
+    return tuple(found)
 
 
 def _without(limits: Limits, varying: Any) -> Limits:
@@ -79,11 +115,8 @@ def _partners(limits: Limits, varying: Any) -> dict[str, float | None]:
     return {field: getattr(limits, field) for field in pair if set(varying) & set(pair) and field not in varying}
 
 
-def _rows(
-    robot: Robot, trajectory: JointTrajectory, limits: MotionLimits, infinite: _Infinite, *, drives: bool
-) -> list[LimitRow]:
-    path = Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
-    source = RobotQuantities(robot, path, limits, drives=drives)
+def _rows(source: RobotQuantities, trajectory: JointTrajectory, infinite: _Infinite) -> list[LimitRow]:
+    """Return the worst instants of what has other limits than constant ones."""
 
     def ratios(times: np.ndarray) -> np.ndarray:
         return _curves(source, times).ratios(np.tile(EVEN[:, None], len(times)))

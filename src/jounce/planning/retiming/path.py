@@ -2,16 +2,46 @@
 
 import dataclasses
 from collections.abc import Mapping
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from jounce.kinematics.chunks import in_chunks
-from jounce.trajectory import AbstractMotion
+from jounce.trajectory import AbstractMotion, SplineMotion
 from jounce.trajectory.stacking import law_derivatives
 
 BLOCK = 2048  # places evaluated at once
+
+
+class JoinedPieces(SplineMotion):
+    """Polynomials that follow one another; where they meet, derivatives may jump.
+
+    Parameters
+    ----------
+    begins : array_like of shape (pieces,)
+        Where they begin, increasing.
+    powers : array_like of shape (powers, pieces)
+        Coefficients, lowest power first, of what the argument exceeds the beginning by.
+    stop : float
+        Where the last one ends.
+    """
+
+    def __init__(self, begins: np.ndarray, powers: np.ndarray, stop: float):
+        self._set(begins, powers, stop, "refuse")
+
+
+class SmoothPieces(JoinedPieces):
+    """Polynomials of a spline, of which all derivatives below its degree are continuous."""
+
+    def __init__(self, begins: np.ndarray, powers: np.ndarray, stop: float):
+        super().__init__(begins, powers, stop)
+
+    @property
+    def joined(self) -> int:
+        """Up to which derivative its pieces are known to meet smoothly."""
+        return self.degree - 1
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -25,18 +55,36 @@ class Path:
     start, stop : float
         Ends of s.
     deviation : float, default 0
-        How far the path passes by the trajectory that it was made of, at most, rad or m.
+        How far the path is from what it was made of, at most, rad or m: from the straight lines between samples or
+        waypoints, or from the trajectory or the laws that were given.
+    allowed : float, optional
+        How far it may be, where that was bounded.
+    words : str, optional
+        What it is, to be told.
+    instants : tuple of arrays, optional
+        Values of s, and the instants of the samples there, s.
+    points : Lines, optional
+        The waypoints that it goes through.
     """
 
     laws: Mapping[str, AbstractMotion]
     start: float
     stop: float
     deviation: float = 0.0
+    allowed: float | None = None
+    words: str = ""
+    instants: tuple[Float[np.ndarray, " place"], Float[np.ndarray, " place"]] | None = None
+    points: Any = None
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the joints."""
         return tuple(self.laws)
+
+    def place(self, s: float) -> str:
+        """Say where on the path a value of s is, by the time of the samples too where it was made of some."""
+        told = "" if self.instants is None else f" (t = {np.interp(s, *self.instants):.6g} s of the samples)"
+        return f"s = {s:.6g}{told}"
 
     def derivatives(self, s: Float[np.ndarray, " point"], order: int) -> Float[np.ndarray, "point derivative joint"]:
         """Return positions and derivatives by s."""

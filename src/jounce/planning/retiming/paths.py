@@ -1,5 +1,6 @@
 """Paths of joints: positions as functions of a parameter that says nothing of time."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -8,15 +9,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import JounceError, TrajectoryError
+from jounce.errors import JounceError, TrajectoryError, whole_number
 from jounce.jet import Jet
 from jounce.planning.retiming.path import Path
-from jounce.planning.retiming.trajectory_paths import path_of_trajectory
+from jounce.planning.retiming.sampled_paths import lines_along, path_of_samples
+from jounce.planning.retiming.straight_lines import Lines, polynomials_at, rounded
 from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory import AbstractMotion, Expression, JointTrajectory, PiecewiseMotion, SplineMotion
-from jounce.trajectory.checks import finite
+from jounce.trajectory.checks import finite, finite_row, positive
 from jounce.trajectory.knots import knot_jumps
 from jounce.trajectory.seen_jumps import level_sizes, unexplained
+from jounce.trajectory.splines import HIGHEST_DEGREE
 
 DEGREE = 5  # of the splines through waypoints
 KINK_CELLS = 2000  # cells in which kinks are looked for
@@ -25,6 +28,7 @@ PLACES_IN_CELL = 4
 FINEST = 4 * PLACES_IN_CELL * CELLS[-1]  # places at which a path is looked at
 RESOLVED = 0.05  # of the range of a derivative: what straight lines between looks may miss
 SLIGHT = 1e-3  # of what the length of the path makes of it: a derivative this small does not matter
+LOOKS = 16  # between two waypoints
 ENDS = 0.02  # of a path
 REPEATED = 1e-9  # of the length of a path: waypoints that are nearer to each other are one
 
@@ -51,33 +55,82 @@ class PathExpression(AbstractMotion):
         )
 
 
-def path_of(path: GivenPath | None, names: Sequence[str] | None = None, order: int = 1) -> Path:
+@dataclasses.dataclass(frozen=True)
+class Between:
+    """What a path does between its points.
+
+    Parameters
+    ----------
+    deviation : float, optional
+        How far it may be from the straight lines between them, rad or m.
+    parameter : array_like of shape (points,), optional
+        s at waypoints, increasing; the length of the chords between them, from 0 to 1, unless given.
+    degree : int, optional
+        Of the splines through waypoints, 1 to 11.
+
+    Raises
+    ------
+    TrajectoryError
+        If one of them is no such number.
+    """
+
+    deviation: float | None = None
+    parameter: ArrayLike | None = None
+    degree: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.deviation is not None:
+            positive("deviation", self.deviation)
+        if self.degree is not None:
+            whole_number("degree", self.degree, 1, HIGHEST_DEGREE, error=TrajectoryError)
+
+    def check_without_points(self) -> None:
+        """Raise TrajectoryError if something was given that only waypoints have."""
+        for name in ("parameter", "degree"):
+            if getattr(self, name) is not None:
+                message = "is for waypoints only, and the path has none; leave it out"
+                raise TrajectoryError(message, name=name, value=getattr(self, name))
+
+
+def path_of(
+    path: GivenPath | None, names: Sequence[str] | None = None, order: int = 1, between: Between = Between()
+) -> Path:
     """Return the path that was given as waypoints, as expressions, or as a trajectory whose times do not count.
 
     Parameters
     ----------
     path : Path, JointTrajectory, dict of str, or array_like of shape (points, joints)
         A trajectory gives its geometry. A mapping gives each joint an expression of ``s``, which runs from 0 to 1, or
-        its positions at the waypoints. Splines of degree 5 go through waypoints, of a lower one through five or fewer.
+        its positions at the waypoints, or a motion over s, which runs over the domain of splines. Splines of degree 5
+        go through waypoints, of a lower one through five or fewer.
     names : sequence of str, optional
         Of the joints of an array, in the order of its columns.
     order : int, default 1
         To which derivatives a path is to be continuous: at corners where a trajectory stops, and at few waypoints.
+    between : Between, optional
+        What the path does between its points.
 
     Raises
     ------
     TrajectoryError
         If it is no path, has a kink, or points repeat.
     """
-    if isinstance(path, Path):
-        return path
+    if isinstance(path, Path) and path.points is not None:
+        return _between(path.points, order, between)
     if isinstance(path, JointTrajectory):
-        return checked(path_of_trajectory(path, order))
+        between.check_without_points()
+        return checked(path_of_samples(path, order, between.deviation))
     if isinstance(path, Mapping):
         given: dict[str, Any] = {str(name): x for name, x in path.items()}
         if any(isinstance(x, str | AbstractMotion) for x in given.values()):
-            return checked(Path({name: _law(name, x) for name, x in given.items()}, 0.0, 1.0))
-        names, lists = list(given), list(given.values())
+            laws = {name: _law(name, x) for name, x in given.items()}
+            path = Path(laws, *_domain(laws))
+    if isinstance(path, Path):
+        between.check_without_points()
+        return checked(path if between.deviation is None else rounded(lines_along(path), between.deviation))
+    if isinstance(path, Mapping):
+        lists: list[Any] = list(path.values())
+        names = [str(name) for name in path]
         if len({np.shape(x) for x in lists}) != 1:
             raise TrajectoryError("waypoints of all joints must be equally many", name="path")
         path = np.stack(lists, axis=-1)
@@ -86,30 +139,45 @@ def path_of(path: GivenPath | None, names: Sequence[str] | None = None, order: i
         wanted = "" if names is None else f" with {len(names)} joints: {', '.join(names)}"
         message = f"waypoints have the shape (points, joints){wanted}; or give a mapping from names to positions"
         raise TrajectoryError(message, name="path", value=f"shape {points.shape}")
-    return through(points, names, order)
+    return _between(Lines(_lengths(points, between.parameter), points, tuple(names), "waypoints"), order, between)
 
 
-def through(points: Float[np.ndarray, "point joint"], names: Sequence[str], order: int = 1) -> Path:
-    """Return the path of splines through points, over the length of the chords between them.
-
-    Five points are given a cubic spline, unless more derivatives than its two are to be continuous: a quartic then.
-    """
+def _lengths(points: Float[np.ndarray, "point joint"], parameter: ArrayLike | None) -> Float[np.ndarray, " point"]:
+    """Return the values of s at waypoints: those given, or the lengths of the chords between them, from 0 to 1."""
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     total = float(chords.sum())
     if not total > 0:
         raise TrajectoryError("the path does not move: all its points are the same", name="path")
+    if parameter is not None:
+        found = finite_row("parameter", parameter)
+        if len(found) != len(points) or not (np.diff(found) > 0).all():
+            message = f"must be {len(points)} numbers that increase, one for each waypoint"
+            raise TrajectoryError(message, name="parameter", value=found.tolist())
+        return found
     same = np.flatnonzero(chords <= REPEATED * total)
     if len(same):
         message = f"waypoint {same[0] + 2} is the same as the one before; leave it out"
         raise TrajectoryError(message, name=f"path[{same[0] + 1}]", value=points[same[0] + 1].tolist())
-    lengths = np.append(0.0, np.cumsum(chords))
-    lengths /= lengths[-1]
+    return np.append(0.0, np.cumsum(chords)) / total
+
+
+def _between(lines: Lines, order: int, between: Between) -> Path:
+    """Return the path of splines through waypoints, or one within a deviation of the straight lines between them.
+
+    Five points are given a cubic spline, unless more derivatives than its two are to be continuous: a quartic then.
+    """
+    if between.deviation is not None:
+        between.check_without_points()
+        return dataclasses.replace(rounded(lines, between.deviation), points=lines)
     smooth = 4 if order > 2 else 3
-    degree = next(d for d in (DEGREE, smooth, 3, 2, 1) if len(points) > d)
-    laws: dict[str, AbstractMotion] = {
-        name: SplineMotion(lengths, column, degree) for name, column in zip(names, points.T, strict=True)
-    }
-    return Path(laws, 0.0, 1.0)
+    wanted = (DEGREE, smooth) if between.degree is None else (between.degree,)
+    degree = next(d for d in (*wanted, 3, 2, 1) if len(lines.at) > d and d <= wanted[0])
+    laws = {name: SplineMotion(lines.at, x, degree) for name, x in zip(lines.names, lines.points.T, strict=True)}
+    places = (lines.at[:-1, None] + np.diff(lines.at)[:, None] * np.arange(1, LOOKS) / LOOKS).reshape(-1)
+    away = lines.distances(places, np.stack([polynomials_at(law, places) for law in laws.values()], axis=1))
+    words = f"splines of degree {degree} through {len(lines.at)} waypoints"
+    start, stop = float(lines.at[0]), float(lines.at[-1])
+    return Path(dict(laws), start, stop, float(away.max()), words=words, points=lines)
 
 
 def checked(path: Path, order: int = 1) -> Path:
@@ -123,22 +191,23 @@ def checked(path: Path, order: int = 1) -> Path:
     for name, law in path.laws.items():
         for instant, jumped in _jumps(law, order):
             if path.start < instant < path.stop and np.any(jumped):
-                raise _kink(instant, int(np.argmax(jumped != 0)), name)
+                raise _kink(path.place(instant), int(np.argmax(jumped != 0)), name)
     s = np.linspace(path.start, path.stop, KINK_CELLS + 1)
     values = path.derivatives(s, order + 1)
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
         at, level, joint = bad[0]
-        message = f"derivative {level} of the path is not finite at s = {s[at]:.6g}"
+        message = f"derivative {level} of the path is not finite at {path.place(float(s[at]))}"
         raise TrajectoryError(message, name=path.names[joint])
     if not np.abs(values[:, 1]).max() > 0:
         raise TrajectoryError("the path does not move: all its points are the same", name="path")
     sizes = level_sizes(np.abs(values).max(axis=2, keepdims=True), path.stop - path.start)
     found = unexplained(s, values, sizes)
+    found[:, :, [isinstance(law, SplineMotion) and law.joined >= order for law in path.laws.values()]] = False
     for level in range(order + 1):
         jumps = np.argwhere(found[:, level])
         if len(jumps):
-            raise _kink(float(s[jumps[0][0]] + (s[1] - s[0]) / 2), level, path.names[jumps[0][1]])
+            raise _kink(path.place(float(s[jumps[0][0]] + (s[1] - s[0]) / 2)), level, path.names[jumps[0][1]])
     return path
 
 
@@ -168,9 +237,10 @@ def cells_needed(path: Path, order: int) -> int:
         at, joint = divmod(int(np.argmax(off)), off.shape[1])
         if off[at, joint] <= RESOLVED:
             return cells
+    place = path.place(float(s[step // 2 + at * step]))
     message = (
-        f"the path waves or bends too finely at s = {s[step // 2 + at * step]:.6g} for a time law that keeps limits: "
-        f"{CELLS[-1]} cells do not resolve it; smooth it, or retime shorter parts of it"
+        f"the path waves or bends too finely at {place} for a time law that keeps limits: "
+        f"{CELLS[-1]} cells do not resolve it; allow a larger deviation, smooth it, or retime shorter parts of it"
     )
     raise TrajectoryError(message, name=path.names[joint])
 
@@ -185,15 +255,25 @@ def _jumps(law: AbstractMotion, order: int) -> Any:
     return zip(instants.tolist(), sizes.T, strict=True)
 
 
-def _kink(s: float, order: int, name: str) -> TrajectoryError:
+def _kink(place: str, order: int, name: str) -> TrajectoryError:
     what = {
         0: "jumps",
         1: "has a kink (its direction jumps, or turns too sharply to be resolved)",
         2: "has a jump of curvature",
     }.get(order, "is not smooth")
     limits = "" if order < 2 else ", where what is limited would be infinite"
-    message = f"the path {what} at s = {s:.6g}{limits}; round it, or stop there and retime both parts"
+    message = f"the path {what} at {place}{limits}; round it by a deviation, or stop there and retime both parts"
     return TrajectoryError(message, name=name)
+
+
+def _domain(laws: Mapping[str, AbstractMotion]) -> tuple[float, float]:
+    """Return from where to where s runs: over what splines are known of, or from 0 to 1."""
+    bounded = [isinstance(law, SplineMotion) and law.beyond == "refuse" for law in laws.values()]
+    domains = {(float(law.breakpoints[0]), float(law.stop)) for law in laws.values() if isinstance(law, SplineMotion)}
+    if not all(bounded):
+        return 0.0, 1.0
+    (only,) = domains if len(domains) == 1 else (None,)
+    return only or (0.0, 1.0)
 
 
 def _law(name: str, law: Any) -> AbstractMotion:

@@ -13,15 +13,17 @@ from jounce.planning.retiming.limits import GivenLimits, MotionLimits, limits_of
 from jounce.planning.retiming.mechanism import retime_mechanism
 from jounce.planning.retiming.motion_limits_check import check_motion
 from jounce.planning.retiming.path import Path
-from jounce.planning.retiming.paths import GivenPath, cells_needed, checked, path_of
+from jounce.planning.retiming.paths import Between, GivenPath, cells_needed, checked, path_of
 from jounce.planning.retiming.program import require_solver
 from jounce.planning.retiming.quantities import Curves
 from jounce.planning.retiming.rate_law import Conditions, RateLaw
 from jounce.planning.retiming.rate_motion import RateMotion
 from jounce.planning.retiming.retimed import RetimedTrajectory, active_limits
 from jounce.planning.retiming.robot_quantities import RobotQuantities
+from jounce.planning.retiming.sampled_paths import path_of_samples
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike
 from jounce.trajectory import FollowingMotion, JointTrajectory
 
 CELLS = 160
@@ -42,6 +44,10 @@ def retime(
     cells: int | None = None,
     drives: bool = True,
     repair: bool = False,
+    deviation: float | None = None,
+    parameter: ArrayLike | None = None,
+    degree: int | None = None,
+    hand_over: bool = False,
 ) -> RetimedTrajectory:
     """Return the fastest motion along a path that keeps limits.
 
@@ -77,6 +83,20 @@ def retime(
     repair : bool, default False
         Return the given trajectory, which must be one, with the smallest slowing that keeps the limits: it is nowhere
         faster than it was, and as it was where that keeps them.
+    deviation : float, optional
+        How far from the straight lines between samples or waypoints the path may be, rad or m (of several joints the
+        root of the sum of squares). Samples of a trajectory unless given 0.001, or a thousandth of the diagonal of the
+        box that holds them if that is less: splines go through them where these keep within it, stand still where the
+        samples do, and are supported by the samples to the order; else a spline whose control points lie on the lines,
+        which rounds corners and what noise and rounding make of dwells. Through waypoints go splines unless it is
+        given. A path of expressions or laws is itself what is deviated from, so that kinks can be rounded.
+    parameter : array_like of shape (points,), optional
+        Values of s at waypoints, increasing; the lengths of the chords between them, from 0 to 1, unless given.
+    degree : int, optional
+        Of the splines through waypoints, with not-a-knot ends; 5 unless given. With a parameter and degree 3 the path
+        is that of TOPP-RA's ``SplineInterpolator``.
+    hand_over : bool, default False
+        Whether a trajectory that is repaired may start and stop in motion, as of a robot that moves already.
 
     Returns
     -------
@@ -109,20 +129,24 @@ def retime(
     require_solver()
     if cells is not None:
         cells = whole_number("cells", cells, 20, 5000, error=TrajectoryError)
+    between = Between(deviation, parameter, degree)
     if isinstance(robot, Mechanism):
-        if path is not None or repair:
+        given = {"repair": repair, "path": path is not None, "deviation": deviation is not None}
+        if any(given.values()):
             message = "the path of a mechanism is that of its drivers, which is not repaired; leave this out"
-            raise TrajectoryError(message, name="repair" if repair else "path")
+            raise TrajectoryError(message, name=next(name for name, x in given.items() if x))
+        between.check_without_points()
         return retime_mechanism(robot, _of_mechanism(limits), _rates(rates), order, cells or CELLS)
     if not isinstance(robot, Robot):
         raise TrajectoryError("must be a Robot or a Mechanism", name="robot", value=type(robot).__name__)
+    hand_over = flag("hand_over", hand_over, error=TrajectoryError)
     drives, repair = flag("drives", drives, error=TrajectoryError), flag("repair", repair, error=TrajectoryError)
     if isinstance(path, JointTrajectory):
         FollowedTrajectory(robot, path)  # checks its joints and units
     if repair:
-        return _repaired(robot, path, limits, order, cells, drives)
+        return _repaired(robot, path, limits, order, cells, drives, between, hand_over=hand_over)
     chosen = _order(order, limits_of(robot, limits), robot)
-    found = path_of(path, names if names is not None else robot.joint_names, chosen)
+    found = path_of(path, names if names is not None else robot.joint_names, chosen, between)
     if not isinstance(path, JointTrajectory):
         warn_of_degrees(robot, JointTrajectory(dict(found.laws), found.start, found.stop))
     source = RobotQuantities(robot, found, limits, drives=drives)
@@ -131,7 +155,7 @@ def retime(
     cells = cells or cells_needed(found, chosen)
     conditions = Conditions(chosen, _rates(rates))
     law, search = fastest(source, source.labels, found.start, found.stop, conditions, cells)
-    return _certified(robot, found, law, search, source, drives)
+    return _certified(robot, found, law, search, source, drives, hand_over=any(conditions.rates))
 
 
 def _repaired(
@@ -141,13 +165,16 @@ def _repaired(
     order: int | None,
     cells: int | None,
     drives: bool,
+    between: Between,
+    *,
+    hand_over: bool,
 ) -> RetimedTrajectory:
     if not isinstance(trajectory, JointTrajectory):
         raise TrajectoryError("only a trajectory can be repaired", name="path", value=type(trajectory).__name__)
-    path = Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
+    between.check_without_points()
+    chosen = _order(order, limits_of(robot, limits), robot)
+    path = checked(path_of_samples(trajectory, chosen, between.deviation, timed=True), chosen)
     source = RobotQuantities(robot, path, limits, drives=drives)
-    chosen = _order(order, source.limits, robot)
-    checked(path, chosen)
     source.check_range()
     cells = cells or cells_needed(path, chosen)
     speeds = np.abs(path.derivatives(np.linspace(path.start, path.stop, 501), 1)[:, 1]).max(axis=1)
@@ -155,7 +182,17 @@ def _repaired(
     first, last = (1.0 if as_it_was else None for as_it_was in keeps.tolist())
     conditions = Conditions(chosen, (first, last), highest=1.0)
     law, search = slowed_only(source, source.labels, path.start, path.stop, conditions, cells)
-    return _certified(robot, path, law, search, source, drives)
+    found = _certified(robot, path, law, search, source, drives, hand_over=hand_over)
+    for end in () if hand_over else found.report.ends:
+        if end.breaks:
+            owner, quantity = end.breaks[0]
+            message = (
+                f"the trajectory does not rest at its {end.end}: from rest, or to it, the {quantity} of {owner} is "
+                "infinite there, which slowing it does not cure; let it rest there, retime it without repair, or say "
+                "hand_over if the robot moves already"
+            )
+            raise TrajectoryError(message, name="repair")
+    return found
 
 
 def keeps_limits(source: RobotQuantities, s: np.ndarray) -> np.ndarray:
@@ -166,7 +203,14 @@ def keeps_limits(source: RobotQuantities, s: np.ndarray) -> np.ndarray:
 
 
 def _certified(
-    robot: Robot, path: Path, law: RateLaw, search: Search, source: RobotQuantities, drives: bool
+    robot: Robot,
+    path: Path,
+    law: RateLaw,
+    search: Search,
+    source: RobotQuantities,
+    drives: bool,
+    *,
+    hand_over: bool,
 ) -> RetimedTrajectory:
     """Return the trajectory of a law, once it keeps the limits as its own derivatives in time tell them."""
     for attempt in range(ATTEMPTS):
@@ -174,7 +218,7 @@ def _certified(
         progress = FollowingMotion(law.parameter, motion)
         laws = {name: FollowingMotion(own, progress) for name, own in path.laws.items()}
         bare = JointTrajectory(laws, 0.0, motion.duration, np.linspace(0.0, motion.duration, law.basis.cells + 1))
-        report = check_motion(robot, bare, source.limits, drives=drives)
+        report = check_motion(robot, bare, source.limits, drives=drives, hand_over=hand_over)
         over = (report.worst.ratio or 0.0) - 1 if report.worst else 0.0
         if over <= KEPT:
             return RetimedTrajectory(laws, bare.stop, path, progress, report, active_limits(search, law, motion))

@@ -57,7 +57,7 @@ def fit_to_samples(
     TrajectoryError
         If the rate gives too few samples, or the splines cannot be made to keep the limits.
     """
-    period = 1 / rate
+    period, hand_over = 1 / rate, trajectory.report.hand_over
     if trajectory.stop < LEAST * period:
         raise TrajectoryError(f"gives fewer than {LEAST} samples in {trajectory.stop:g} s; choose more", value=rate)
     slowed = 1.0
@@ -71,12 +71,13 @@ def fit_to_samples(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SampleWarning)
             read = JointTrajectory.from_samples(times, positions, found.names, degree)
-            report = check_motion(robot, read, limits, drives=drives)
+            report = worst = check_motion(robot, read, limits, drives=drives, hand_over=hand_over)
         if report.kept:
-            found.report = check_motion(robot, found, limits, drives=drives)
-            return found, report
-        over = ((report.worst.ratio or 1.0) if report.worst else 1.0) - 1
-        told = "" if report.worst is None else f" of the {report.worst.quantity} of {report.worst.joint}"
+            found.report = worst = check_motion(robot, found, limits, drives=drives, hand_over=hand_over)
+            if worst.kept:
+                return found, report
+        over = max((worst.worst.ratio or 1.0) if worst.worst else 1.0, 1.0) - 1
+        told = "" if worst.worst is None else f" of the {worst.worst.quantity} of {worst.worst.joint}"
         slowed = max(slowed, float(periods) * period / trajectory.stop) * (1 + min(over / 2, 0.05)) + period / 10
     message = (
         f"splines of degree {degree} through samples at this rate break the limit{told}; "

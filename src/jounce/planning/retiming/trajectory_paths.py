@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.errors import SampleWarning, TrajectoryError
-from jounce.planning.retiming.path import Path
+from jounce.planning.retiming.path import JoinedPieces, Path
 from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory, SplineMotion
 
 STILL = 1e-3  # of the largest speed: a trajectory that is slower than this at its ends stands still there
@@ -44,23 +44,6 @@ class Stops(NamedTuple):
 
     lengths: Float[np.ndarray, " stop"]
     turns: Float[np.ndarray, " stop"]
-
-
-class JoinedPieces(SplineMotion):
-    """Polynomials that follow one another; where they meet, derivatives may jump.
-
-    Parameters
-    ----------
-    begins : array_like of shape (pieces,)
-        Where they begin, increasing.
-    powers : array_like of shape (powers, pieces)
-        Coefficients, lowest power first, of what the argument exceeds the beginning by.
-    stop : float
-        Where the last one ends.
-    """
-
-    def __init__(self, begins: np.ndarray, powers: np.ndarray, stop: float):
-        self._set(begins, powers, stop, "refuse")
 
 
 class Ramps:

@@ -1,0 +1,134 @@
+"""Paths of what was sampled: splines through the samples where these support them, else near straight lines.
+
+Splines through samples with noise, rounding or dwells swing, and so do those through few samples. Such a path keeps
+within a deviation of the straight lines between the samples instead, which is told.
+"""
+
+import dataclasses
+import warnings
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import SampleWarning
+from jounce.planning.retiming.path import Path
+from jounce.planning.retiming.straight_lines import Lines, rounded
+from jounce.planning.retiming.trajectory_paths import path_of_trajectory
+from jounce.trajectory import AbstractMotion, HermiteMotion, JointTrajectory, SplineMotion
+
+DEVIATION = 1e-3  # rad or m, from the straight lines between samples, unless given
+SHARE = 1e-3  # of the size of the path, if that is less
+LOOKS, MANY = 8, 100_000  # between two samples, and at once
+STILL = 1e-7  # of the size of the path: how far a joint may move while its samples do not
+PLACES = 4000  # at which a path is looked at that does not come from samples
+
+
+def samples_of(law: AbstractMotion) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, " sample"]] | None:
+    """Return the times and the values that a law was made of; None where it was made of something else.
+
+    Positions alone, as polynomials of degree 1 go through, are samples as well.
+    """
+    if type(law) is SplineMotion and law.samples.value is not None and law.beyond == "refuse":
+        return law.samples.value
+    if isinstance(law, HermiteMotion) and law.degree == 1 and law.beyond == "refuse":
+        return np.asarray(law.breakpoints, float), np.asarray(law.coefficients, float)[0]
+    return None
+
+
+def lines_of(trajectory: JointTrajectory) -> Lines | None:
+    """Return the straight lines between the samples of a trajectory; None if no joint of it has any."""
+    found = {name: samples_of(law) for name, law in trajectory.laws.items()}
+    times = [own[0] for own in found.values() if own is not None]
+    if not times:
+        return None
+    every = [trajectory.start, trajectory.stop, *times]
+    if any(own is None for own in found.values()):
+        every.append(np.linspace(trajectory.start, trajectory.stop, PLACES + 1))
+    at = np.unique(np.hstack(every))
+    at = at[(at >= trajectory.start) & (at <= trajectory.stop)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SampleWarning)
+        exact = None if all(found.values()) else Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
+        columns = None if exact is None else exact.derivatives(at, 0)[:, 0]
+    points = [
+        np.interp(at, *own) if own is not None else columns[:, k]  # type: ignore[index]
+        for k, own in enumerate(found.values())
+    ]
+    return Lines(at, np.stack(points, axis=1), trajectory.names, "samples")
+
+
+def lines_along(path: Path) -> Lines:
+    """Return straight lines between many places of a path that does not come from samples."""
+    knots = [np.asarray(law.breakpoints) for law in path.laws.values() if isinstance(law, SplineMotion)]
+    at = np.unique(np.concatenate([np.linspace(path.start, path.stop, PLACES + 1), *knots]))
+    at = at[(at >= path.start) & (at <= path.stop)]
+    found = Lines(at, path.derivatives(at, 0)[:, 0], path.names, "places")
+    if not np.isfinite(found.points).all():
+        return found
+    between = (at[:-1, None] + np.diff(at)[:, None] * np.array([0.25, 0.5, 0.75])).reshape(-1)
+    return dataclasses.replace(found, own=float(found.distances(between, path.derivatives(between, 0)[:, 0]).max()))
+
+
+def deviation_of(lines: Lines, given: float | None) -> float:
+    """Return how far from straight lines a path may be."""
+    return min(DEVIATION, SHARE * lines.size) if given is None else given
+
+
+def path_of_samples(
+    trajectory: JointTrajectory, order: int, deviation: float | None = None, *, timed: bool = False
+) -> Path:
+    """Return where a trajectory leads, within a deviation of the straight lines between its samples if it has any.
+
+    Parameters
+    ----------
+    trajectory : JointTrajectory
+        Its laws go through samples, or are known between any two instants.
+    order : int
+        To which derivatives the path is to be continuous.
+    deviation : float, optional
+        rad or m; unless given 0.001, or a thousandth of the size of the path if that is less.
+    timed : bool, default False
+        Whether the path runs over the time of the trajectory, as where its times count.
+
+    Raises
+    ------
+    TrajectoryError
+        If it does not move, or a path so near would bend too sharply: the message names the joint and the instant.
+    """
+    lines, own = lines_of(trajectory), Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
+    if lines is None:
+        if deviation is not None:
+            return rounded(lines_along(own), deviation, timed=timed)
+        return own if timed else path_of_trajectory(trajectory, order)
+    allowed = deviation_of(lines, deviation)
+    away = _swing(trajectory, own, lines, order)
+    if away <= allowed:
+        found = own if timed else path_of_trajectory(trajectory, order)
+        if found.deviation + away <= allowed:
+            degrees = sorted({law.degree for law in trajectory.laws.values() if type(law) is SplineMotion})
+            words = f"splines of degree {' and '.join(map(str, degrees))} through {len(lines.at)} samples"
+            return dataclasses.replace(found, deviation=found.deviation + away, allowed=allowed, words=words)
+    return rounded(lines, allowed, timed=timed)
+
+
+def _swing(trajectory: JointTrajectory, own: Path, lines: Lines, order: int) -> float:
+    """Return how far splines are from straight lines between their samples; infinite if these do not support them."""
+    laws = [law for law in trajectory.laws.values() if samples_of(law) is not None]
+    if min(law.degree for law in laws if isinstance(law, SplineMotion)) <= order:
+        return np.inf
+    if trajectory.supported_order() < order:
+        return np.inf
+    same = np.diff(lines.points, axis=0) == 0
+    dwells = np.zeros_like(same)
+    dwells[1:] |= same[1:] & same[:-1]
+    dwells[:-1] |= same[1:] & same[:-1]
+    share, farthest, count = np.arange(1, LOOKS) / LOOKS, 0.0, MANY // LOOKS
+    for first in range(0, len(same), count):
+        some = slice(first, first + count)
+        at = lines.at[:-1][some, None] + np.diff(lines.at)[some, None] * share
+        places = own.derivatives(at.reshape(-1), 0)[:, 0]
+        moved = np.abs(places.reshape(*at.shape, -1) - lines.points[:-1][some, None]).max(axis=1)
+        if np.any(moved[dwells[some]] > STILL * lines.size):
+            return np.inf
+        farthest = max(farthest, float(lines.distances(at.reshape(-1), places).max()))
+    return farthest

@@ -1,0 +1,117 @@
+"""What is told of the ends of a trajectory, and of what it was taken to do between the points that were given."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from jounce.dynamics.trajectory_ends import TrajectoryEnd
+from jounce.planning.retiming.sampled_paths import lines_of, samples_of
+from jounce.planning.retiming.straight_lines import polynomials_at
+from jounce.trajectory import HermiteMotion, JointTrajectory, SplineMotion
+
+LOOKS = 8  # between two points
+TOLD = 1e-9  # rad or m: less is rounding
+SHOWN = 3  # joints of an end
+UNITS = {"velocities": "rad/s or m/s", "accelerations": "rad/s^2 or m/s^2"}
+
+
+def ends_words(ends: Iterable[TrajectoryEnd]) -> list[str]:
+    """Word what a controller meets at both ends: one line for each, or one where both are at rest."""
+    found = list(ends)
+    if all(end.at_rest for end in found):
+        return ["starts and stops at rest"] if found else []
+    return [f"{end.end}s {_moving(end)} at t = {end.time:g} s" for end in found]
+
+
+def _moving(end: TrajectoryEnd) -> str:
+    if end.at_rest:
+        return "at rest"
+    word, values = ("velocities", end.velocities) if end.velocities else ("accelerations", end.accelerations)
+    largest = sorted(values.items(), key=lambda entry: -abs(entry[1]))
+    told = ", ".join(f"{name} {value:.4g}" for name, value in largest[:SHOWN])
+    more = f" and {len(largest) - SHOWN} more" if len(largest) > SHOWN else ""
+    how = "in motion" if end.velocities else "at rest, but with acceleration"
+    return f"{how}: {told}{more}, {UNITS[word]},"
+
+
+def breaks_words(ends: Iterable[TrajectoryEnd]) -> list[str]:
+    """Word which limits a jump from rest, or to it, breaks at both ends."""
+    lines = []
+    for end in ends:
+        if not end.breaks:
+            continue
+        by: dict[str, list[str]] = {}
+        for owner, quantity in end.breaks:
+            by.setdefault(quantity, []).append(owner)
+        told = "; ".join(f"{quantity} of {', '.join(owners)}" for quantity, owners in by.items())
+        jump = "from rest" if end.end == "start" else "to rest"
+        lines.append(f"infinite by the jump {jump} at the {end.end}: {told}")
+    return lines
+
+
+def ends_facts(ends: Iterable[TrajectoryEnd]) -> list[dict[str, Any]]:
+    """Return what is met at both ends as plain data."""
+    return [
+        {
+            "end": end.end,
+            "time": end.time,
+            "at_rest": end.at_rest,
+            "velocities": dict(end.velocities),
+            "accelerations": dict(end.accelerations),
+            "breaks": [{"name": owner, "quantity": quantity} for owner, quantity in end.breaks],
+        }
+        for end in ends
+    ]
+
+
+def between_facts(trajectory: JointTrajectory) -> Mapping[str, Any] | None:
+    """Return what was taken to happen between the points of a trajectory; None where its laws say it.
+
+    ``words``, and how far from the straight lines between the points that leads at most: ``deviation``, rad or m, the
+    ``joint`` and the instant ``at``, s.
+    """
+    told = {words: None for law in trajectory.laws.values() if (words := _words(law)) is not None}
+    if not told:
+        return None
+    away, joint, at = 0.0, None, None
+    if all(samples_of(law) is not None for law in trajectory.laws.values()):
+        away, joint, at = _farthest(trajectory)
+    return {"words": "; ".join(told), "deviation": away, "joint": joint, "at": at}
+
+
+def _words(law: object) -> str | None:
+    if isinstance(law, HermiteMotion):
+        levels = {1: "positions alone: straight lines between {}", 3: "positions and velocities: cubics between {}"}
+        return levels[law.degree].format(f"{len(law.breakpoints)} points") if law.degree in levels else None
+    if isinstance(law, SplineMotion) and samples_of(law) is not None:
+        return f"positions alone: splines of degree {law.degree} through {len(law.samples.value[0])} samples"
+    return None
+
+
+def _farthest(trajectory: JointTrajectory) -> tuple[float, str | None, float | None]:
+    """Return how far laws are from straight lines between their samples, which one, and where."""
+    lines = lines_of(trajectory)
+    assert lines is not None
+    share = np.arange(1, LOOKS) / LOOKS
+    at = (lines.at[:-1, None] + np.diff(lines.at)[:, None] * share).reshape(-1)
+    places = np.stack([polynomials_at(law, at) for law in trajectory.laws.values()], axis=1)  # type: ignore[arg-type]
+    away = lines.distances(at, places)
+    k = int(np.argmax(away))
+    if not away[k] > 0:
+        return 0.0, None, None
+    own = np.stack([np.interp(at[k], lines.at, column) for column in lines.points.T])
+    return float(away[k]), lines.names[int(np.argmax(np.abs(places[k] - own)))], float(at[k])
+
+
+def between_words(trajectory: JointTrajectory) -> list[str]:
+    """Word what was taken to happen between the points of a trajectory; nothing where its laws say it."""
+    told = between_facts(trajectory)
+    if told is None:
+        return []
+    if told["deviation"] <= TOLD:
+        return [told["words"]]
+    place = f"{told['joint']} at t = {told['at']:.5g} s"
+    return [f"{told['words']}, at most {told['deviation']:.2g} rad or m from straight lines, {place}"]
