@@ -40,7 +40,7 @@ def four_bar(lengths, angle=0.0, guess=(0.0, 0.0), law=None):
 
 
 @pytest.mark.parametrize(
-    ("lengths", "angle", "guess"),
+    "lengths, angle, guess",
     [
         (FLAT, 0.0, (np.radians(45), np.radians(100))),
         (FLAT, 0.0, (0.0, 0.1)),

@@ -62,6 +62,7 @@ def servo(
         --units angle=deg --header-units
     """
     from jounce.io import in_units
+    from jounce.mechanism.time import last_step_words
     from jounce.reporting.law_facts import law_facts, law_words
     from jounce.reporting.peaks import shown_peaks, table_peaks
 
@@ -83,7 +84,8 @@ def servo(
     found = table_peaks(dataset)
     if not output.json:
         count = f"{len(motion.time)} rows from {first:g} s to {last:g} s, {frequency:g} a second"
-        say("\n".join([mechanism.title or file.name, count, *law_words(laws)]))
+        shorter = filter(None, [last_step_words(motion.time)])
+        say("\n".join([mechanism.title or file.name, count, *shorter, *law_words(laws)]))
         show_peaks(shown_peaks(found, shown))
     output.write(lambda: in_units(dataset, shown), header_units=told)
     output.tell("servo", lambda: _result(file, frequency, names, laws, found, output.out))

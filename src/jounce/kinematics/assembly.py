@@ -13,7 +13,6 @@ from jounce.errors import AssemblyError, AssemblyWarning, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.device import resident
 from jounce.kinematics.gauss_newton import Displacements, Trial, put_together
-from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import (
     Coordinates,
     DriverLag,

@@ -147,7 +147,7 @@ class HostJacobian:
         """Combinations of rows that vanish, orthonormal."""
         if not self.is_large:
             return self._singular[0][:, self.rank :]
-        rows, columns = self.shape
+        rows, _columns = self.shape
         return _null_space(self.sparse().T.tocsr(), rows - self.rank)
 
     @cached_property
@@ -155,7 +155,7 @@ class HostJacobian:
         """Directions that no row sees, orthonormal; of hundreds in a large mechanism, some at random."""
         if not self.is_large:
             return self._singular[2][self.rank :]
-        rows, columns = self.shape
+        _rows, columns = self.shape
         return _null_space(self.sparse(), columns - self.rank).T
 
     @cached_property

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from jounce.dynamics.limits import LimitReport
 from jounce.errors import UNSET, JounceError, show_value
 from jounce.kinematics import Motion, Stretches
+from jounce.reporting.mechanism_facts import grid_facts
 from jounce.reporting.motion_facts import motion_facts
 from jounce.reporting.peaks import Peak, peaks, table_peaks
 from jounce.trajectory import JointTrajectory
@@ -110,7 +111,7 @@ def torques_result(
         "file": robot,
         "trajectory": trajectory,
         "rates": dataset.sizes["derivative"] - 1,
-        "time": {"start": times[0], "stop": times[-1], "count": len(times)},
+        "time": grid_facts(times),
         "held": [name for name in dataset.data_vars if name not in motion.names],
         "peaks": [{"joint": peak.pop("output"), **peak} for peak in told],
         "written": written,

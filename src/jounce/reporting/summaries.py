@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits import LimitReport
+from jounce.mechanism.time import last_step_words
 from jounce.reporting.law_facts import law_words
 from jounce.trajectory import JointTrajectory
 
@@ -103,6 +104,7 @@ def _mechanism_start(facts: Facts) -> list[str]:
     lines += ["", "Start", f"  put together at t = {assembly['at']:g} s" if assembled else f"  {assembly['message']}"]
     if time is not None:
         lines.append(f"  time: {count(time['count'], 'instant')} from {time['start']:g} s to {time['stop']:g} s")
+        lines += [f"  {time['remark']}"] if "remark" in time else []
     else:
         lines.append("  no time grid is given")
     lines += [f"  {line}" for line in law_words(facts["laws"])]
@@ -130,6 +132,7 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
         f"{report.robot}: {moved} ({robot.name}, {trajectory.name})",
         f"t = {motion.start:g} s to {motion.stop:g} s, {len(report.times)} instants and the peaks between them",
     ]
+    lines += filter(None, [last_step_words(motion.times)])
     if report.held:
         units = {row.joint: "m" if row.unit == "N" else "rad" for row in report.rows if row.unit in ("N", "N m")}
         held = [f"{name} at {value:.6g} {units[name]}" for name, value in report.held.items()]
@@ -154,6 +157,7 @@ def torques_summary(dataset: xarray.Dataset, motion: JointTrajectory, robot: Pat
         f"({robot.name}, {trajectory.name})",
         f"t = {instants[0]:g} s to {instants[-1]:g} s, {count(len(instants), 'instant')}",
     ]
+    lines += filter(None, [last_step_words(instants)])
     still = [str(name) for name in dataset.data_vars if name not in motion.names]
     if still:
         lines.append(f"not in the trajectory, held still: {', '.join(still)}")
