@@ -14,7 +14,9 @@ from jounce.errors import SampleWarning
 from jounce.integrate import Simulation
 from jounce.kinematics import Motion, Stretches, solve
 from jounce.mechanism import AbstractQuantity
+from jounce.mechanism.law_breaks import breaks_of_laws
 from jounce.reporting.maxima import Curves, Highest, Peaks, Times
+from jounce.trajectory.breaks import both_sides
 from jounce.trajectory.shown_units import ShownUnits, derivative_unit
 
 if TYPE_CHECKING:
@@ -130,7 +132,8 @@ def peaks(motion: Motion | Stretches, *, refine: bool = True) -> list[Peak]:
         What was solved; of stretches, those that `looked_at` found; else they are solved for it.
     refine : bool, default True
         Find peaks between its instants too: the motion is solved at more instants where it has few, and then, as often
-        as it takes, around the highest of them. Otherwise only its own instants count.
+        as it takes, around the highest of them. Otherwise only its own instants count, and both sides of the instants
+        at which its laws jump or bend, which count always.
 
     Returns
     -------
@@ -261,6 +264,9 @@ def _extremes(
     """
     times, sizes = highest.times.copy(), highest.sizes.copy()
     rounding = ROUNDING * highest.scales
+    breaks, sides, beside = _beside(motion)
+    if len(sides):
+        _keep_best(times, sizes, 0 * rounding, np.repeat(breaks[:, None], len(sizes), axis=1), beside)
     if refine and len(motion.time) > 1:
         low, high = _around_maxima(motion, highest)
         share = np.linspace(0.0, 1.0, POINTS)[:, None, None]
@@ -276,6 +282,20 @@ def _extremes(
         _keep_best(times, sizes, rounding, vertex, _own(motion, vertex))
     solved = np.isfinite(sizes)
     return np.where(solved, times, np.nan), np.where(solved, sizes, np.nan)
+
+
+def _beside(motion: Motion | Stretches) -> tuple[Times, Times, Curves]:
+    """Return where the laws of a motion jump or bend, at both sides of each, these sides, and the curves there."""
+    if not len(motion.time):
+        return np.zeros(0), np.zeros(0), np.zeros((0, 0))
+    first, last = float(motion.time[0]), float(motion.time[-1])
+    outputs = motion.mechanism.outputs.values()
+    lost = max((output.lost_orders for output in outputs), default=0)
+    breaks = breaks_of_laws(motion.mechanism, first, last, motion.order + lost)
+    if isinstance(motion, Simulation):
+        breaks = np.unique(np.concatenate([breaks, [time for time, _ in motion.kinks]]))
+    sides, which = both_sides(breaks, first, last)
+    return breaks[which], sides, _at(motion, sides) if len(sides) else np.zeros((0, 0))
 
 
 def _around_maxima(motion: Motion | Stretches, highest: Highest) -> tuple[Peaks, Peaks]:
