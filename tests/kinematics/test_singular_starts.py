@@ -53,7 +53,7 @@ def four_bar(lengths, angle=0.0, guess=(0.0, 0.0), law=None):
     ],
 )
 def test_a_start_at_a_change_point_is_singular_wherever_rounding_leaves_it(lengths, angle, guess):
-    with pytest.raises(jn.MobilityError, match="singular position .* start at another instant") as caught:
+    with pytest.raises(jn.MobilityError, match=r"singular position .* start at another instant") as caught:
         jn.solve(four_bar(lengths, angle, guess), TIME, strict=False)
     assert caught.value.status == Status.SINGULAR
 

@@ -57,11 +57,12 @@ class Cells:
     ) -> "Cells":
         """Return the cells of a grid within a window, all of it unless given.
 
-        Of the two instants on both sides of a knot of a motion law, the cell of the first ends where that of the other
-        begins.
+        Those of the two instants on both sides of a knot of a motion law meet at the knot.
         """
-        pairs = np.diff(instants) < NEAR * (instants[-1] - instants[0])
-        middles = np.where(pairs, instants[1:], (instants[1:] + instants[:-1]) / 2)
+        middles, pairs = (instants[1:] + instants[:-1]) / 2, np.diff(instants) < NEAR * (instants[-1] - instants[0])
+        if pairs.any():  # a knot at an end is that end
+            middles[0] = instants[0] if pairs[0] else middles[0]
+            middles[-1] = instants[-1] if pairs[-1] else middles[-1]
         first, last = instants[0] if start is None else start, instants[-1] if stop is None else stop
         low = np.maximum(np.concatenate([instants[:1], middles]), first)
         high = np.minimum(np.concatenate([middles, instants[-1:]]), last)

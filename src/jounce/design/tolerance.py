@@ -297,7 +297,7 @@ class _Spread:
     def _peaks(
         self, name: str, values: Float[np.ndarray, "sample time derivative *axes"], sides: Sides
     ) -> Float[np.ndarray, "sample derivative *axes"]:
-        """Return the largest magnitudes of samples of an output, at the instants and on both sides of breaks of laws."""
+        """Return the largest magnitudes of samples of an output, at the instants and beside the breaks of laws."""
         peaks = np.abs(values).max(axis=1)
         beside = sides.values.get(name)
         if beside is None or not beside.shape[1]:

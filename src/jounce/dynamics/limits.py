@@ -153,8 +153,9 @@ def check_limits(
     counts as one that speeds up, and where the trajectory ends as one that has slowed down.
 
     All values are exact derivatives of the trajectory, at its own instants and at least three between each two of them,
-    2000 in all or more, and on both sides of where a derivative of a law is known to jump or bend. Around the highest peaks of each curve the step is then refined to less than a millionth of
-    the duration: what is reported are true values of the curves.
+    2000 in all or more, and on both sides of where a derivative of a law is known to jump or bend. Around the highest
+    peaks of each curve the step is then refined to less than a millionth of the duration: what is reported are true
+    values of the curves.
 
     Where a derivative of a law jumps within the trajectory, those above it are infinite, and so may be torques and
     their rates: a limit of them is broken there. Where pieces of laws meet is known; jumps and kinks of expressions and

@@ -1,4 +1,4 @@
-"""Where the laws of a mechanism jump or bend: no series about an instant goes on beyond, and peaks may be limits there."""
+"""Where the laws of a mechanism jump or bend: no series goes on beyond, and peaks may be limits from one side."""
 
 import numpy as np
 from jaxtyping import Float

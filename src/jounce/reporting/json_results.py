@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from jounce.errors import UNSET, JounceError, show_value
 from jounce.kinematics import Motion, Stretches
 from jounce.reporting.mechanism_facts import grid_facts
 from jounce.reporting.motion_facts import motion_facts
-from jounce.reporting.peaks import Peak, peaks, table_peaks
+from jounce.reporting.peaks import Peak, peaks
 from jounce.trajectory import JointTrajectory
 
 if TYPE_CHECKING:
@@ -101,11 +101,15 @@ def limits_result(report: LimitReport, robot: Path, trajectory: Path, written: P
 
 
 def torques_result(
-    dataset: xarray.Dataset, motion: JointTrajectory, robot: Path, trajectory: Path, written: Path | None
+    dataset: xarray.Dataset,
+    found: Iterable[Peak],
+    motion: JointTrajectory,
+    files: tuple[Path, Path],
+    written: Path | None,
 ) -> dict[str, Any]:
     """Return what `jounce torques` tells of a robot on a trajectory."""
-    times = dataset["time"].values
-    told = [told_peak(peak) for peak in table_peaks(dataset)]
+    (robot, trajectory), times = files, dataset["time"].values
+    told = [told_peak(peak) for peak in found]
     return {
         "robot": dataset.attrs["title"],
         "file": robot,

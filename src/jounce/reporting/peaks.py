@@ -167,22 +167,26 @@ def _name(refine: bool) -> str:
     return "peaks" if refine else "peaks at the instants"
 
 
-def table_peaks(dataset: xarray.Dataset) -> list[Peak]:
+def table_peaks(dataset: xarray.Dataset, beside: xarray.Dataset | None = None) -> list[Peak]:
     """Return the peak values of torques and their rates, or of coordinates, at the instants of a dataset only.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Of variables of dimensions time and derivative, with the attribute ``units``: N, N*m, m or rad.
+    beside : xarray.Dataset, optional
+        The same on both sides of where laws jump or bend.
     """
-    found = []
+    found, coords = [], ("time", "derivative")
+    times = np.concatenate([x["time"].values for x in (dataset, beside) if x is not None])
     for name, variable in dataset.data_vars.items():
         unit = variable.attrs["units"]
-        for order, given in enumerate(variable.transpose("derivative", "time").values):
+        both = (variable, *(() if beside is None else (beside[name],)))
+        for order, given in enumerate(np.concatenate([x.transpose(*coords).values for x in both]).T):
             solved = np.flatnonzero(np.isfinite(given))
             values = given if solved.size else np.full_like(given, np.nan)
             low, high = (int(solved[pick(given[solved])]) if solved.size else 0 for pick in (np.argmin, np.argmax))
-            extremes = [(float(values[k]), float(dataset["time"][k])) for k in (low, high)]
+            extremes = [(float(values[k]), float(times[k])) for k in (low, high)]
             (least, least_at), (most, most_at) = extremes
             told = derivative_name(order) if unit in ("m", "rad") else effort_name(unit, order)
             size = float(np.abs(values[solved]).max(initial=0.0))

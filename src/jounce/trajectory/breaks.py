@@ -17,7 +17,7 @@ from jounce.trajectory.stacking import law_derivatives
 BENDING = frozenset({"abs", "sqrt", "asin", "acos", "atan2"})  # functions that may have kinks
 LOOKS = 2001  # at a law that may bend anywhere
 BESIDE = 2e-11  # of a span of time: how far beside a break its sides are; kinks are found to half of that
-MOST = 1000  # breaks of the derivative above those asked for: of more, as of a spline through many samples, none is told
+MOST = 1000  # breaks of the derivative above those asked for; of more, as of a spline through samples, none is told
 
 Times = Float[np.ndarray, " time"]
 
