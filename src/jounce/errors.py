@@ -294,7 +294,14 @@ class MechanismFileError(MechanismError):
 
 
 class MobilityError(MechanismError):
-    """The drivers and joints do not leave exactly zero degrees of freedom."""
+    """The drivers and joints do not leave exactly zero degrees of freedom.
+
+    ``status`` is that of a singular position, where the start is one.
+    """
+
+    def __init__(self, message: str, *, status: Any = None, **place: Any) -> None:
+        super().__init__(message, **place)
+        self.status = status
 
 
 class RobotError(JounceError):

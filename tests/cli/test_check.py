@@ -98,6 +98,22 @@ def test_a_trajectory_that_is_too_fast_ends_with_1_and_its_rows_are_marked(run):
     assert "* broken" in out
 
 
+LATE = "joints: {pin: 1.05*t**40}\ntime: {stop: 1 s, step: 30 ms}\n"  # over the range of +-1 rad in the last hundredth
+
+
+def test_the_last_instant_counts_though_the_step_does_not_divide_the_time(run, files):
+    robot, law = files(pendulum_urdf=PENDULUM, late_yaml=LATE)
+    status, out, _ = run(robot, law)
+    assert status == 1
+    assert "t = 0 s to 1 s" in out
+    assert "the step of 0.03 s does not divide the time: the last one is 0.01 s" in out
+    status, out, _ = run(robot, law, "--json")
+    told = json.loads(out)
+    assert told["time"]["stop"] == 1.0
+    (position,) = (row for row in told["limits"] if row["quantity"] == "position")
+    assert (position["worst"], position["at"], position["broken"]) == (1.05, 1.0, True)
+
+
 def test_what_is_infinite_by_a_jump_is_told_printed_drawn_and_null_in_json(run, files, tmp_path):
     law = "joints: {pin: 0.1*abs(t - 0.98765)}\ntime: {stop: 2, step: 0.1}"
     limits = "joints: {pin: {acceleration: 5 rad/s^2, velocity: 1 rad/s}}"

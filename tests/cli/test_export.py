@@ -42,6 +42,15 @@ def test_a_message_is_written_and_read_back(run, files, tmp_path):
     }
 
 
+def test_a_law_file_is_written_to_its_stop_though_its_step_does_not_divide_the_time(run, files, tmp_path):
+    robot, law = files
+    law.write_text("joints: {pin: 0.5*t**4}\ntime: {stop: 1 s, step: 30 ms}\n")
+    out = tmp_path / "motion.yaml"
+    status, output, _ = run(robot, law, "--format", "ros", "--rate", "20Hz", "--out", out)
+    assert (status, "21 rows from 0 s to 1 s" in output) == (0, True)
+    assert yaml.safe_load(out.read_text())["points"][-1]["positions"] == [0.5]
+
+
 @pytest.mark.parametrize(
     "options, words",
     [

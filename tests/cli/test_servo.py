@@ -41,6 +41,14 @@ def test_a_row_for_each_period_position_to_jerk_in_the_units_asked_for(drive):
 
 
 @pytest.mark.slow
+def test_the_last_row_is_the_end_of_the_motion_whatever_the_rate(tmp_path, capsys):
+    out = tmp_path / "drive.csv"
+    assert main(["servo", PRESS, "--rate", "77Hz", "--out", str(out)]) == 0
+    assert "does not divide the time" in capsys.readouterr().out.replace("\n", " ")
+    assert float(rows(out)[-1][0]) == 1.2
+
+
+@pytest.mark.slow
 def test_json_is_in_si_and_tells_the_continuity(capsys):
     assert main(["servo", PRESS, "--rate", "100", "--units", "angle=deg", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)

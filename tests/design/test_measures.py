@@ -40,13 +40,13 @@ def test_no_series_goes_on_beyond_a_knot():
     """A rate of 1 - t from a knot on, and of zero before it: it is largest at the knot, and half of it in the mean."""
     knots = np.array([0.5])
     time = at_instants([0.5, 0.9], TIME / 2, knots)
-    assert np.count_nonzero(np.abs(time - 0.5) < 1e-9) == 1  # asked for, of the grid, and a knot
+    assert np.count_nonzero(np.abs(time - 0.5) < 1e-9) == 2  # asked for, of the grid, and a knot: its two sides
     series = jnp.asarray(np.stack([np.where(time >= 0.5, 1.0 - time, 0.0), np.where(time >= 0.5, -1.0, 0.0)]))
-    cells = Cells.of(time, knots=knots)
+    cells = Cells.of(time)
     assert float(jnp.max(largest(series, cells))) == pytest.approx(0.5, abs=1e-12)
     assert float(integral(series, cells)) == pytest.approx(0.125, abs=1e-12)
-    assert float(jnp.max(largest(series, Cells.of(time, 0.0, 0.5, knots)))) == 0.0
-    assert float(jnp.max(largest(-series, Cells.of(time, 0.5, 1.0, knots)))) == pytest.approx(0.0, abs=1e-12)
+    assert float(jnp.max(largest(series, Cells.of(time, 0.0, 0.5)))) == 0.0
+    assert float(jnp.max(largest(-series, Cells.of(time, 0.5, 1.0)))) == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import jounce as jn
 from jounce import planar, spatial
 from jounce.mechanism import build, time_grid
 from jounce.mechanism.builder import grouped_elements
-from jounce.mechanism.time import instants_of
+from jounce.mechanism.time import instants_of, last_step_words
 from tests.problems.small import crank, four_bar
 
 PIN = planar.Revolute(("ground", "crank"), [0, 0], [0, 0])
@@ -240,7 +240,11 @@ class TestTimeGrid:
             (jn.TimeGrid(0, 1, 0.25), [0, 0.25, 0.5, 0.75, 1]),
             (jn.TimeGrid(0, 1, count=3), [0, 0.5, 1]),
             (jn.TimeGrid(0, 0, count=1), [0]),
-            (jn.TimeGrid(-1, 0.99, 0.5), [-1, -0.5, 0, 0.5]),
+            (jn.TimeGrid(-1, 0.99, 0.5), [-1, -0.5, 0, 0.5, 0.99]),
+            (jn.TimeGrid(0, 1, 0.3), [0, 0.3, 0.6, 0.9, 1]),
+            (jn.TimeGrid(0, 1, 2.0), [0, 1]),
+            (jn.TimeGrid(0, 1, 0.25 * (1 + 1e-9)), [0, 0.25, 0.5, 0.75, 1]),
+            (jn.TimeGrid(0, 1, 0.25 * (1 - 1e-9)), [0, 0.25, 0.5, 0.75, 1]),
             (jn.TimeGrid("tau", "2*tau", "tau/2"), [2, 3, 4]),
             ([0, 1, 4], [0, 1, 4]),
             (np.array([5.0]), [5]),
@@ -261,7 +265,19 @@ class TestTimeGrid:
     def test_stop_is_reached_though_the_step_is_rounded(self, step):
         instants = time_grid(jn.TimeGrid(0, 1, step), {})
         assert len(instants) == round(1 / step) + 1
-        assert instants[-1] == pytest.approx(1, abs=1e-12)
+        assert instants[-1] == 1.0
+
+    @pytest.mark.parametrize("step", [0.03, 0.3, 1 / 3.5, 1.7e-3, 0.0999])
+    def test_stop_is_reached_though_the_step_does_not_divide_the_time(self, step):
+        instants = time_grid(jn.TimeGrid(0.2, 1.2, step), {})
+        assert instants[-1] == 1.2
+        np.testing.assert_allclose(np.diff(instants)[:-1], step, rtol=1e-12)
+        assert 0 < instants[-1] - instants[-2] < step
+        assert "last one" in last_step_words(instants)
+
+    @pytest.mark.parametrize("step", [0.1, 1e-3, 1 / 3, 0.7 / 7, 5.0, 1.0])
+    def test_nothing_is_told_of_steps_that_are_alike(self, step):
+        assert last_step_words(time_grid(jn.TimeGrid(0, 1, step), {})) == ""
 
     @pytest.mark.parametrize(
         "grid, message",

@@ -184,11 +184,37 @@ def test_outside_the_knots_the_end_segments_go_on():
         ((KNOTS, VALUES, 4, 0, {5: 0.0}), "from 0 to 4, got 5"),
         ((KNOTS, VALUES, 4, 0, {1: math.inf}), r"start\[1\]: the value of a condition must be a finite number"),
         ((KNOTS, VALUES, 4, 0, None, None, "naturel"), "did you mean 'natural'"),
+        ((KNOTS, VALUES, 4, 0, dict.fromkeys((1, 2, 3, 4), 0.0)), "start: .* 4 .* start and 0 at the end: .* grows by"),
+        ((KNOTS, VALUES, 4, 0, {1: 0.0}, dict.fromkeys((1, 2, 3), 0.0)), "end: .* every knot.*; give 2 at each end"),
+        ((KNOTS, VALUES, 2, 0, {1: 0.0, 2: 0.0}), "start: .* grows by a factor at every knot.*; give 1 at each end"),
+        ((KNOTS, VALUES, 3, 0, {1: 0.0, 2: 0.0, 3: 0.0}), "start: .*; give 2 at one end and 1 at the other"),
+        ((KNOTS, VALUES, 4, 2, {0: 0.0, 1: 0.0, 3: 0.0, 4: 0.0}), "start: .*derivatives above that of the knots"),
     ],
 )
 def test_bad_knots_and_conditions(arguments, message):
     with pytest.raises(TrajectoryError, match=message):
         PolynomialMotion(*arguments)
+
+
+@pytest.mark.parametrize("m, shares", [(4, (2, 2)), (3, (2, 1)), (3, (1, 2)), (2, (1, 1)), (6, (3, 3))])
+def test_evenly_shared_conditions_give_the_law_of_smooth_data(m, shares):
+    t = np.linspace(0.0, 1.7, 52)
+    start, end = ({k: sine(x, k) for k in range(1, n + 1)} for x, n in zip((t[0], t[-1]), shares, strict=True))
+    at = np.linspace(0.0, 1.7, 1001)
+    found = derivatives(PolynomialMotion(t, sine(t, 0), m, start=start, end=end), 1, at)
+    close(found[0], sine(at, 0), 1e-5)
+    close(found[1], sine(at, 1), 1e-3)
+
+
+def test_one_segment_takes_any_shares():
+    law = PolynomialMotion([0.0, 2.0], [0.0, 32.0], 4, start=dict.fromkeys((1, 2, 3, 4), 0.0))
+    close(derivatives(law, 0, [0.5, 1.0, 2.0])[0], np.array([0.5, 1.0, 2.0]) ** 5)
+
+
+def test_knots_so_uneven_that_the_law_leaves_them_are_refused():
+    knots = np.array([0.0, 1.0, 1.0001, 2.0, 3.0, 4.0, 5.0])
+    with pytest.raises(TrajectoryError, match=r"(grows to|misses) .*shortest segment is 0.00012 of the mean .*evenly"):
+        PolynomialMotion(knots, [0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0], 4, ends="natural")
 
 
 def test_conditions_that_determine_nothing():

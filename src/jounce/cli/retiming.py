@@ -141,9 +141,9 @@ def _of_mechanism(file: Path, limits: Path | None, rate: float, asked: Any, read
     bounds = load_drive_limits(limits, mechanism)
     with errors_about(file):
         found = find(mechanism, None, bounds, **asked)
-    import numpy as np
+    from jounce.mechanism import TimeGrid, time_grid
 
-    found.times = np.append(np.arange(0.0, found.stop, 1 / rate), found.stop)
+    found.times = time_grid(TimeGrid(0.0, found.stop, 1 / rate), {})
     return _Result(found, found.stop, found.path.stop - found.path.start)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from typing import Any
 
 from jounce.cli.file_kinds import expecting
 from jounce.cli.options import (
@@ -115,7 +116,7 @@ def torques(
 ) -> int:
     r"""Compute the joint torques of a trajectory, and their rates.
 
-    Printed are the peaks at the instants of the trajectory.
+    Printed are the peaks at the instants of the trajectory, and on both sides of where its laws jump or bend.
 
     Parameters
     ----------
@@ -149,9 +150,27 @@ def torques(
     with errors_about(trajectory, robot):
         found = trajectory_torques(model, motion, rates, drives=not no_drives)
         ends = trajectory_ends(model, motion)
+        beside = _beside_breaks(model, motion, rates, drives=not no_drives)
+    largest = table_peaks(found, beside)
     if not output.json:
         say(torques_summary(found, motion, ends, robot, trajectory))
-        show_peaks(table_peaks(found))
+        show_peaks(largest)
     output.write(lambda: found)
-    output.tell("torques", lambda: torques_result(found, motion, ends, robot, trajectory, output.out))
+    output.tell("torques", lambda: torques_result(found, largest, motion, ends, (robot, trajectory), output.out))
     return 0
+
+
+def _beside_breaks(robot: Any, motion: Any, rates: int, *, drives: bool) -> Any:
+    """Return the torques on both sides of where laws jump or bend, at the instants of these; None without any."""
+    from jounce.dynamics.trajectories import trajectory_torques
+    from jounce.trajectory.breaks import both_sides, law_breaks
+
+    first, last = float(motion.times[0]), float(motion.times[-1])
+    breaks = law_breaks(motion.laws.values(), first, last, rates + 2)
+    sides, which = both_sides(breaks, first, last)
+    if not len(sides):
+        return None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SampleWarning)  # told of all instants
+        found = trajectory_torques(robot, motion, rates, times=sides, drives=drives)
+    return found.assign_coords(time=breaks[which])

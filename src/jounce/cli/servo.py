@@ -63,6 +63,7 @@ def servo(
         --units angle=deg --header-units
     """
     from jounce.io import in_units
+    from jounce.mechanism.time import last_step_words
     from jounce.reporting.law_facts import law_facts, law_words
     from jounce.reporting.peaks import shown_peaks, table_peaks
 
@@ -78,13 +79,14 @@ def servo(
         if not names:
             raise JounceError("there is no driver", name="drivers")
         motion = _at_rate(mechanism, frequency, order, bar)
-        dataset = _driven(motion, names)
+        dataset, beside = _driven(motion, names), _beside_breaks(mechanism, motion, names)
     first, last = float(motion.time[0]), float(motion.time[-1])
     laws = [law for law in law_facts(mechanism, first, last) if law["driver"] in names]
-    found = table_peaks(dataset)
+    found = table_peaks(dataset, beside)
     if not output.json:
         count = f"{len(motion.time)} rows from {first:g} s to {last:g} s, {frequency:g} a second"
-        say("\n".join([mechanism.title or file.name, count, *law_words(laws)]))
+        shorter = filter(None, [last_step_words(motion.time)])
+        say("\n".join([mechanism.title or file.name, count, *shorter, *law_words(laws)]))
         show_peaks(shown_peaks(found, shown))
     output.write(lambda: in_units(dataset, shown), header_units=told)
     output.tell("servo", lambda: _result(file, frequency, names, laws, found, output.out))
@@ -106,6 +108,23 @@ def _at_rate(mechanism: Mechanism, frequency: float, order: int, bar: Bar) -> Mo
     first, last = float(known[0]), float(known[-1])
     grid = TimeGrid(first, last, 1 / frequency)
     return solve(mechanism, grid, order, strict=False, progress=bar, keep=True)
+
+
+def _beside_breaks(mechanism: Mechanism, motion: Motion, names: list[str]) -> Any:
+    """Return the coordinates of drivers on both sides of where laws jump or bend; None without any."""
+    import numpy as np
+
+    from jounce.kinematics import solve
+    from jounce.mechanism.law_breaks import breaks_of_laws
+    from jounce.trajectory.breaks import both_sides
+
+    first, last = float(motion.time[0]), float(motion.time[-1])
+    breaks = breaks_of_laws(mechanism, first, last, motion.order)
+    sides, which = both_sides(breaks, first, last)
+    if not len(sides):
+        return None
+    whole = solve(mechanism, np.append(first, sides), motion.order, strict=False)  # from the same start
+    return _driven(whole, names).isel(time=slice(1, None)).assign_coords(time=breaks[which])
 
 
 def _driven(motion: Motion, names: list[str]) -> Any:

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from jounce.mechanism import Mechanism, with_outputs_held
-from jounce.mechanism.resolve import resolve_motion
-from jounce.trajectory.smoothness import knots
+from jounce.mechanism import Mechanism
+from jounce.mechanism.law_breaks import breaks_of_laws
+from jounce.trajectory.smoothness import HIGHEST
 
 MOST_KNOTS = 200  # more of them, as of a spline through many samples, are left where they are
-SAME = 1e-12  # of a span of time
+SAME = 2e-11  # of a span of time: kinks of expressions are found to half of that
 
 
 def law_knots(
@@ -36,7 +36,4 @@ def law_knots(
 
 
 def _of_design(mechanism: Mechanism, first: float, last: float) -> Float[np.ndarray, " knots"]:
-    values, laws = mechanism.parameter_values, with_outputs_held(mechanism).drivers.values()
-    motions = (getattr(driver, "motion", None) for driver in laws)
-    each = [knots(resolve_motion(motion, values), first, last) for motion in motions if motion is not None]
-    return np.unique(np.concatenate([np.zeros(0), *each]))
+    return breaks_of_laws(mechanism, first, last, HIGHEST)

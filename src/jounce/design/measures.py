@@ -17,13 +17,13 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.jet import Jet
 from jounce.shapes import Numbers
+from jounce.trajectory.breaks import with_sides
 
 SAMPLES = 9  # of a cell, in which its largest value is looked for
 ROUNDS = 6  # of Newton's method from the best of them
 
 NO_KNOTS = np.zeros(0)
 NEAR = 1e-9  # of a span of time: instants so near to each other are one
-AFTER = 1e-13  # of a span of time: so far after a knot its instant is, whose derivatives are those from the right
 
 Series = Float[Numbers, "order *cell"]
 """Taylor coefficients about the instants of a grid."""
@@ -54,17 +54,19 @@ class Cells:
         instants: Float[np.ndarray, " time"],
         start: float | None = None,
         stop: float | None = None,
-        knots: Float[np.ndarray, " knots"] = NO_KNOTS,
     ) -> "Cells":
         """Return the cells of a grid within a window, all of it unless given.
 
-        The series about an instant that is a knot of a motion law is that from the right: its cell begins there.
+        Those of the two instants on both sides of a knot of a motion law meet at the knot.
         """
-        middles = np.where(_near(instants[1:], knots, instants), instants[1:], (instants[1:] + instants[:-1]) / 2)
+        middles, pairs = (instants[1:] + instants[:-1]) / 2, np.diff(instants) < NEAR * (instants[-1] - instants[0])
+        if pairs.any():  # a knot at an end is that end
+            middles[0] = instants[0] if pairs[0] else middles[0]
+            middles[-1] = instants[-1] if pairs[-1] else middles[-1]
         first, last = instants[0] if start is None else start, instants[-1] if stop is None else stop
         low = np.maximum(np.concatenate([instants[:1], middles]), first)
         high = np.minimum(np.concatenate([middles, instants[-1:]]), last)
-        (index,) = np.nonzero((high - low > 2 * _after(instants)) | ((high == low) & (first == last)))
+        (index,) = np.nonzero((high - low > NEAR * (instants[-1] - instants[0])) | ((high == low) & (first == last)))
         if not index.size:  # a window of one instant, at which two cells meet
             index = np.array([int(np.argmin(np.abs(instants - first)))])
             low[index] = high[index] = first
@@ -73,6 +75,9 @@ class Cells:
     def at(self, time: float) -> tuple[int, float]:
         """Return the nearest instant, and how far a time is from it, s."""
         nearest = int(np.argmin(np.abs(self.instants - time)))
+        span = float(self.instants[-1] - self.instants[0])
+        if np.diff(self.instants[nearest : nearest + 2]).min(initial=np.inf) < NEAR * span:  # from the right, at a knot
+            nearest += 1
         return nearest, float(time - self.instants[nearest])
 
 
@@ -199,18 +204,14 @@ def environment(
 def at_instants(
     values: Sequence[float], instants: Float[np.ndarray, " given"], knots: Float[np.ndarray, " knots"] = NO_KNOTS
 ) -> Float[np.ndarray, " time"]:
-    """Return a grid that has the instants at which something is asked, and those just after the knots of laws."""
+    """Return a grid that has the instants at which something is asked, and those on both sides of the knots of laws."""
     wanted = np.unique(np.concatenate([instants, np.asarray(values, float)]))
     gaps = np.diff(wanted)
     close = np.concatenate([[False], gaps < NEAR * (wanted[-1] - wanted[0] or 1.0)])
     wanted = wanted[~close]
-    inside = knots[(knots > wanted[0]) & (knots < wanted[-1]) & ~_near(knots, wanted[[0, -1]], wanted)]
-    after = inside + _after(wanted)
-    return np.unique(np.concatenate([wanted[~_near(wanted, inside, wanted)], after]))
-
-
-def _after(grid: Float[np.ndarray, " time"]) -> float:
-    return AFTER * float(grid[-1] - grid[0] + np.abs(grid).max())
+    apart = ~_near(wanted, knots, wanted)
+    apart[[0, -1]] = True
+    return with_sides(wanted[apart], knots)
 
 
 def _near(

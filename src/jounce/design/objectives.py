@@ -144,8 +144,8 @@ class Goals:
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
         """Take another grid."""
         self.instants = at_instants(self._arguments.asked, instants, self._knots)
-        self._cells = [Cells.of(self.instants, *window, self._knots) for window in self._windows]
-        self._whole = Cells.of(self.instants, knots=self._knots)
+        self._cells = [Cells.of(self.instants, *window) for window in self._windows]
+        self._whole = Cells.of(self.instants)
 
     def series(self, outputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return the Taylor coefficients of the quantities, (order + 1, time), from outputs of a motion."""
@@ -270,7 +270,7 @@ class Goals:
         self, series: Callable[..., Any], window: tuple[Any, Any], *, root: bool, squared: bool = False
     ) -> Quantity:
         def found(names: Mapping[str, Any]) -> Any:
-            cells, values = Cells.of(self.instants, *window, self._knots), series(names)
+            cells, values = Cells.of(self.instants, *window), series(names)
             length = float(np.sum(cells.high - cells.low))
             mean = integral(square(values) if root else values, cells) / length
             return safe_root(mean) if root and not squared else mean

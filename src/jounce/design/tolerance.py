@@ -13,9 +13,11 @@ from jounce.design.design_space import Sobol
 from jounce.design.variations import Variation, read_variations, reader_of, spreads
 from jounce.errors import MechanismError, UnsupportedError, check_name, no_such, whole_number
 from jounce.jet.turns import whole_periods
-from jounce.kinematics import Motion, Status, solve, solve_batch
+from jounce.kinematics import Motion, Status, solve
+from jounce.kinematics.families import Sides, solve_with_sides
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
 from jounce.mechanism.held_outputs import with_outputs
+from jounce.mechanism.law_breaks import laws_may_break
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
 
@@ -182,9 +184,13 @@ class _Spread:
         self._variables: dict[str, Any] = {str(name): whole[name].variable for name in whole.data_vars}
         self._outputs = wanted
         self._solved: np.ndarray | None = None
+        sides, own = Sides(np.zeros((1, 0)), {}), {name: [self.space[name]] for name in self.names}
+        if laws_may_break(self.mechanism):
+            sides = solve_with_sides(self.mechanism, own, nominal.time, nominal.order)[1]
         for name in self._outputs:
-            peak = abs(whole[name]).max("time", skipna=False)
-            self._put(f"{name}_peak", peak.dims, peak.values, name, "largest magnitude of {} at the instants")
+            dims, values = whole[name].dims[1:], whole[name].values
+            peak = self._peaks(name, values[None], sides)[0]
+            self._put(f"{name}_peak", dims, peak, name, "largest magnitude of {} at the instants and breaks of laws")
 
     def add_gradients(self) -> None:
         """Differentiate by the parameters, all in one pass forward."""
@@ -218,19 +224,20 @@ class _Spread:
             raise MechanismError(message, name="samples", value=count)
         space = Sobol(self.variations, self.space, count)
         whole: Histories = {n: np.full((count, *s), np.nan) for n, s in zip(self._outputs, shapes, strict=True)}
+        peaks = {name: np.full((count, *s[1:]), np.nan) for name, s in zip(self._outputs, shapes, strict=True)}
         solved = np.zeros((count, len(self.nominal.time)), bool)
         for start, stop in _stretches(count, progress):
-            found = self._solved_designs(space.values(start, stop))
+            found, sides = self._solved_designs(space.values(start, stop))
             solved[start:stop] = found["status"].values == Status.OK
             for name in self._outputs:
                 if name in found:
                     whole[name][start:stop] = self._near_nominal(name, found[name].values)
+                    peaks[name][start:stop] = self._peaks(name, whole[name][start:stop], sides)
         self._solved = solved.sum(axis=0)
         for name, values in whole.items():
             dims = self._variables[name].dims
             self._add_statistics(name, "", dims, values)
-            peaks = np.abs(values[solved.all(axis=1)]).max(axis=1)
-            self._add_statistics(f"{name}_peak", name, dims[1:], peaks)
+            self._add_statistics(f"{name}_peak", name, dims[1:], peaks[name][solved.all(axis=1)])
 
     def add_indices(self, count: int, progress: Progress | None) -> None:
         """Estimate how much of the variance of the peaks each parameter causes, alone and with others."""
@@ -247,14 +254,14 @@ class _Spread:
         }
         peaks: dict[str, list[np.ndarray]] = {name: [] for name in self._outputs}
         for start, stop in _stretches(len(shares), progress):
-            found = self._solved_designs({name: x[start:stop] for name, x in values.items()})
+            found, sides = self._solved_designs({name: x[start:stop] for name, x in values.items()})
             bad = (found["status"].values != Status.OK).any(axis=1)
             if bad.any():
                 share = f"{int(bad.sum())} of {stop - start} designs lock or cannot be put together"
                 message = f"{share}, and indices need all of them; narrow the spread"
                 raise MechanismError(message, name="indices")
             for name in self._outputs:
-                peaks[name].append(np.abs(self._near_nominal(name, found[name].values)).max(axis=1))
+                peaks[name].append(self._peaks(name, self._near_nominal(name, found[name].values), sides))
         for name, parts in peaks.items():
             whole = np.concatenate(parts)
             flat = whole.reshape(len(whole), -1)
@@ -280,11 +287,25 @@ class _Spread:
             found["solved"] = ("time", self._solved, {"long_name": "samples solved"})
         return xarray.Dataset(found, coordinates, {"title": whole.attrs.get("title", ""), "source": "jounce"})
 
-    def _solved_designs(self, values: Mapping[str, np.ndarray]) -> Any:
+    def _solved_designs(self, values: Mapping[str, np.ndarray]) -> tuple[Any, Sides]:
         """Return designs solved side by side, always as many, so that all is compiled once."""
         count = len(next(iter(values.values())))
         filled = {name: np.concatenate([x, np.repeat(x[-1:], TOGETHER - count)]) for name, x in values.items()}
-        return solve_batch(self.mechanism, filled, self.nominal.time, self.nominal.order).isel(design=slice(count))
+        found, sides = solve_with_sides(self.mechanism, filled, self.nominal.time, self.nominal.order)
+        return found.isel(design=slice(count)), sides
+
+    def _peaks(
+        self, name: str, values: Float[np.ndarray, "sample time derivative *axes"], sides: Sides
+    ) -> Float[np.ndarray, "sample derivative *axes"]:
+        """Return the largest magnitudes of samples of an output, at the instants and beside the breaks of laws."""
+        peaks = np.abs(values).max(axis=1)
+        beside = sides.values.get(name)
+        if beside is None or not beside.shape[1]:
+            return peaks
+        beside = np.abs(beside[: len(values)].reshape(len(values), -1, *values.shape[2:]))
+        if np.any(getattr(self.mechanism.outputs[name], "wraps", ())):
+            beside[:, :, 0] = np.nan  # no derivative, and counted from where the motion begins
+        return np.where(np.isnan(peaks), peaks, np.fmax(peaks, np.fmax.reduce(beside, axis=1)))
 
     def _near_nominal(
         self, name: str, values: Float[np.ndarray, "sample time derivative *axes"]

@@ -17,6 +17,7 @@ from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike, seconds
+from jounce.trajectory.breaks import at_breaks, law_breaks, with_sides
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 FIELDS = ("position", "velocity", "acceleration", "jerk", "effort", "effort_rate")
@@ -177,8 +178,9 @@ def check_limits(
     counts as one that speeds up, and where the trajectory ends as one that has slowed down.
 
     All values are exact derivatives of the trajectory, at its own instants and at least three between each two of them,
-    2000 in all or more. Around the highest peaks of each curve the step is then refined to less than a millionth of
-    the duration: what is reported are true values of the curves.
+    2000 in all or more, and on both sides of where a derivative of a law is known to jump or bend. Around the highest
+    peaks of each curve the step is then refined to less than a millionth of the duration: what is reported are true
+    values of the curves.
 
     Where a derivative of a law jumps within the trajectory, those above it are infinite, and so may be torques and
     their rates: a limit of them is broken there. Where pieces of laws meet is known; jumps and kinks of expressions and
@@ -244,6 +246,9 @@ def check_limits(
 
     merged = _merged(robot, limits)
     grid = _grid(trajectory) if times is None else _checked_times(times)
+    first, last = float(grid[0]), float(grid[-1])
+    breaks = law_breaks(trajectory.laws.values(), first, last, ORDER)
+    grid = with_sides(grid, breaks)
     values = curves(grid)
     bounds = _Bounds(robot, merged, REST * np.abs(values[:, 1]).max(axis=0), trajectory.stop)
     infinite = infinite_quantities(followed, jumps_of(followed, grid, values[:, : ORDER + 1]), drives)
@@ -254,6 +259,7 @@ def check_limits(
         if quantity in EFFORTS or name not in held
     ]
     at, found, shown = worst_instants(curves, bounds, grid, values, np.array(wanted))
+    at = at_breaks(at, breaks, first, last)
     rows = tuple(
         _row(robot, bounds, quantity, joint, *bounds.or_infinite(infinite, quantity, joint, *worst))
         for (quantity, joint), *worst in zip(wanted, at.tolist(), found.tolist(), shown.tolist(), strict=True)

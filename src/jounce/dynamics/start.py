@@ -148,7 +148,7 @@ def _assembled(model: Model, instant: float) -> tuple[Model, dict[str, np.ndarra
         raise AssemblyError(message, status=error.status) from None
     except MobilityError as error:
         message = f"joints, drivers and initial conditions together: {error.message}"
-        raise MobilityError(message) from None
+        raise MobilityError(message, status=error.status) from None
 
 
 def _let_go(model: Model, whole: Model, instant: float) -> tuple[Model, dict[str, np.ndarray]] | None:

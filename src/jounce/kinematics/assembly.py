@@ -13,7 +13,6 @@ from jounce.errors import AssemblyError, AssemblyWarning, MobilityError
 from jounce.jet import Jet
 from jounce.kinematics.device import resident
 from jounce.kinematics.gauss_newton import Displacements, Trial, put_together
-from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import (
     Coordinates,
     DriverLag,
@@ -30,6 +29,7 @@ from jounce.mechanism.builder import group_rows, with_reference
 from jounce.modules import with_fields
 
 MAX_DATUMS = 100
+TIGHT = 1e-12  # rad or sizes of the mechanism: the tolerance of bodies put together to rounding
 SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise
 
 
@@ -71,9 +71,17 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     model, found = settled(model, instant, tolerance)
     check_assembled(model, found, instant, free=free)
     warn_of_parts_turned_over(model, found)
-    model, told = redundancy_of(model, found, instant)
-    check_mobility(model, found.jacobian, told, free=free)
+    model, told = redundancy_of(model, _exact(model, found, instant, tolerance), instant)
+    check_mobility(model, told, free=free)
     return model, found.coordinates
+
+
+def _exact(model: Model, found: Trial, instant: float, tolerance: float) -> Trial:
+    """Return bodies that were put together loosely, next to a singular position, put together to rounding."""
+    if tolerance <= TIGHT or not found.jacobian.smallest[1].size:
+        return found
+    exact = put_together(model, instant, TIGHT, found.coordinates)
+    return exact if exact.closed else found
 
 
 def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
@@ -275,12 +283,12 @@ def redundancy_of(model: Model, found: Trial, instant: float) -> tuple[Model, Re
     return model, told
 
 
-def check_mobility(model: Model, jacobian: HostJacobian, found: Redundancy, *, free: bool = False) -> None:
+def check_mobility(model: Model, found: Redundancy, *, free: bool = False) -> None:
     """Raise MobilityError, with the bodies concerned, where degrees of freedom are left or the position is singular.
 
     Redundant constraints are no error: here they agree. Degrees of freedom may be left (`free`).
     """
-    (rows, columns), rank = jacobian.shape, found.rank
+    (rows, columns), rank = found.here.shape, found.rank
     left_over = columns - rank
     if (free or not left_over) and not found.is_singular:
         return
@@ -297,13 +305,13 @@ def check_mobility(model: Model, jacobian: HostJacobian, found: Redundancy, *, f
     if found.count:
         parts.append(f"{found}, which is no fault as they agree")
     if found.is_singular:
-        moving = freely_moving(model, jacobian.free_directions)
+        moving = freely_moving(model, found.here.free_directions)
         parts.append(
             "the start is a singular position (a dead point or a change point), where only "
-            f"{found.rank_here} equations are independent and {moving} can move: start at another instant, or with "
+            f"{found.here.rank} equations are independent and {moving} can move: start at another instant, or with "
             "another position"
         )
-    raise MobilityError("; ".join(parts))
+    raise MobilityError("; ".join(parts), status=Status.SINGULAR if found.is_singular else None)
 
 
 def freely_moving(model: Model, directions: Float[np.ndarray, "direction column"]) -> str:

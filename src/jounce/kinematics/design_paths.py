@@ -140,8 +140,10 @@ class DesignPaths:
         Of the model by which the designs are measured.
     designs : Designs
         What is solved.
-    instants : array of shape (time,)
-        s.
+    instants : array of shape (designs, time)
+        Of each, s; from the first one they are followed.
+    last : float
+        To which they are followed, s.
 
     Attributes
     ----------
@@ -149,8 +151,9 @@ class DesignPaths:
         Those that are left to be solved alone.
     """
 
-    def __init__(self, solver: Solver, designs: Designs, instants: Float[np.ndarray, " time"]):
+    def __init__(self, solver: Solver, designs: Designs, instants: Float[np.ndarray, "design time"], last: float):
         self.solver, self.designs, self.instants = solver, designs, instants
+        self._ends = float(instants[0, 0]), last
         count = len(designs.rows)
         self.apart = np.zeros(count, bool)
         self._settings = tuple(map(np.asarray, (solver.tolerance, solver.refine, solver.wanted)))
@@ -162,7 +165,7 @@ class DesignPaths:
     def follow(self, coordinates: Coordinates, plain: Bool[np.ndarray, " design"]) -> None:
         """Follow the designs from where they are put together, those that are plain."""
         self.apart |= ~plain
-        first, last = self.instants[0], self.instants[-1]
+        first, last = self._ends
         count = len(plain)
         known = self._known_at_the_start(coordinates)
         places = Places(*(np.full(count, x) for x in (first, np.inf, np.inf, 0.0, np.inf)))
@@ -194,9 +197,9 @@ class DesignPaths:
         Outputs are arrays of shape (designs, time, order + 1, components), for each instance of each group. A design of
         which an instant is not solved at once is left to be solved alone, too.
         """
-        count, times = len(self.apart), len(self.instants)
+        count, times = self.instants.shape
         design = np.repeat(np.flatnonzero(~self.apart), times)
-        instant = np.tile(self.instants, count - int(self.apart.sum()))
+        instant = self.instants[~self.apart].ravel()
         levels = self.solver.wanted + 1
         status = np.full((count, times), int(Status.NOT_REACHED))
         outputs: list[list[np.ndarray]] = []
@@ -326,11 +329,11 @@ class DesignPaths:
         instant, safe_step, radius, turnover, largest = (part[lanes] for part in places)
         rate = np.abs(turnover)
         reach = np.where(rate > 0, 1 / np.where(rate > 0, rate, 1.0), np.inf)
-        last = self.instants[-1]
+        first, last = self._ends
         left = last - instant
         step = np.minimum(np.minimum(safe_step, SAFE_FRACTION * reach), np.minimum(largest, left))
         ahead = (turnover < 0) & (reach < PASSAGE * radius)
-        short = (step <= SMALLEST_STEP * (last - self.instants[0])) & (left > 0)
+        short = (step <= SMALLEST_STEP * (last - first)) & (left > 0)
         self.apart[lanes[(ahead | short) & (left > 0)]] = True
         step = np.where(left - step < SLIVER * step, left, step)
         return step, np.where(step == left, last, instant + step)

@@ -25,7 +25,7 @@ from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 HALVINGS = 12
-CLEARLY_REGULAR = 1e-9  # smallest pivot over the largest of a Jacobian that is looked at no closer
+CLEARLY_REGULAR = 1e-6  # smallest pivot over the largest of a Jacobian that is looked at no closer
 
 Coordinates = dict[str, Float[Numbers, "_ ... _"]]
 

@@ -1,5 +1,6 @@
 """Families: many designs of one mechanism solved in one program, each with an outcome of its own at every instant."""
 
+import dataclasses
 import itertools
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -26,10 +27,12 @@ from jounce.mechanism import (
     with_outputs_held,
 )
 from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.law_breaks import breaks_of_laws, laws_may_break
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
 from jounce.shapes import ArrayLike, real_numbers
+from jounce.trajectory.breaks import both_sides
 from jounce.trajectory.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
@@ -121,6 +124,20 @@ def solve_batch(
     >>> int(family["status"].max())
     0
     """
+    family, values = _family(mechanism, parameters, time, order, tolerance, progress)
+    family.solve(thread_count(threads), alone=alone)
+    return family.dataset(values)
+
+
+def _family(
+    mechanism: Mechanism,
+    parameters: Mapping[str, ArrayLike],
+    time: TimeLike | None,
+    order: int,
+    tolerance: float,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple["_Family", dict[str, np.ndarray]]:
+    """Return designs that are to be solved, and the values of their parameters, checked."""
     check_mechanism(mechanism)
     values = checked_values(mechanism, parameters, "design")
     for name in ("design", "status"):
@@ -130,9 +147,75 @@ def solve_batch(
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     order = checked_settings(mechanism, order, tolerance)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
-    family = _Family(mechanism, names, rows, instants, order, float(tolerance), progress)
-    family.solve(thread_count(threads), alone=alone)
-    return family.dataset(values)
+    return _Family(mechanism, names, rows, instants, order, float(tolerance), progress), values
+
+
+def solve_with_sides(
+    mechanism: Mechanism,
+    parameters: Mapping[str, ArrayLike],
+    instants: Float[np.ndarray, " time"],
+    order: int,
+    *,
+    tolerance: float = 1e-12,
+    threads: int | None = None,
+) -> tuple["xarray.Dataset", "Sides"]:
+    """Return what `solve_batch` does, and the same on both sides of where the laws of each design jump or bend.
+
+    Parameters
+    ----------
+    mechanism, parameters, order, tolerance, threads
+        As for `solve_batch`.
+    instants : array of shape (time,)
+        Strictly increasing, s.
+    """
+    family, values = _family(mechanism, parameters, instants, order, tolerance)
+    family.look_beside_breaks()
+    family.solve(thread_count(threads))
+    return family.dataset(values), family.sides()
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Sides:
+    """Outputs of designs on both sides of where their laws jump or bend; NaN where a design has fewer of them.
+
+    Attributes
+    ----------
+    instants : array of shape (designs, sides)
+        Of the breaks, s.
+    values : dict of str to array of shape (designs, sides, order + 1, ...)
+    """
+
+    instants: Float[np.ndarray, "design side"]
+    values: dict[str, np.ndarray]
+
+    def like(self, values: Mapping[str, np.ndarray]) -> "Sides":
+        """Return them with the axes of other values of the same outputs."""
+        named = {name: found.reshape(*found.shape[:3], *values[name].shape[3:]) for name, found in self.values.items()}
+        return dataclasses.replace(self, values=named)
+
+
+def sides_of_designs(
+    mechanism: Mechanism, parameters: Mapping[str, np.ndarray], first: float, last: float, order: int
+) -> tuple[Float[np.ndarray, "design side"], Float[np.ndarray, "design side"]]:
+    """Return where the laws of each design jump or bend, and the instants on both sides of it.
+
+    A design with fewer of them than others has the first instant in their place.
+    """
+    count = len(next(iter(parameters.values())))
+    found = []
+    for k in range(count if laws_may_break(mechanism) else 0):
+        try:
+            design = mechanism.with_parameters(**{name: float(values[k]) for name, values in parameters.items()})
+            breaks = breaks_of_laws(design, first, last, order)
+        except JounceError:  # told when the design is solved
+            breaks = np.zeros(0)
+        sides, which = both_sides(breaks, first, last)
+        found.append((breaks[which], sides))
+    most = max((len(sides) for _, sides in found), default=0)
+    both = np.full((2, count, most), first)
+    for k, pair in enumerate(found):
+        both[:, k, : len(pair[0])] = pair
+    return both[0], both[1]
 
 
 class _Family:
@@ -151,8 +234,27 @@ class _Family:
         self.mechanism, self.names, self.rows, self.instants = mechanism, names, rows, instants
         self.held = with_outputs_held(mechanism)  # what is solved side by side
         self.order, self.tolerance, self.progress = order, tolerance, progress
-        self.status: Int[np.ndarray, "design time"] = np.full((len(rows), len(instants)), int(Status.NOT_REACHED))
         self.outputs: dict[str, np.ndarray] = {}
+        self._take(np.zeros((len(rows), 0)), np.zeros((len(rows), 0)))
+
+    def _take(self, beside: Float[np.ndarray, "design side"], breaks: Float[np.ndarray, "design side"]) -> None:
+        """Solve at more instants, those of each design its own, which come after those of all."""
+        self.breaks, common = breaks, np.broadcast_to(self.instants, (len(self.rows), len(self.instants)))
+        self.all_instants = np.concatenate([common, beside], axis=1)
+        self.status: Int[np.ndarray, "design time"] = np.full(self.all_instants.shape, int(Status.NOT_REACHED))
+
+    def look_beside_breaks(self) -> None:
+        """Solve at both sides of where the laws of each design jump or bend, too."""
+        first, last = float(self.instants[0]), float(self.instants[-1])
+        level = self.order + lost_orders(self.mechanism)
+        designs = dict(zip(self.names, self.rows.T, strict=True))
+        breaks, beside = sides_of_designs(self.mechanism, designs, first, last, level)
+        self._take(beside, breaks)
+
+    def sides(self) -> Sides:
+        """Return what was found beside the breaks."""
+        count = len(self.instants)
+        return Sides(self.breaks, {name: found[:, count:] for name, found in self.outputs.items()})
 
     def design(self, k: int) -> Mechanism:
         """Return one of the designs."""
@@ -187,6 +289,7 @@ class _Family:
             found = self.outputs.get(name)
             if found is None:
                 continue
+            found = found[:, : len(self.instants)]
             dims = ["design", "time", "derivative"]
             if found.ndim == 4:
                 axes = output.axes or (("component", output.labels[: found.shape[3]]),)
@@ -195,7 +298,7 @@ class _Family:
                 dims += [axis for axis, _ in axes]
             variables[name] = (dims, found, {"units": output.unit, "long_name": derivatives_of(name)})
         words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": _flags()}
-        variables["status"] = (("design", "time"), self.status, words)
+        variables["status"] = (("design", "time"), self.status[:, : len(self.instants)], words)
         taken = {*variables, *coordinates}
         named = {name: name if name not in taken else f"parameter_{name}" for name in values}
         coordinates |= {named[name]: ("design", value, {"long_name": name}) for name, value in values.items()}
@@ -275,7 +378,7 @@ class _Family:
         threads: int,
     ) -> Int[np.ndarray, " design"]:
         """Follow designs side by side and keep what comes of them; return which are left to be solved alone."""
-        paths = DesignPaths(solver, designs, self.instants)
+        paths = DesignPaths(solver, designs, self.all_instants[chosen], float(self.instants[-1]))
         paths.follow(coordinates, plain)
         outputs, status = paths.solved(threads)
         whole = ~paths.apart
@@ -291,15 +394,17 @@ class _Family:
     def _alone(self, k: int) -> None:
         """Solve one design alone."""
         try:
-            motion: Motion = solve(self.design(k), self.instants, self.order, tolerance=self.tolerance, strict=False)
+            grid, places = np.unique(self.all_instants[k], return_inverse=True)
+            motion: Motion = solve(self.design(k), grid, self.order, tolerance=self.tolerance, strict=False)
         except SPOILED as error:
             status = getattr(error, "status", None)
             self.status[k] = int(Status.NOT_ASSEMBLED if status is None else status)
             return
         except JounceError as error:
             raise self._located(error, k) from None
-        self.status[k] = motion.status
+        self.status[k] = motion.status[places]
         for name, values in motion.outputs.items():
+            values = values[places]
             self._put(name, np.array([k]), values[None] if values.ndim == 3 else values[None, ..., None])
 
     def _put(self, name: str, designs: np.ndarray, values: np.ndarray) -> None:

@@ -15,6 +15,7 @@ from jounce.mechanism.pattern import Pattern
 from jounce.shapes import Numbers
 
 RANK_TOLERANCE = 1e-9
+SMALL = 1e-6  # of the largest singular value: how small one is next to a singular position
 STEP_TOLERANCE = 1e-10
 MOST_DENSE = 100  # rows and columns; from there on an elimination of what is not zero is quicker
 DAMPING = 1e-6  # of the largest singular value
@@ -34,11 +35,14 @@ class HostJacobian:
         Entries in the columns of those bodies.
     body_count : int
         Number of bodies.
+    tolerance : float
+        Of the largest singular value: those at or below count as zero.
     """
 
     bodies: Int[np.ndarray, "row slot"]
     blocks: Float[np.ndarray, "row slot width"]
     body_count: int
+    tolerance: float = RANK_TOLERANCE
 
     @classmethod
     def of(cls, pattern: Pattern, entries: Float[Numbers, " entry"]) -> "HostJacobian":
@@ -69,11 +73,11 @@ class HostJacobian:
 
     def scaled(self, scale: Float[np.ndarray, " row"]) -> "HostJacobian":
         """Return the Jacobian with its rows multiplied by a scale."""
-        return HostJacobian(self.bodies, scale[:, None, None] * self.blocks, self.body_count)
+        return dataclasses.replace(self, blocks=scale[:, None, None] * self.blocks)
 
     def take(self, rows: Bool[np.ndarray, " row"]) -> "HostJacobian":
         """Return the Jacobian of some rows."""
-        return HostJacobian(self.bodies[rows], self.blocks[rows], self.body_count)
+        return dataclasses.replace(self, bodies=self.bodies[rows], blocks=self.blocks[rows])
 
     def dense(self) -> Float[np.ndarray, "row column"]:
         """Return the matrix."""
@@ -107,27 +111,56 @@ class HostJacobian:
     @cached_property
     def rank(self) -> int:
         """Number of rows that depend on no others."""
-        if not self.is_large:
-            sizes = np.linalg.svd(self.dense(), compute_uv=False)  # in half the time that the vectors take besides
-            return int(np.sum(sizes > RANK_TOLERANCE * sizes.max(initial=0.0)))
+        if self.is_large:
+            return min(self.shape) - int(np.sum(self.smallest[1] <= self.tolerance * self.largest))
+        return int(np.sum(self._sizes > self.tolerance * self.largest))
+
+    @cached_property
+    def largest(self) -> float:
+        """The largest singular value, or a bound near it."""
+        return _largest_size(self.sparse()) if self.is_large else float(self._sizes.max(initial=0.0))
+
+    def times(self, vectors: Float[np.ndarray, "column k"]) -> Float[np.ndarray, "row k"]:
+        """Return the products with some vectors."""
+        return (self.sparse() if self.is_large else self.dense()) @ vectors
+
+    @cached_property
+    def smallest(self) -> tuple[Any, Any, Any]:
+        """Singular values at most `SMALL` times the largest: vectors of rows in columns, values, vectors of columns."""
         rows, columns = self.shape
-        return rows - self.dependences.shape[1] if rows <= columns else columns - len(self.free_directions)
+        if not self.is_large:
+            few = self._sizes <= SMALL * self.largest
+            if not few.any():
+                return np.zeros((rows, 0)), np.zeros(0), np.zeros((columns, 0))
+            left, sizes, right = self._singular
+            return left[:, : len(few)][:, few], sizes[few], right[: len(few)][few].T
+        if not min(self.shape):
+            return np.zeros((rows, 0)), np.zeros(0), np.zeros((columns, 0))
+        matrix = self.sparse() if rows > columns else self.sparse().T.tocsr()
+        vectors = _null_space(matrix, tolerance=SMALL)
+        others, sizes, turned = np.linalg.svd(matrix @ vectors, full_matrices=False)
+        vectors = vectors @ turned.T
+        return (others, sizes, vectors) if rows > columns else (vectors, sizes, others)
 
     @cached_property
     def dependences(self) -> Float[np.ndarray, "row combination"]:
         """Combinations of rows that vanish, orthonormal."""
         if not self.is_large:
             return self._singular[0][:, self.rank :]
-        rows, columns = self.shape
-        return _null_space(self.sparse().T.tocsr(), None if rows <= columns else rows - self.rank)
+        rows, _columns = self.shape
+        return _null_space(self.sparse().T.tocsr(), rows - self.rank)
 
     @cached_property
     def free_directions(self) -> Float[np.ndarray, "direction column"]:
         """Directions that no row sees, orthonormal; of hundreds in a large mechanism, some at random."""
         if not self.is_large:
             return self._singular[2][self.rank :]
-        rows, columns = self.shape
-        return _null_space(self.sparse(), columns - self.rank if rows <= columns else None).T
+        _rows, columns = self.shape
+        return _null_space(self.sparse(), columns - self.rank).T
+
+    @cached_property
+    def _sizes(self) -> Float[np.ndarray, " k"]:
+        return np.linalg.svd(self.dense(), compute_uv=False)  # in half the time that the vectors take besides
 
     @cached_property
     def _singular(self) -> tuple[Float[np.ndarray, "row row"], Float[np.ndarray, " k"], Float[np.ndarray, "c c"]]:
@@ -211,15 +244,17 @@ def is_clearly_regular(matrix: Float[np.ndarray, "size size"], tolerance: float)
     return _solved(whole, np.zeros((len(matrix), 0)))[1] > 10 * tolerance * _largest_size(whole)
 
 
-def _clearly_independent(matrix: Any) -> bool:
+def _clearly_independent(matrix: Any, tolerance: float) -> bool:
     """Tell whether no combination of rows vanishes by far."""
     smallest = _solved(matrix, np.zeros((matrix.shape[0], 0)))[1]
     # in the larger matrix rounding hides what is smaller
-    least = 10 * RANK_TOLERANCE if matrix.shape[0] == matrix.shape[1] else 1e-7
+    least = 10 * tolerance if matrix.shape[0] == matrix.shape[1] else max(10 * tolerance, 1e-7)
     return smallest > least * _largest_size(matrix)
 
 
-def _null_space(matrix: Any, count: int | None = None) -> Float[np.ndarray, "column vector"]:
+def _null_space(
+    matrix: Any, count: int | None = None, tolerance: float = RANK_TOLERANCE
+) -> Float[np.ndarray, "column vector"]:
     """Return an orthonormal basis of what a matrix takes to zero; if its dimension is given and large, a part of it.
 
     The inverse of ``A^T A + d I`` shortens every vector by d over the square of its singular value, but those of the
@@ -229,7 +264,7 @@ def _null_space(matrix: Any, count: int | None = None) -> Float[np.ndarray, "col
     rows, columns = matrix.shape
     if not rows or not columns:
         return np.linalg.qr(_probes(columns, min(columns, MOST_VECTORS)))[0]
-    if count == 0 or (count is None and _clearly_independent(matrix.T)):
+    if count == 0 or (count is None and _clearly_independent(matrix.T, tolerance)):
         return np.zeros((columns, 0))
     size = _largest_size(matrix)
     factors = _factored(_augmented(matrix, (DAMPING * size) ** 2))
@@ -248,6 +283,6 @@ def _null_space(matrix: Any, count: int | None = None) -> Float[np.ndarray, "col
         block = nearest(min(columns, width))
         _, sizes, turned = np.linalg.svd(np.linalg.qr(matrix @ block, mode="r"))
         if width >= columns or sizes[0] > 10 * DAMPING * size:
-            found = np.count_nonzero(sizes > RANK_TOLERANCE * size) if count is None else len(turned) - count
+            found = np.count_nonzero(sizes > tolerance * size) if count is None else len(turned) - count
             return block @ turned[found:].T
         width *= 4

@@ -24,6 +24,8 @@ OPEN = 1e-7  # part of a row in combinations that vanish: what is less is none
 KINDS = {"joints": "joint", "drivers": "driver", "initial": "initial condition"}
 CURVE_ORDER = 4  # to which curves are looked for that lead away from a singular position
 CLOSED = 1e-9  # rad or sizes of the mechanism, by which joints may be open at a position in general
+ROUNDING = 1e-14  # of residuals, whose rows have one size: what is less does not tell two positions from each other
+STEP = 1e-3  # rad or sizes of the mechanism, over which the change of the Jacobian is measured
 
 
 class Repetition(NamedTuple):
@@ -61,15 +63,15 @@ class Redundancy:
         The joint or driver of each row, as a model has them.
     rank : int
         Of the Jacobian, in general.
-    rank_here : int
-        At the position assembled.
+    here : HostJacobian
+        Scaled, at the position assembled.
     jacobian : HostJacobian
         Scaled, at a position of that rank.
     """
 
     rows: tuple[str, ...]
     rank: int
-    rank_here: int
+    here: HostJacobian
     jacobian: HostJacobian
 
     @property
@@ -80,7 +82,7 @@ class Redundancy:
     @property
     def is_singular(self) -> bool:
         """Whether the position assembled is singular: fewer equations are independent there than in general."""
-        return self.rank_here < self.rank
+        return self.here.rank < self.rank
 
     @cached_property
     def repetitions(self) -> tuple[Repetition, ...]:
@@ -113,13 +115,31 @@ def redundancy(model: Model, coordinates: Coordinates, jacobian: HostJacobian, m
     moved : callable
         Takes coordinates and an increment to coordinates, residual and Jacobian, with rows of that size.
     """
-    here = jacobian.rank
-    best, rank = jacobian, here
-    if here < min(jacobian.shape) or jacobian.shape[0] > jacobian.shape[1]:
-        for nearby in _nearby(model, coordinates, jacobian, moved):
+    here = _next_to_singular(coordinates, jacobian, moved)
+    best, rank = jacobian, jacobian.rank
+    if here.rank < min(here.shape) or here.shape[0] > here.shape[1]:
+        for nearby in _nearby(model, coordinates, here, moved):
             if nearby.rank >= rank:
                 best, rank = nearby, nearby.rank
     return Redundancy(model.rows, rank, here, best)
+
+
+def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, moved: Mover) -> HostJacobian:
+    """Return the Jacobian with those singular values zero that are so at a position that rounding does not tell apart.
+
+    Along the velocity v of a small singular value s, the residual by the combination u of rows that belongs to it grows
+    as ``s x + c x^2 / 2``, where c is the change of the Jacobian in that direction, seen by u. At ``x = -s / c`` the
+    position is singular, and its residual differs from that of this one by ``s^2 / 2 c``.
+    """
+    rows, sizes, columns = jacobian.smallest
+    zero = 0.0
+    for k in np.flatnonzero(sizes > jacobian.tolerance * jacobian.largest):
+        size, velocity = sizes[k], columns[:, k]
+        there, back = (moved(coordinates, sign * STEP * velocity)[2] for sign in (1.0, -1.0))
+        change = rows.T @ (there.times(columns) - back.times(columns)) / (2 * STEP)
+        if size**2 <= 2 * ROUNDING * np.linalg.norm(change):
+            zero = max(zero, float(size))
+    return dataclasses.replace(jacobian, tolerance=1.01 * zero / jacobian.largest) if zero else jacobian
 
 
 def _nearby(model: Model, coordinates: Coordinates, jacobian: HostJacobian, moved: Mover) -> list[HostJacobian]:

@@ -13,18 +13,26 @@ from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory import Expression
 
 MAX_INSTANTS = 10_000_000
+PART_OF_STEP = 1e-6  # a last step that is so short is added to the one before
 
 
 @dataclasses.dataclass(frozen=True)
 class TimeGrid:
-    """Evenly spaced instants, s.
+    """Evenly spaced instants with both ends, s.
 
     Parameters
     ----------
     start, stop : number or expression
-        First instant, and last one where it lies on the grid, s.
+        First and last instant, s.
     step : number or expression, optional
-        Spacing, s; or `count`, the number of instants with both ends.
+        Spacing, s, the last step being shorter where the others do not arrive at the stop; or `count`, the number of
+        instants with both ends.
+
+    Examples
+    --------
+    >>> from jounce.mechanism import time_grid
+    >>> time_grid(TimeGrid(0, 1, step=0.3), {}).tolist()
+    [0.0, 0.3, 0.6, 0.8999999999999999, 1.0]
     """
 
     start: Any
@@ -45,14 +53,14 @@ class SpacedInstants:
     ----------
     start, step : float
     count : int
-    stop : float, optional
-        The last instant to the bit, where it is given.
+    stop : float
+        The last instant, to the bit.
     """
 
     start: float
     step: float
     count: int
-    stop: float | None = None
+    stop: float
 
     def __len__(self) -> int:
         return self.count
@@ -69,8 +77,7 @@ class SpacedInstants:
 
     def _at(self, index: Int[np.ndarray, " time"]) -> Float[np.ndarray, " time"]:
         instants = self.start + self.step * index
-        if self.stop is not None:
-            instants[index == self.count - 1] = self.stop
+        instants[index == self.count - 1] = self.stop
         return instants
 
 
@@ -130,12 +137,31 @@ def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> SpacedInstants:
     elif values["step"] <= 0:
         raise MechanismError("the step must be greater than zero", name="time.step", value=values["step"])
     else:
-        count = np.floor((stop - start) / values["step"] * (1 + 1e-12) + 1e-9) + 1
+        steps = (stop - start) / values["step"]
+        count = np.floor(steps + PART_OF_STEP) + 1
+        count += steps - (count - 1) > PART_OF_STEP  # the last step is shorter
     if count > MAX_INSTANTS:
         raise MechanismError(f"a time grid holds at most {MAX_INSTANTS} instants", name="time", value=float(count))
-    if "count" in values:
-        return SpacedInstants(start, (stop - start) / max(int(count) - 1, 1), int(count), stop)
-    return SpacedInstants(start, values["step"], int(count))
+    step = values["step"] if "step" in values else (stop - start) / max(int(count) - 1, 1)
+    return SpacedInstants(start, step, int(count), stop)
+
+
+def last_step_words(instants: Instants) -> str:
+    """Tell that the last step of a grid is shorter than the others, which are alike; nothing where it is not.
+
+    Examples
+    --------
+    >>> last_step_words(np.array([0.0, 0.4, 0.8, 1.0]))
+    'the step of 0.4 s does not divide the time: the last one is 0.2 s'
+    """
+    if len(instants) < 3:
+        return ""
+    steps = np.diff(instants)
+    step, last = float(steps[0]), float(steps[-1])
+    alike = np.abs(steps[:-1] - step).max() <= PART_OF_STEP * step
+    if not (alike and last < step * (1 - 2 * PART_OF_STEP)):
+        return ""
+    return f"the step of {step:.6g} s does not divide the time: the last one is {last:.6g} s"
 
 
 def nearest_instants(

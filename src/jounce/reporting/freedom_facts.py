@@ -133,7 +133,7 @@ class StartingState:
             model, told = redundancy_of(model, trial, self.instant)
             jacobian = told.jacobian
             try:
-                check_mobility(model, trial.jacobian, told)
+                check_mobility(model, told)
             except MobilityError as error:
                 message = error.message
         drives = np.array([name.startswith("drivers.") for name in model.rows], bool)

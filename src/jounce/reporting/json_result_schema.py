@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Literal, NotRequired
 
 from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
@@ -273,6 +273,7 @@ class SweepResult(Result):
     file: str
     designs: int
     instants: int
+    remark: NotRequired[str]
     vary: list[str]
     failed: dict[str, int]
     peaks: list[SweptPeak]

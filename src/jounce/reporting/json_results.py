@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +14,10 @@ from jounce.dynamics.trajectories import told_drives
 from jounce.dynamics.trajectory_ends import TrajectoryEnd
 from jounce.errors import UNSET, JounceError, show_value
 from jounce.kinematics import Motion, Stretches
+from jounce.reporting.mechanism_facts import grid_facts
 from jounce.reporting.motion_ends import between_facts, ends_facts
 from jounce.reporting.motion_facts import motion_facts
-from jounce.reporting.peaks import Peak, peaks, table_peaks
+from jounce.reporting.peaks import Peak, peaks
 from jounce.trajectory import JointTrajectory
 
 if TYPE_CHECKING:
@@ -110,21 +111,21 @@ def limits_result(
 
 def torques_result(
     dataset: xarray.Dataset,
+    found: Iterable[Peak],
     motion: JointTrajectory,
     ends: Sequence[TrajectoryEnd],
-    robot: Path,
-    trajectory: Path,
+    files: tuple[Path, Path],
     written: Path | None,
 ) -> dict[str, Any]:
     """Return what `jounce torques` tells of a robot on a trajectory."""
-    times = dataset["time"].values
-    told = [told_peak(peak) for peak in table_peaks(dataset)]
+    (robot, trajectory), times = files, dataset["time"].values
+    told = [told_peak(peak) for peak in found]
     return {
         "robot": dataset.attrs["title"],
         "file": robot,
         "trajectory": trajectory,
         "rates": dataset.sizes["derivative"] - 1,
-        "time": {"start": times[0], "stop": times[-1], "count": len(times)},
+        "time": grid_facts(times),
         "held": [name for name in dataset.data_vars if name not in motion.names],
         "drives": dataset.attrs["drives"] == told_drives(True),
         "peaks": [{"joint": peak.pop("output"), **peak} for peak in told],

@@ -7,6 +7,7 @@ from os import PathLike, fspath
 from typing import Any, Literal, NotRequired
 
 import numpy as np
+from jaxtyping import Float
 from typing_extensions import TypedDict
 
 from jounce.constraints.base import by_ratio_alone, value_fields
@@ -19,6 +20,7 @@ from jounce.mechanism import Mechanism, Model, build, time_grid, with_outputs_he
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve
 from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.mechanism.time import last_step_words
 from jounce.reporting.freedom_facts import AssemblyFacts, FreedomFacts, MobilityFacts, StartingState
 from jounce.reporting.law_facts import LawFacts, law_facts
 from jounce.reporting.range_facts import RangeFacts
@@ -92,6 +94,7 @@ class Grid(TypedDict):
     start: float
     stop: float
     count: int
+    remark: NotRequired[str]  # that the last step is shorter
 
 
 class MechanismFacts(TypedDict):
@@ -197,7 +200,19 @@ def _time(mechanism: Mechanism) -> dict[str, Any] | None:
     if mechanism.time is None:
         return None
     instants = time_grid(mechanism.time, mechanism.parameter_values)
-    return {"start": float(instants[0]), "stop": float(instants[-1]), "count": len(instants)}
+    return grid_facts(instants)
+
+
+def grid_facts(instants: Float[np.ndarray, " time"]) -> dict[str, Any]:
+    """Return instants as plain data, with what is to be said of them, if anything.
+
+    Examples
+    --------
+    >>> grid_facts(np.array([0.0, 0.5, 1.0]))
+    {'start': 0.0, 'stop': 1.0, 'count': 3}
+    """
+    found = {"start": float(instants[0]), "stop": float(instants[-1]), "count": len(instants)}
+    return found | ({"remark": remark} if (remark := last_step_words(instants)) else {})
 
 
 def _numbers(mechanism: Mechanism, value: Any, size: int) -> list[float] | None:

@@ -10,6 +10,7 @@ from typing_extensions import TypedDict
 from jounce.integrate import Simulation
 from jounce.kinematics import Motion, Status, Stretches
 from jounce.mechanism import AbstractMotionOutput, build, with_outputs_held
+from jounce.mechanism.time import last_step_words
 from jounce.reporting.unbounded import unbounded_outputs
 
 
@@ -118,7 +119,7 @@ def motion_facts(motion: Motion | Stretches) -> dict[str, Any]:
 
 
 def _remarks(motion: Motion | Stretches) -> list[str]:
-    """Return what is to be said of outputs, such as why their values are NaN: one line for those that have it alike."""
+    """Return what is to be said of the instants, and of outputs, such as why their values are NaN, each once."""
     names: dict[str, list[str]] = {}
     for name, values in (motion.outputs if isinstance(motion, Motion) else {}).items():  # stretches are not kept
         output = motion.mechanism.outputs[name]
@@ -128,7 +129,8 @@ def _remarks(motion: Motion | Stretches) -> list[str]:
         where = ", ".join(f"{instant:g} s" for instant in instants[:6]) + (", ..." if len(instants) > 6 else "")
         remark = f"grows without bound towards t = {where}, its extremes say only how near an instant comes"
         names.setdefault(remark, []).append(name)
-    return [f"{', '.join(those)}: {remark}" for remark, those in names.items()]
+    told = [f"{', '.join(those)}: {remark}" for remark, those in names.items()]
+    return [*filter(None, [last_step_words(motion.time)]), *told]
 
 
 def _simulated(motion: Simulation) -> dict[str, Any]:

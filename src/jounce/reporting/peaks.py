@@ -14,7 +14,9 @@ from jounce.errors import SampleWarning
 from jounce.integrate import Simulation
 from jounce.kinematics import Motion, Stretches, solve
 from jounce.mechanism import AbstractQuantity
+from jounce.mechanism.law_breaks import breaks_of_laws
 from jounce.reporting.maxima import Curves, Highest, Peaks, Times
+from jounce.trajectory.breaks import both_sides
 from jounce.trajectory.shown_units import ShownUnits, derivative_unit
 
 if TYPE_CHECKING:
@@ -130,7 +132,8 @@ def peaks(motion: Motion | Stretches, *, refine: bool = True) -> list[Peak]:
         What was solved; of stretches, those that `looked_at` found; else they are solved for it.
     refine : bool, default True
         Find peaks between its instants too: the motion is solved at more instants where it has few, and then, as often
-        as it takes, around the highest of them. Otherwise only its own instants count.
+        as it takes, around the highest of them. Otherwise only its own instants count, and both sides of the instants
+        at which its laws jump or bend, which count always.
 
     Returns
     -------
@@ -164,22 +167,26 @@ def _name(refine: bool) -> str:
     return "peaks" if refine else "peaks at the instants"
 
 
-def table_peaks(dataset: xarray.Dataset) -> list[Peak]:
+def table_peaks(dataset: xarray.Dataset, beside: xarray.Dataset | None = None) -> list[Peak]:
     """Return the peak values of torques and their rates, or of coordinates, at the instants of a dataset only.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Of variables of dimensions time and derivative, with the attribute ``units``: N, N*m, m or rad.
+    beside : xarray.Dataset, optional
+        The same on both sides of where laws jump or bend.
     """
-    found = []
+    found, coords = [], ("time", "derivative")
+    times = np.concatenate([x["time"].values for x in (dataset, beside) if x is not None])
     for name, variable in dataset.data_vars.items():
         unit = variable.attrs["units"]
-        for order, given in enumerate(variable.transpose("derivative", "time").values):
+        both = (variable, *(() if beside is None else (beside[name],)))
+        for order, given in enumerate(np.concatenate([x.transpose(*coords).values for x in both]).T):
             solved = np.flatnonzero(np.isfinite(given))
             values = given if solved.size else np.full_like(given, np.nan)
             low, high = (int(solved[pick(given[solved])]) if solved.size else 0 for pick in (np.argmin, np.argmax))
-            extremes = [(float(values[k]), float(dataset["time"][k])) for k in (low, high)]
+            extremes = [(float(values[k]), float(times[k])) for k in (low, high)]
             (least, least_at), (most, most_at) = extremes
             told = derivative_name(order) if unit in ("m", "rad") else effort_name(unit, order)
             size = float(np.abs(values[solved]).max(initial=0.0))
@@ -261,6 +268,9 @@ def _extremes(
     """
     times, sizes = highest.times.copy(), highest.sizes.copy()
     rounding = ROUNDING * highest.scales
+    breaks, sides, beside = _beside(motion)
+    if len(sides):
+        _keep_best(times, sizes, 0 * rounding, np.repeat(breaks[:, None], len(sizes), axis=1), beside)
     if refine and len(motion.time) > 1:
         low, high = _around_maxima(motion, highest)
         share = np.linspace(0.0, 1.0, POINTS)[:, None, None]
@@ -276,6 +286,20 @@ def _extremes(
         _keep_best(times, sizes, rounding, vertex, _own(motion, vertex))
     solved = np.isfinite(sizes)
     return np.where(solved, times, np.nan), np.where(solved, sizes, np.nan)
+
+
+def _beside(motion: Motion | Stretches) -> tuple[Times, Times, Curves]:
+    """Return where the laws of a motion jump or bend, at both sides of each, these sides, and the curves there."""
+    if not len(motion.time):
+        return np.zeros(0), np.zeros(0), np.zeros((0, 0))
+    first, last = float(motion.time[0]), float(motion.time[-1])
+    outputs = motion.mechanism.outputs.values()
+    lost = max((output.lost_orders for output in outputs), default=0)
+    breaks = breaks_of_laws(motion.mechanism, first, last, motion.order + lost)
+    if isinstance(motion, Simulation):
+        breaks = np.unique(np.concatenate([breaks, [time for time, _ in motion.kinks]]))
+    sides, which = both_sides(breaks, first, last)
+    return breaks[which], sides, _at(motion, sides) if len(sides) else np.zeros((0, 0))
 
 
 def _around_maxima(motion: Motion | Stretches, highest: Highest) -> tuple[Peaks, Peaks]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from jounce.dynamics.limits import LimitReport
 from jounce.dynamics.trajectories import told_drives
 from jounce.dynamics.trajectory_ends import TrajectoryEnd
+from jounce.mechanism.time import last_step_words
 from jounce.reporting.law_facts import law_words
 from jounce.reporting.motion_ends import between_words, breaks_words, ends_words
 from jounce.trajectory import JointTrajectory
@@ -106,6 +107,7 @@ def _mechanism_start(facts: Facts) -> list[str]:
     lines += ["", "Start", f"  put together at t = {assembly['at']:g} s" if assembled else f"  {assembly['message']}"]
     if time is not None:
         lines.append(f"  time: {count(time['count'], 'instant')} from {time['start']:g} s to {time['stop']:g} s")
+        lines += [f"  {time['remark']}"] if "remark" in time else []
     else:
         lines.append("  no time grid is given")
     lines += [f"  {line}" for line in (*law_words(facts["laws"]), *facts["remarks"])]
@@ -133,6 +135,7 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
         f"{report.robot}: {moved} ({robot.name}, {trajectory.name})",
         f"t = {motion.start:g} s to {motion.stop:g} s, {len(report.times)} instants and the peaks between them",
     ]
+    lines += filter(None, [last_step_words(motion.times)])
     if report.held:
         units = {row.joint: "m" if row.unit == "N" else "rad" for row in report.rows if row.unit in ("N", "N m")}
         held = [f"{name} at {value:.6g} {units[name]}" for name, value in report.held.items()]
@@ -163,6 +166,7 @@ def torques_summary(
         f"t = {instants[0]:g} s to {instants[-1]:g} s, {count(len(instants), 'instant')}",
     ]
     lines.append(f"torques: {dataset.attrs['drives']}")
+    lines += filter(None, [last_step_words(instants)])
     still = [str(name) for name in dataset.data_vars if name not in motion.names]
     if still:
         lines.append(f"not in the trajectory, held still: {', '.join(still)}")

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from jounce.kinematics import Status
+from jounce.mechanism.time import last_step_words
 from jounce.reporting.peaks import derivative_unit
 from jounce.reporting.tables import Table, number
 from jounce.sweeps.chunks import Plan
@@ -41,7 +42,8 @@ def sweep_facts(plan: Plan) -> dict[str, Any]:
             found[f"{word}_at"] = None if best is None else _design(plan, best[1])
         rows.append(found)
     failed = {Status(code).name.lower(): count for code, count in sorted(outcomes.items()) if code != Status.OK}
-    return {
+    remark = last_step_words(plan.problem.instants)
+    return ({"remark": remark} if remark else {}) | {
         "designs": plan.space.count,
         "instants": len(plan.problem.instants),
         "vary": list(plan.space.variations),
@@ -57,6 +59,7 @@ def sweep_summary(facts: dict[str, Any], name: str) -> str:
     lines = [f"{name}: {count} designs ({', '.join(facts['vary'])}) at {facts['instants']} instants"]
     kinds = ", ".join(f"{number} {word.replace('_', ' ')}" for word, number in facts["failed"].items())
     lines.append("  all were solved" if not bad else f"  {count - bad} were solved at all instants, {bad} not: {kinds}")
+    lines += [f"  {facts['remark']}"] if "remark" in facts else []
     return "\n".join([*lines, f"  checksum {facts['checksum']}"])
 
 

@@ -17,7 +17,8 @@ from jounce.errors import MechanismError, RobotError, check_name
 from jounce.integrate import simulate_batch
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.options import checked_options, instants_of
-from jounce.kinematics import Motion, Status, solve, solve_batch
+from jounce.kinematics import Motion, Status, solve
+from jounce.kinematics.families import Sides, sides_of_designs, solve_with_sides
 from jounce.kinematics.motion import output_group
 from jounce.kinematics.solve import checked_settings
 from jounce.mechanism import (
@@ -33,6 +34,7 @@ from jounce.mechanism.builder import pose_at
 from jounce.rigid.inertia import Inertia
 from jounce.robot.robot import Robot
 from jounce.shapes import seconds
+from jounce.trajectory.breaks import both_sides, law_breaks
 from jounce.trajectory.joint_trajectory import JointTrajectory
 from jounce.trajectory.units import parse_value
 
@@ -71,11 +73,14 @@ class Histories:
         See `Status`.
     pace : array of shape (designs,), optional
         How many times faster than the instants say each design moves.
+    sides : Sides, optional
+        The quantities on both sides of where laws jump or bend, at the pace of the instants.
     """
 
     values: dict[str, Float[np.ndarray, "design time derivative *axes"]]
     status: Int[np.ndarray, "design time"]
     pace: Float[np.ndarray, " design"] | None = None
+    sides: Sides | None = None
 
 
 class Problem(abc.ABC):
@@ -164,9 +169,9 @@ class Motions(_OfMechanism):
     def histories(self, designs: Designs, threads: int) -> Histories:
         """Solve some designs side by side."""
         settings = {"tolerance": self.tolerance, "threads": threads}
-        found = solve_batch(self.mechanism, designs, self.instants, self.order, **settings)
+        found, sides = solve_with_sides(self.mechanism, designs, self.instants, self.order, **settings)
         values = {str(name): array.values for name, array in found.data_vars.items() if name != "status"}
-        return Histories(values, found["status"].values)
+        return Histories(values, found["status"].values, sides=sides.like(values))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -204,13 +209,23 @@ class Simulations(_OfMechanism):
         """Simulate some designs side by side; their threads are as many as the machine has cores."""
         del threads
         settings = {"method": self.method, "tolerance": self.tolerance, "longest_step": self.longest_step}
-        found = simulate_batch(self.mechanism, designs, self.instants, self.order, **settings)
+        count = len(next(iter(designs.values())))
+        first, last = sorted((float(self.instants[0]), float(self.instants[-1])))
+        breaks, beside = sides_of_designs(self.mechanism, designs, first, last, self.order)
+        every, forward = np.union1d(self.instants, beside), self.instants[0] <= self.instants[-1]
+        grid = every if forward else every[::-1]
+        found = simulate_batch(self.mechanism, designs, grid, self.order, **settings)
+        here, there = (np.searchsorted(every, x) for x in (self.instants, beside))
+        if not forward:
+            here, there = len(every) - 1 - here, len(every) - 1 - there
         shapes = {quantity.name: quantity.shape for quantity in self.quantities()}
-        values = {name: x.reshape(*x.shape[:3], *shapes[name]) for name, x in found.outputs.items()}
+        whole = {name: x.reshape(*x.shape[:3], *shapes[name]) for name, x in found.outputs.items()}
         unknown = found.status != Status.OK
-        for array in values.values():
+        for array in whole.values():
             array[unknown] = np.nan
-        return Histories(values, found.status)
+        own = np.arange(count)[:, None]
+        sides = Sides(breaks, {name: array[own, there] for name, array in whole.items()})
+        return Histories({name: array[:, here] for name, array in whole.items()}, found.status[:, here], sides=sides)
 
 
 def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order: int) -> tuple[Quantity, ...]:
@@ -317,17 +332,29 @@ class Torques(Problem):
         for name in linear:
             share = self._torques(_with({name: 1.0}, bare), speed) - base
             found = found + designs[name][:, None, None, None] * share[which]
-        values = {name: found[..., k] for k, name in enumerate(self.robot.joint_names)}
-        status = np.full(found.shape[:2], int(Status.OK))
-        return Histories(values, status, designs.get("speed"))
+        here, breaks = len(self.instants), self._looks[1]
+        values = {name: found[:, :here, :, k] for k, name in enumerate(self.robot.joint_names)}
+        beside = {name: found[:, here:, :, k] for k, name in enumerate(self.robot.joint_names)}
+        status = np.full((count, here), int(Status.OK))
+        sides = Sides(np.broadcast_to(breaks, (count, len(breaks))), beside)
+        return Histories(values, status, designs.get("speed"), sides)
 
-    def _torques(self, robot: Robot, speed: Float[np.ndarray, " speed"]) -> Float[np.ndarray, "speed time rate joint"]:
+    @functools.cached_property
+    def _looks(self) -> tuple[Float[np.ndarray, " look"], Float[np.ndarray, " side"]]:
+        """The instants, then those on both sides of where laws jump or bend; and of which of these they are."""
+        first, last = float(self.instants[0]), float(self.instants[-1])
+        breaks = law_breaks(self.trajectory.laws.values(), first, last, self.rates + 2)
+        sides, which = both_sides(breaks, first, last)
+        return np.concatenate([self.instants, sides]), breaks[which]
+
+    def _torques(self, robot: Robot, speed: Float[np.ndarray, " speed"]) -> Float[np.ndarray, "speed look rate joint"]:
         followed = FollowedTrajectory(robot, self.trajectory)
         orders = np.arange(self.rates + 3)
-        q = followed.coordinates(self.instants, self.rates + 2) * (speed[:, None, None, None] ** orders[:, None])
+        looks = self._looks[0]
+        q = followed.coordinates(looks, self.rates + 2) * (speed[:, None, None, None] ** orders[:, None])
         flat = q.reshape(-1, *q.shape[2:])
-        torques = followed.torques(flat, np.tile(self.instants, len(speed)), True)
-        return torques.reshape(len(speed), len(self.instants), *torques.shape[1:])
+        torques = followed.torques(flat, np.tile(looks, len(speed)), True)
+        return torques.reshape(len(speed), len(looks), *torques.shape[1:])
 
 
 def _with(values: Mapping[str, float], robot: Robot) -> Robot:

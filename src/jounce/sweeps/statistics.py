@@ -13,11 +13,11 @@ from jounce.kinematics import Status
 from jounce.sweeps.problems import Histories, Quantity
 
 STATISTICS = {
-    "peak": "largest magnitude of {} at the instants",
+    "peak": "largest magnitude of {} at the instants and where laws jump or bend",
     "peak_time": "instant of the largest magnitude of {}",
     "rms": "root mean square of {} over time",
-    "min": "least value of {} at the instants",
-    "max": "largest value of {} at the instants",
+    "min": "least value of {} at the instants and where laws jump or bend",
+    "max": "largest value of {} at the instants and where laws jump or bend",
 }
 
 
@@ -91,14 +91,19 @@ def kept_values(
         values = found.values.get(quantity.name)
         if values is None:  # no design of them was solved
             values = np.full((count, len(instants), levels, *quantity.shape), np.nan)
-        kept |= {f"{quantity.name}_{kind}": x for kind, x in statistics(values, instants, found.pace).items()}
+        beside = None if found.sides is None or quantity.name not in found.sides.values else found.sides
+        told = statistics(values, instants, found.pace, beside and (beside.values[quantity.name], beside.instants))
+        kept |= {f"{quantity.name}_{kind}": x for kind, x in told.items()}
         if histories:
             kept[quantity.name] = values
     return kept
 
 
 def statistics(
-    values: Float[np.ndarray, "design time *rest"], instants: np.ndarray, pace: np.ndarray | None = None
+    values: Float[np.ndarray, "design time *rest"],
+    instants: np.ndarray,
+    pace: np.ndarray | None = None,
+    beside: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> dict[str, Float[np.ndarray, "design *rest"]]:
     """Return statistics of histories over time; NaN where a value is not known.
 
@@ -109,6 +114,8 @@ def statistics(
         s; the mean of squares is over time, by trapezia.
     pace : array of shape (designs,), optional
         How many times faster each design moves than the instants say.
+    beside : tuple of arrays of shape (designs, sides, ...) and (designs, sides), optional
+        More values that count for extremes, those on both sides of where laws jump or bend, and their instants, s.
 
     Examples
     --------
@@ -121,6 +128,16 @@ def statistics(
     at = np.argmax(size, axis=1)
     peak = np.take_along_axis(size, at[:, None], axis=1)[:, 0]
     unknown, when = np.isnan(peak), instants[at]
+    if beside is not None and beside[0].shape[1]:
+        more, their = beside
+        low = np.where(unknown, low, np.fmin(low, np.fmin.reduce(more, axis=1)))
+        high = np.where(unknown, high, np.fmax(high, np.fmax.reduce(more, axis=1)))
+        sizes = np.nan_to_num(np.abs(more), nan=-np.inf)
+        at = np.argmax(sizes, axis=1)
+        larger = np.take_along_axis(sizes, at[:, None], axis=1)[:, 0]
+        instant = np.take_along_axis(their, at.reshape(len(at), -1), axis=1).reshape(at.shape)
+        when = np.where(larger > peak, instant, when)
+        peak = np.where(larger > peak, larger, peak)
     if pace is not None:
         when = instants[0] + (when - instants[0]) / pace.reshape(-1, *[1] * (when.ndim - 1))
     weight = _weights(instants)

@@ -16,6 +16,9 @@ from jounce.trajectory.splines import integrated, local_powers
 MAX_CONTINUITY = 10
 ENDS = ("not-a-knot", "natural", "clamped")
 BEYOND = ("refuse", "hold", "continue")
+LARGEST_GROWTH = 1e3  # of what is interpolated, between the knots: by an ill-conditioned system, not by a law
+AT_KNOTS = 1e-6  # of the largest value, by which a law may miss its own knots
+PLACES = 4  # in each segment at which the growth is looked at
 
 _Conditions = Mapping[int, float]
 
@@ -29,8 +32,10 @@ class PolynomialMotion(SplineMotion):
     A law of s segments has ``s + 1 + m`` free numbers, and the knots fix ``s + 1`` of them. The other m are fixed by
     conditions at the first and the last knot. Those on derivatives lower than what the knots carry are the constants
     of its integration; as many are needed as integrations. Those on higher derivatives are either named by `ends`, or
-    given: as many as are left. With m odd they cannot be shared evenly, and an error at one end then does not fade
-    along the knots; prefer m even, which is a spline of odd degree.
+    given: as many as are left, shared between start and end evenly, or but for one where their number is odd. With more
+    at one end, an error there, of rounding as well, grows by a factor at every knot; such shares are refused unless
+    there is only one segment. With an odd number it does not fade along the knots; prefer `derivative` and m both even
+    or both odd.
 
     Parameters
     ----------
@@ -56,11 +61,13 @@ class PolynomialMotion(SplineMotion):
     Raises
     ------
     TrajectoryError
-        If the knots are too few, not finite or do not increase, or the conditions do not close the system.
+        If the knots are too few, not finite or do not increase, the conditions do not close the system or are shared
+        unevenly between start and end, or what they determine does not stay near what is given.
 
     Notes
     -----
-    The formulas are Negrean 2025, equations 61-64; the conditions at the ends are not fixed there.
+    The formulas are Negrean 2025, equations 61-64. Equation 64 names all derivatives at the first knot and two at the
+    last, one more condition than there are unknowns, and its spline would grow by a factor at every knot.
 
     Examples
     --------
@@ -272,6 +279,7 @@ def _spline(
         message = f"{needed} conditions on the derivatives above that of the knots close the system, or none"
         raise TrajectoryError(f"{message}; give as many in start and end together", value=given)
     first, last = (needed + 1) // 2, needed // 2
+    _check_shares(conditions, len(knots) - 1, (first, last))
     if not given and ends == "not-a-knot":
         if len(knots) <= degree:
             message = f"not-a-knot ends of a law of this degree need at least {degree + 1} knots"
@@ -295,7 +303,43 @@ def _spline(
             orders = [sorted(end) for end in conditions]
             message = "the conditions at the start and the end do not determine the law; choose others"
             raise TrajectoryError(message, value=orders) from None
-    return local_powers(spline, knots[:-1], degree)
+    pieces = local_powers(spline, knots[:-1], degree)
+    _check_growth(pieces, knots, values, conditions)
+    return pieces
+
+
+def _check_shares(conditions: _Ends, segments: int, shares: tuple[int, int]) -> None:
+    """Raise an error where one end has more conditions than the other, by more than one."""
+    start, end = (len(given) for given in conditions)
+    if segments == 1 or abs(start - end) <= 1:
+        return
+    more, fewer = shares
+    some = f"{more} at each end" if more == fewer else f"{more} at one end and {fewer} at the other"
+    message = (
+        f"of the conditions on the derivatives above that of the knots, {start} are at the start and {end} at the end: "
+        "an error at one end, of rounding as well, then grows by a factor at every knot, and the law with it"
+    )
+    raise TrajectoryError(f"{message}; give {some}, or none", name="start" if start > end else "end")
+
+
+def _check_growth(
+    pieces: _Pieces, knots: Float[np.ndarray, " knots"], values: Float[np.ndarray, " knots"], conditions: _Ends
+) -> None:
+    """Raise an error unless a spline goes through its own knots and stays near them, as far as rounding tells."""
+    given = [abs(value) for end in conditions for value in end.values()]
+    size = max(float(np.max(np.abs(values))), *given, 0.0)
+    local = np.diff(knots) * (np.arange(1, PLACES + 1) / PLACES)[:, None]
+    along = sum(c * local**k for k, c in enumerate(pieces))
+    missed = float(np.max(np.abs(along[-1] - values[1:])))
+    if not missed <= AT_KNOTS * size:
+        message = f"the law misses the values at its own knots, by {missed:.3g}: errors grow from knot to knot"
+    elif not np.max(np.abs(along)) <= LARGEST_GROWTH * size:
+        message = f"the law grows to {np.max(np.abs(along)):.3g} between its knots, of which the largest is {size:.3g}"
+    else:
+        return
+    smallest = float(np.min(np.diff(knots)) * (len(knots) - 1) / (knots[-1] - knots[0]))
+    advice = "sample evenly, lower the order of continuity, or choose an even number of conditions, half at each end"
+    raise TrajectoryError(f"{message} (the shortest segment is {smallest:.2g} of the mean one); {advice}")
 
 
 def _closing(pieces: _Pieces, knots: Float[np.ndarray, " knots"], constants: _Ends, duration: float) -> _Pieces:

@@ -55,6 +55,15 @@ def test_example_of_laws():
     np.testing.assert_allclose(found[:, 0, 1], np.deg2rad(-120), rtol=1e-15)
 
 
+@pytest.mark.parametrize("step, count", [("30 ms", 35), ("0.3 s", 5), ("7 s", 2), ("25 ms", 41), ("333 ms", 5)])
+def test_a_law_file_ends_at_its_stop(tmp_path, step, count):
+    text = f"joints: {{a: t**2}}\ntime: {{stop: 1 s, step: {step}}}\n"
+    trajectory = load_trajectory(write(tmp_path, text, "law.yaml"))
+    assert trajectory.stop == trajectory.times[-1] == 1.0
+    assert len(trajectory.times) == count
+    assert trajectory.derivatives([trajectory.stop], 1)[0, :, 0].tolist() == [1.0, 2.0]
+
+
 def test_samples_and_columns_of_derivatives(tmp_path):
     rows = [f"{row},{'a_d1' if k == 0 else 99.0}" for k, row in enumerate(ROWS)]
     trajectory = load_trajectory(write(tmp_path, rows))
@@ -193,7 +202,7 @@ def test_json_and_toml(tmp_path):
         ("joints: {a: t}\ntime: {start: 0}\n", r"time\.stop: is missing"),
         ("joints: {a: t}\ntime: {stop: 1 m, step: 1}\n", r"line 2, time\.stop: .*got '1 m'"),
         ("joints: {a: t}\ntime: {stop: 1 s}\n", "line 2, time: a time grid takes either step or count"),
-        ("joints: {a: t}\ntime: {stop: 1 s, step: 2 s}\n", "line 2, time: .* at least two instants"),
+        ("joints: {a: t}\ntime: {stop: 0 s, step: 2 s}\n", "line 2, time: .* at least two instants"),
         (
             "joints: {a: t}\ntime:\n  start: 2 s\n  stop: 1 s\n  step: 0.1 s\n",
             r"line 4, time\.stop: stop must not come",

@@ -17,7 +17,7 @@ from jounce.errors import MechanismError
 from jounce.io.mechanisms.keys import OUTPUTS, ROLES, file_keys, output_holder
 from jounce.io.mechanisms.written_laws import WrittenLaws
 from jounce.io.mechanisms.written_values import plain, plain_number
-from jounce.mechanism import Body, Mechanism, TimeGrid
+from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid
 from jounce.shapes import seconds
 
 
@@ -212,6 +212,11 @@ def _time(time: Any) -> dict[str, Any]:
         return {key: plain(value, f"time.{key}") for key, value in given.items() if value is not None}
     instants = seconds("time", time, MechanismError)
     start, stop, count = float(instants[0]), float(instants[-1]), len(instants)
-    if not np.allclose(instants, np.linspace(start, stop, count), rtol=0, atol=1e-12 * max(abs(start), abs(stop))):
+    ends, slack = {"start": plain_number(start, "time"), "stop": plain_number(stop, "time")}, max(abs(start), abs(stop))
+    if np.allclose(instants, np.linspace(start, stop, count), rtol=0, atol=1e-12 * slack):
+        return ends | {"count": count}
+    step = float(instants[1] - start)
+    spaced = time_grid(TimeGrid(start, stop, step), {})
+    if len(spaced) != count or not np.allclose(instants, spaced, rtol=0, atol=1e-12 * slack):
         raise MechanismError("instants that are not evenly spaced have no form in a file", name="time")
-    return {"start": plain_number(start, "time"), "stop": plain_number(stop, "time"), "count": count}
+    return ends | {"step": plain_number(step, "time")}

@@ -274,7 +274,7 @@ class _LawFile:
         values = {key: self._number(raw, kinds.get(key, "time"), ("time", key)) for key, raw in data.items()}
         times = self._placed(("time",), lambda: time_grid(TimeGrid(**{"start": 0.0, **values}), {}))
         if len(times) < 2:
-            message = "a trajectory needs at least two instants; choose a later stop or a smaller step"
+            message = "a trajectory needs at least two instants; choose a later stop"
             raise self.source.error(message, ("time",))
         return times
 

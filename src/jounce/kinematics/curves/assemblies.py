@@ -228,7 +228,7 @@ class _Search:
         self.senses = senses(self.system, trial.coordinates) if trial.closed else drawn_senses(model)
         self.starts = self.since_last_new = self.movable = 0
         if trial.closed:
-            check_mobility(self.model, trial.jacobian, redundancy_of(self.first, trial, instant)[1])
+            check_mobility(self.model, redundancy_of(self.first, trial, instant)[1])
             self.add({name: x[..., 0] for name, x in trial.coordinates.items()}, hits=0)
 
     def from_starts(self, count: int, random: np.random.Generator) -> None:

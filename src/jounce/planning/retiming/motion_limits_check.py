@@ -20,9 +20,11 @@ from jounce.planning.retiming.robot_quantities import RobotQuantities
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
+from jounce.trajectory.breaks import at_breaks, law_breaks, with_sides
 
 EVEN = np.array([1.0, 0.0, 0.0, 0.0])  # z and its derivatives where the parameter is the time
 ZOOM, ZOOMS = 9, 8
+JOUNCE = 4  # the highest derivative that is limited
 SMALL = 1e-9  # of the size of a velocity of a point: a smaller jump is rounding
 
 _PARTNERS = {"acceleration": "deceleration"}
@@ -121,7 +123,9 @@ def _rows(source: RobotQuantities, trajectory: JointTrajectory, infinite: _Infin
     def ratios(times: np.ndarray) -> np.ndarray:
         return _curves(source, times).ratios(np.tile(EVEN[:, None], len(times)))
 
-    grid = np.unique(np.concatenate([trajectory.times, np.linspace(trajectory.start, trajectory.stop, 2001)]))
+    ends = float(trajectory.start), float(trajectory.stop)
+    breaks = law_breaks(trajectory.laws.values(), *ends, JOUNCE)
+    grid = with_sides(np.unique(np.concatenate([trajectory.times, np.linspace(*ends, 2001)])), breaks)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)
         found = ratios(grid)
@@ -138,6 +142,7 @@ def _rows(source: RobotQuantities, trajectory: JointTrajectory, infinite: _Infin
                 best, times = np.where(better, here[top, every], best), np.where(better, around[top, every], times)
                 low, high = around[np.maximum(top - 1, 0), every], around[np.minimum(top + 1, ZOOM - 1), every]
     values, bounds = _at_peaks(source, times)
+    times = at_breaks(times, breaks, *ends)
     labels = source.labels.every
     when = np.array([infinite.get((label.owner, label.word), np.nan) for label in labels])
     when = np.where(np.isnan(when), _jumps(source, trajectory), when)

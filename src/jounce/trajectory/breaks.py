@@ -1,0 +1,144 @@
+"""Where derivatives of laws jump or bend, and the instants beside: a largest value may be a limit from one side there."""
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.trajectory.composed import FollowingMotion
+from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
+from jounce.trajectory.profiles import AbstractProfile
+from jounce.trajectory.seen_jumps import seen_jumps
+from jounce.trajectory.smoothness import HIGHEST, known_jumps
+from jounce.trajectory.stacking import law_derivatives
+
+BENDING = frozenset({"abs", "sqrt", "asin", "acos", "atan2"})  # functions that may have kinks
+LOOKS = 2001  # at a law that may bend anywhere
+BESIDE = 2e-11  # of a span of time: how far beside a break its sides are; kinks are found to half of that
+MOST = 1000  # breaks of the derivative above those asked for; of more, as of a spline through samples, none is told
+
+Times = Float[np.ndarray, " time"]
+
+
+def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order: int) -> Times:
+    """Return the instants at which a derivative up to an order jumps or bends, in the sequence of time, s.
+
+    Where pieces of a law meet is known, also where they are passed by what leads the law. Kinks of expressions with
+    ``abs`` and the like, and of Python functions, are looked for.
+
+    Parameters
+    ----------
+    laws : iterable of AbstractMotion
+        With numbers in the place of parameters.
+    first, last : float
+        s.
+    order : int
+        Of the highest derivative that matters.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> ramp = jn.SegmentedMotion([jn.Segment("dwell", 0.25), jn.Segment("cycloidal", 0.5, by=0.1)], beyond="hold")
+    >>> bent = jn.ExpressionMotion(jn.Expression("abs(t - 0.1)"), {})
+    >>> law_breaks([ramp, bent], 0.0, 1.0, 4).round(9).tolist()
+    [0.1, 0.25, 0.75]
+    """
+    found = [np.zeros(0)]
+    for law in _with_leaders(laws) if last > first else ():
+        level = min(order + 1, HIGHEST)
+        instants, jumps, _ = known_jumps(law, first, last, level)
+        jump, bend = np.any(jumps[:-1] != 0, axis=0), jumps[-1] != 0
+        found.append(instants[jump | bend if np.sum(jump | bend) <= MOST else jump])
+        if _may_bend(law):
+            found.append(_seen(law, first, last, order))
+    return _apart(np.concatenate(found), first, last)
+
+
+def both_sides(breaks: Times, first: float, last: float) -> tuple[Times, Int[np.ndarray, " time"]]:
+    """Return the instants just before and just after breaks, within a first and a last instant, and of which they are.
+
+    Examples
+    --------
+    >>> instants, which = both_sides(np.array([0.5, 1.0]), 0.0, 1.0)
+    >>> instants.round(9).tolist(), which.tolist()
+    ([0.5, 0.5, 1.0], [0, 0, 1])
+    """
+    away = _beside(first, last)
+    instants = (breaks[:, None] + away * np.array([-1.0, 1.0])).ravel()
+    which = np.repeat(np.arange(len(breaks)), 2)
+    inside = (instants > first) & (instants < last)
+    return instants[inside], which[inside]
+
+
+def with_sides(instants: Times, breaks: Times) -> Times:
+    """Return a grid with the instants just before and just after breaks."""
+    return np.union1d(instants, both_sides(breaks, float(instants[0]), float(instants[-1]))[0])
+
+
+def at_breaks(instants: Times, breaks: Times, first: float, last: float) -> Times:
+    """Return instants, a break in the place of each that is just beside it.
+
+    Examples
+    --------
+    >>> at_breaks(np.array([0.3, 0.5 - 2e-11]), np.array([0.5]), 0.0, 1.0).tolist()
+    [0.3, 0.5]
+    """
+    if not len(breaks):
+        return instants
+    after = np.clip(np.searchsorted(breaks, instants), 1, max(len(breaks) - 1, 1))
+    pair = breaks[np.stack([after - 1, np.minimum(after, len(breaks) - 1)])]
+    nearest = np.where(np.abs(pair[0] - instants) <= np.abs(pair[1] - instants), pair[0], pair[1])
+    return np.where(np.abs(nearest - instants) <= 1.5 * _beside(first, last), nearest, instants)
+
+
+def _beside(first: float, last: float) -> float:
+    return max(BESIDE * (last - first), 8 * float(np.spacing(max(abs(first), abs(last)))))
+
+
+def _apart(instants: Times, first: float, last: float) -> Times:
+    """Return instants without those that are others but for rounding."""
+    instants = np.unique(instants)
+    return instants[np.diff(instants, prepend=-np.inf) > 2 * _beside(first, last)]
+
+
+def _with_leaders(laws: Iterable[AbstractMotion]) -> Iterator[AbstractMotion]:
+    """Yield laws, and those that lead them or parts of them."""
+    for law in laws:
+        yield law
+        if isinstance(law, FollowingMotion):
+            yield from _with_leaders(law.parts[1:])
+        elif parts := getattr(law, "parts", ()):
+            yield from (x for part in parts for x in _with_leaders([part]) if x is not part)
+
+
+def may_break(law: AbstractMotion) -> bool:
+    """Tell whether a law may jump or bend somewhere: all but expressions of smooth functions."""
+    return not isinstance(law, ExpressionMotion) or _may_bend(law)
+
+
+def _may_bend(law: Any) -> bool:
+    """Tell whether a law may have a kink that is not known: one that is no spline, profile or smooth expression."""
+    if parts := getattr(law, "parts", ()):
+        return any(map(_may_bend, parts))
+    if isinstance(law, ExpressionMotion):
+        used: set[str] = set()
+        law.expression.folded(lambda _: None, lambda _: None, lambda word, _: used.add(word))
+        return bool(used & BENDING)
+    return not isinstance(law, SplineMotion | AbstractProfile)
+
+
+def _seen(law: AbstractMotion, first: float, last: float, order: int) -> Times:
+    """Return where derivatives of a law are seen to jump."""
+    level = min(order + 2, HIGHEST + 1)
+
+    def evaluate(times: Times) -> Any:
+        filled = np.full(max(16, 1 << (len(times) - 1).bit_length()), last)  # few shapes, so that few are compiled
+        filled[: len(times)] = times
+        found = np.asarray(law_derivatives([law], jnp.asarray(filled), level))[..., : len(times)]
+        return np.nan_to_num(np.moveaxis(found, -1, 0))
+
+    looks = np.linspace(first, last, LOOKS)
+    with np.errstate(over="ignore", invalid="ignore"):  # next to what grows without bound
+        return seen_jumps(evaluate, looks, evaluate(looks))[0]

@@ -1,0 +1,50 @@
+"""Where laws jump or bend: against the instants at which they were made to."""
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.trajectory.breaks import at_breaks, both_sides, law_breaks, may_break, with_sides
+
+BENT = jn.PiecewiseMotion(["t", "2*t - 0.25"], until=[0.25])
+RAMP = jn.SegmentedMotion([jn.Segment("dwell", 0.25), jn.Segment("cycloidal", 0.5, by=0.1)], beyond="hold")
+
+
+def expression(text):
+    return jn.ExpressionMotion(jn.Expression(text), {})
+
+
+@pytest.mark.parametrize(
+    "law, expected",
+    [
+        (expression("sin(3*t) + t**5"), []),
+        (expression("abs(t - 0.3)"), [0.3]),
+        (expression("abs(sin(7*t))"), [np.pi / 7, 2 * np.pi / 7]),
+        (expression("abs(t - 0.3)**3*t"), [0.3]),
+        (jn.FunctionMotion(lambda t: abs(t - 0.7)), [0.7]),
+        (jn.PiecewiseMotion(["t**4", "0.2**4 + abs(t - 0.6)"], until=[0.2]), [0.2, 0.6]),
+        (RAMP, [0.25, 0.75]),
+        (jn.FollowingMotion(BENT, expression("t**2")), [0.5]),
+        (jn.FollowingMotion(RAMP, expression("t**2")), [0.5, np.sqrt(0.75)]),
+        (jn.FollowingMotion(expression("sin(t)"), BENT), [0.25]),
+    ],
+)
+def test_breaks_are_found(law, expected):
+    assert law_breaks([law], 0.0, 1.0, 4).tolist() == pytest.approx(expected, abs=1e-11)
+    assert may_break(law) or not expected
+
+
+def test_those_of_several_laws_are_told_once():
+    laws = [expression("abs(t - 0.5)"), jn.PiecewiseMotion(["t", "0.5"], until=[0.5])]
+    assert law_breaks(laws, 0.0, 1.0, 4).tolist() == pytest.approx([0.5], abs=1e-11)
+
+
+@pytest.mark.parametrize("first, last", [(0.0, 1.0), (-3.0, 1e4), (1e6, 1e6 + 1.0)])
+def test_sides_are_beside_and_within(first, last):
+    breaks = np.array([first, (first + last) / 2, last])
+    sides, which = both_sides(breaks, first, last)
+    assert which.tolist() == [0, 1, 1, 2]
+    assert first < sides[0] < sides[1] < breaks[1] < sides[2] < sides[3] < last
+    np.testing.assert_allclose(sides, breaks[which], rtol=1e-14, atol=1e-10 * (last - first))
+    np.testing.assert_array_equal(at_breaks(sides, breaks, first, last), breaks[which])
+    assert len(with_sides(np.array([first, last]), breaks)) == 6
