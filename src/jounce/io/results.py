@@ -17,6 +17,7 @@ from jounce.io.files.netcdf_parts import NetcdfParts
 from jounce.io.files.reading import known_name, read_file, reason_of, written_name
 from jounce.io.files.writing import check_target, replacing
 from jounce.io.result_columns import AXES, column_units, columns, dataset_of
+from jounce.precision import double_precision
 
 if TYPE_CHECKING:
     import xarray
@@ -50,6 +51,7 @@ def check_writable(path: str | PathLike[str], *, overwrite: bool = False) -> Non
     check_target(path, SUFFIXES, "an output", overwrite=overwrite)
 
 
+@double_precision
 def write(
     dataset: xarray.Dataset,
     path: str | PathLike[str],
@@ -103,6 +105,7 @@ def write(
             _write_netcdf(dataset, scratch)
 
 
+@double_precision
 def write_parts(
     parts: Iterable[xarray.Dataset],
     path: str | PathLike[str],
