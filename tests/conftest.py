@@ -12,14 +12,16 @@ import threading
 import hypothesis
 import jax
 import pytest
+from jax._src import core  # what is private to JAX has no public name
 
 import tests.type_checks  # isort: skip # noqa: F401 - before jounce
 from jounce.cli import main
 from jounce.cli.compiled_programs import keep_programs
-from jounce.constraints import base  # importing jounce switches on double precision
+from jounce.constraints import base
 from jounce.errors import OutputError
 from jounce.kinematics.rehearsal import NAME
 from jounce.private_folder import PrivateFolder
+from tests.precision import watched
 from tests.shares_of_tests import pytest_addoption, pytest_collection_modifyitems  # noqa: F401 - found here by pytest
 
 # Most of the time of the tests goes into compiling. It is halved without XLA's last optimisations, without its passes
@@ -40,6 +42,7 @@ os.environ.setdefault("JOUNCE_THREADS", "1")
 # The lines of Python from which each operation comes, which only dumps of programs show, take a twelfth of the time.
 jax.config.update("jax_include_full_tracebacks_in_locations", False)
 jax.config.update("jax_traceback_in_locations_limit", 0)
+jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 hypothesis.settings.register_profile("jounce", deadline=None, max_examples=15, derandomize=True)
@@ -106,6 +109,28 @@ def _memory():
 def _memory_maps():
     told = pathlib.Path("/proc/self/maps")
     return told.read_text().count("\n") if told.exists() else 0
+
+
+@pytest.fixture
+def single_precision():
+    """Set JAX up as a program finds it that has not switched on double precision; what is shown must run there."""
+    jax.config.update("jax_enable_x64", False)
+    yield
+    jax.config.update("jax_enable_x64", True)
+
+
+@pytest.fixture(autouse=True)
+def _examples_of_docstrings(request):
+    """Run the examples of docstrings, which go through all that is public, in single precision."""
+    if isinstance(request.node, pytest.DoctestItem):
+        request.getfixturevalue("single_precision")
+        request.getfixturevalue("doors_kept")
+
+
+@pytest.fixture
+def doors_kept(monkeypatch):
+    """Fail where an operation of JAX is run in single precision for a function of the package."""
+    monkeypatch.setattr(core.Primitive, "bind", watched(core.Primitive.bind))
 
 
 @pytest.fixture(autouse=True)

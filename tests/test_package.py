@@ -36,12 +36,12 @@ def test_all_that_the_stub_lists_is_there_and_comes_from_where_it_says():
         jounce.sovle  # noqa: B018 - what is looked for is the error
 
 
-def test_the_package_has_double_precision_at_once_and_the_rest_when_it_is_used():
+def test_the_package_is_imported_when_it_is_used():
     found = printed(
-        "import sys, jounce, jax; print(jax.numpy.ones(1).dtype, 'equinox' in sys.modules)\n"
+        "import sys, jounce; print('jax' in sys.modules, 'equinox' in sys.modules)\n"
         "print(jounce.solve.__module__, jounce.io.load is jounce.load, 'scipy' in sys.modules, 'xarray' in sys.modules)"
     )
-    assert found.split() == "float64 False jounce.kinematics.solve True False False".split()
+    assert found.split() == "False False jounce.kinematics.solve True False False".split()
 
 
 def test_everything_can_be_imported_by_a_star():

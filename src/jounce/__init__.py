@@ -1,9 +1,10 @@
 """Exact time derivatives of any order of mechanisms and robots: jerk, jounce and beyond, torques and their rates.
 
-Importing this package switches JAX to double precision (``jax_enable_x64``); it has no other side effect but a
-mark that a process gets when it is forked, see `jounce.interrupts`. What the package offers stands in the stub beside
-this file, ``__init__.pyi``, and is imported when a name of it is first used: importing the package alone takes as long
-as JAX does, and a command that computes nothing, such as ``jounce --help``, does not wait for JAX either.
+Importing this package has no side effect but a mark that a process gets when it is forked, see `jounce.interrupts`.
+The settings of JAX are left alone; everything is computed in double precision all the same, see `jounce.precision`.
+What the package offers stands in the stub beside this file, ``__init__.pyi``, and is imported when a name of it is
+first used: importing the package alone takes no time, and a command that computes nothing, such as ``jounce --help``,
+does not wait for JAX either.
 """
 
 import importlib
@@ -20,12 +21,7 @@ __version__ = "0.4.0"
 
 if _is_command():
     _end_on_signals()  # before the libraries, which take a second
-if _is_command() and "jax" not in sys.modules:
-    os.environ["JAX_ENABLE_X64"] = "1"  # JAX reads it when it is imported
-else:
-    import jax as _jax
-
-    _jax.config.update("jax_enable_x64", True)
+    os.environ["JAX_ENABLE_X64"] = "1"  # the process is the command's own; JAX reads it when it is imported
 _mark_forks()
 
 _lock = threading.RLock()  # threads that import several rooms at once may get each other's half imported

@@ -31,6 +31,7 @@ def pages_with(language, needle=""):
 
 @pytest.mark.slow
 @pages_with("python")
+@pytest.mark.usefixtures("single_precision")  # which a page switches off itself where it has to
 def test_python_blocks_run(page, tmp_path, monkeypatch):
     (tmp_path / "examples").symlink_to(ROOT / "examples", target_is_directory=True)
     monkeypatch.chdir(tmp_path)

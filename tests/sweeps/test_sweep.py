@@ -16,7 +16,7 @@ import xarray
 import jounce as jn
 from jounce.cli import main
 from jounce.errors import JounceError, OutputError, UnsupportedError
-from jounce.sweeps import cluster
+from jounce.sweeps import cluster, manifest
 from jounce.sweeps.fingerprints import fingerprint
 from jounce.sweeps.problems import Torques
 
@@ -86,11 +86,11 @@ def test_it_opens_lazily_and_says_what_it_is(done):
     found = xarray.open_zarr(folder)
     assert found["psi_peak"].chunks is not None
     assert dict(found["C"].sizes) == {"design": COUNT, "time": 9, "derivative": 3, "component": 2}
-    manifest = json.loads(found.attrs["manifest"])
-    assert manifest["checksum"] == found.attrs["checksum"]
-    assert manifest["designs"] == COUNT
-    assert list(manifest["files"]) == ["four_bar.yaml"]
-    assert manifest["options"]["order"] == 2
+    told = json.loads(found.attrs["manifest"])
+    assert told["checksum"] == found.attrs["checksum"]
+    assert told["designs"] == COUNT
+    assert list(told["files"]) == ["four_bar.yaml"]
+    assert told["options"]["order"] == 2
 
 
 def test_only_what_is_missing_is_computed_again_to_the_same_bits(done, tmp_path):
@@ -123,6 +123,83 @@ def test_what_was_lost_or_changed_on_the_disk_is_told_and_computed_again(done, t
         again = swept(folder, histories=True)
     assert again.attrs["checksum"] == done[1].attrs["checksum"]
     assert again["psi_peak"].identical(done[1]["psi_peak"])
+
+
+def exchanged(one, other):
+    kept = one.with_name("kept")
+    for source, target in ((one, kept), (other, one), (kept, other)):
+        shutil.move(source, target)
+
+
+def exchange_two(folder, tmp_path):
+    """Exchange two chunks that are whole, each with its digest."""
+    for array in ("chunks/digest", "psi_peak", "psi_rms", "C_max", "BC", "AB"):
+        zero, one = (next((folder / array / "c").glob(f"{k}*"), None) for k in (0, 1))
+        if zero is not None and one is not None:
+            exchanged(zero, one)
+
+
+def take_from_another(folder, tmp_path):
+    """Put a chunk of another sweep, with its digest, in the place of that of this one."""
+    other = tmp_path / "other.zarr"
+    swept(other, histories=True, vary={**VARY, "BC": "10cm:15.9cm:9"})
+    for part in other.glob("**/c/0"):
+        target = folder / part.relative_to(other)
+        (shutil.rmtree if target.is_dir() else pathlib.Path.unlink)(target)
+        shutil.move(part, target)
+
+
+@pytest.mark.parametrize("change", [exchange_two, take_from_another])
+def test_a_chunk_with_its_digest_is_whole_in_its_own_place_only(tmp_path, change):
+    folder = tmp_path / "a.zarr"
+    vary = {"BC": "10cm:16cm:8", "AB": [0.03, 0.04, 0.05, 0.045]}  # two chunks of one size
+    first = swept(folder, vary=vary, histories=True)
+    values, checksum = first["psi_peak"].values, first.attrs["checksum"]
+    change(folder, tmp_path)
+    with pytest.warns(jn.DamageWarning, match=r"files of (16|32) designs"):
+        again = swept(folder, vary=vary, histories=True)
+    assert again.attrs["checksum"] == checksum
+    assert np.array_equal(again["psi_peak"].values, values, equal_nan=True)
+
+
+def edited(folder, before, after):
+    path = folder / "zarr.json"
+    assert before in path.read_text()
+    path.write_text(path.read_text().replace(before, after))
+
+
+def test_a_checksum_is_computed_whatever_stands_in_the_folder(done, tmp_path):
+    folder, checksum = tmp_path / "a.zarr", done[1].attrs["checksum"]
+    shutil.copytree(done[0], folder)
+    edited(folder, checksum, "0" * 64)
+    assert xarray.open_zarr(folder).attrs["checksum"] == "0" * 64
+    again = swept(folder, histories=True)
+    assert again.attrs["checksum"] == checksum
+    assert json.loads(again.attrs["manifest"])["checksum"] == checksum
+
+
+def test_coordinates_that_were_changed_are_written_again(done, tmp_path):
+    folder = tmp_path / "a.zarr"
+    shutil.copytree(done[0], folder)
+    shutil.copy(folder / "BC" / "c" / "0", folder / "time" / "c" / "0")
+    with pytest.warns(jn.DamageWarning, match="files of time were lost or changed"):
+        again = swept(folder, histories=True)
+    assert np.array_equal(again["time"].values, TIME)
+    assert again.attrs["checksum"] == done[1].attrs["checksum"]
+
+
+def test_what_computes_is_part_of_a_sweep(done, tmp_path, monkeypatch):
+    """XLA and machine code round otherwise: one does not go on with the sweep of the other."""
+    folder, found = done
+    arithmetic = json.loads(found.attrs["manifest"])["arithmetic"]
+    assert arithmetic["device"] == "cpu"
+    monkeypatch.setenv("JOUNCE_NATIVE", "1" if arithmetic["machine code"] == "not used" else "0")
+    if arithmetic == manifest.arithmetic():
+        pytest.skip("there is no compiler, so that all is computed by XLA")
+    with pytest.raises(OutputError, match=r"machine code is (llvmlite .* there, and not used|not used there,.*) here"):
+        swept(folder, histories=True)
+    with pytest.raises(OutputError, match=r"a worker rounds otherwise .* machine code is .* same packages"):
+        manifest.check_same_arithmetic({"arithmetic": arithmetic}, str(folder))
 
 
 def test_another_sweep_is_refused_and_nothing_of_the_first_is_lost(done, tmp_path):

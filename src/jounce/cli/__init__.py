@@ -15,6 +15,7 @@ import re
 import sys
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from inspect import cleandoc
 from pathlib import Path
 from typing import Any, Literal
@@ -42,7 +43,7 @@ from jounce.cli.sweeping import sweep
 from jounce.cli.tolerances import tolerance
 from jounce.cli.viewing import view
 from jounce.errors import JounceError, SolveError
-from jounce.interrupts import end_on_signals
+from jounce.interrupts import end_on_signals, is_command
 from jounce.reporting.terminal import cautions, complain, unexpected
 
 
@@ -112,7 +113,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not re.fullmatch("[1-9][0-9]{0,3}", os.environ.get(name, "1")):  # 0 is "unknown" to some, nothing to others
             del os.environ[name]
     as_json = "--json" in given
-    with failsafe_streams() as output, cautions(json=as_json):
+    with failsafe_streams() as output, cautions(json=as_json), _precision():
         status = _status(given, as_json)
         output.flush()
         if output.failure is None:
@@ -123,6 +124,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         complain(f"standard output cannot be written: {reason_of(output.failure)}", json=as_json)
     return status or 1
+
+
+def _precision() -> AbstractContextManager[Any]:
+    """Return the context for a command in the process of another program; one of its own has it from the start."""
+    if is_command():
+        return nullcontext()
+    from jounce.precision import in_double
+
+    return in_double()
 
 
 def _end_at_once(status: int) -> None:

@@ -113,7 +113,7 @@ def sweep(
             problem, forms, out, _title(problem, file), files, sample=sample, histories=histories, chunk=chunk
         )
         with Bar("sweeping", "designs") as bar:
-            run(
+            checksum = run(
                 plan,
                 workers=workers,
                 scheduler=scheduler,
@@ -122,7 +122,7 @@ def sweep(
                 user_files=user_files,
                 prepare_worker=partial(use_compilation_cache, quiet=True),
             )
-    facts = sweep_facts(plan)
+    facts = sweep_facts(plan, checksum)
     if json:
         say_json("sweep", {"file": file, **facts, "written": out})
         return 0

@@ -9,3 +9,6 @@ from jounce.constraints.base import (
     catalogue as catalogue,
     rows as rows,
 )
+from jounce.precision import compute_in_double as _compute_in_double
+
+_compute_in_double(__name__)

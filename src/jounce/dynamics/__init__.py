@@ -58,3 +58,6 @@ from jounce.dynamics.small_motions import linearise as linearise
 from jounce.dynamics.static_equilibrium import Equilibrium as Equilibrium, equilibrium as equilibrium
 from jounce.dynamics.trajectories import trajectory_torques as trajectory_torques
 from jounce.dynamics.trajectory_ends import TrajectoryEnd as TrajectoryEnd, trajectory_ends as trajectory_ends
+from jounce.precision import compute_in_double as _compute_in_double
+
+_compute_in_double(__name__)

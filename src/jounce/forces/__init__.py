@@ -31,3 +31,6 @@ from jounce.forces.springs import (
     Spring as Spring,
     TorsionalSpring as TorsionalSpring,
 )
+from jounce.precision import compute_in_double as _compute_in_double
+
+_compute_in_double(__name__)

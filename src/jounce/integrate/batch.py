@@ -25,6 +25,7 @@ from jounce.jet.turns import brought_near, whole_periods
 from jounce.kinematics import Status
 from jounce.kinematics.families import checked_values
 from jounce.kinematics.pose_outputs import output_series
+from jounce.kinematics.threads import in_callers_context
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
 from jounce.mechanism.axis_angles import measures_angle, raw_angles, with_turns
 from jounce.mechanism.builder import with_reference
@@ -136,14 +137,15 @@ def simulate_batch(
     def depart(some: np.ndarray) -> None:
         runs.depart(some, *starts.of(some))
 
+    advance, depart_others = in_callers_context(runs.advance), in_callers_context(depart)
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:  # XLA works outside of Python's lock
         lots = runs.lots(np.arange(len(rows)))
         depart(lots[0])  # compiles, once for all threads; so does the first advance
-        list(pool.map(depart, lots[1:]))
+        list(pool.map(depart_others, lots[1:]))
         if len(runs.moving):
             runs.advance(runs.lots(runs.moving)[0])
         while len(runs.moving):
-            list(pool.map(runs.advance, runs.lots(runs.moving)))
+            list(pool.map(advance, runs.lots(runs.moving)))
     status = runs.status
     for run, reason in starts.failed.items():
         status[run, 0] = int(reason)

@@ -49,7 +49,7 @@ def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
 
     Examples
     --------
-    >>> import diffrax
+    >>> import diffrax, jax
     >>> import jounce as jn
     >>> pendulum = jn.Mechanism(
     ...     space="planar",
@@ -59,10 +59,11 @@ def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
     ...     outputs={"angle": jn.AngleOutput("rod")},
     ... )
     >>> equation = jn.ode_term(pendulum)
-    >>> solution = diffrax.diffeqsolve(
-    ...     equation.term, diffrax.Dopri8(), 0.0, 1.0, None, equation.state, args=equation.equations,
-    ...     stepsize_controller=diffrax.PIDController(rtol=1e-10, atol=1e-10),
-    ... )
+    >>> with jax.enable_x64(True):  # diffrax computes as precisely as JAX is told to
+    ...     solution = diffrax.diffeqsolve(
+    ...         equation.term, diffrax.Dopri8(), 0.0, 1.0, None, equation.state, args=equation.equations,
+    ...         stepsize_controller=diffrax.PIDController(rtol=1e-10, atol=1e-10),
+    ...     )
     >>> motion = equation.motion(solution.ts, solution.ys, order=3)
     >>> fall = jn.simulate(pendulum, [0.0, 1.0], order=3)
     >>> bool(abs(motion.outputs["angle"] - fall.outputs["angle"][1:]).max() < 1e-7)

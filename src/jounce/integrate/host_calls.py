@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.precision import called_back
 from jounce.shapes import Numbers
 
 Values = tuple[Any, ...]
@@ -50,7 +51,7 @@ def _derivative(function: Callable[[Numbers], Any], shapes: Any, count: int, deg
 
     @jax.custom_jvp
     def found(vector: Numbers) -> Any:
-        return jax.pure_callback(on_the_host, whole, vector, vmap_method="sequential")
+        return called_back(on_the_host, whole, vector, vmap_method="sequential")
 
     @found.defjvp
     def along(primals: tuple[Numbers], tangents: tuple[Numbers]) -> tuple[Any, Any]:

@@ -43,3 +43,6 @@ from jounce.jet.vectors import (
     stack as stack,
     transpose as transpose,
 )
+from jounce.precision import compute_in_double as _compute_in_double
+
+_compute_in_double(__name__)

@@ -26,6 +26,7 @@ from jounce.jet.coefficients import (
     square_root,
     total,
 )
+from jounce.precision import in_full
 from jounce.shapes import ArrayLike, Numbers, Real, real_derivatives
 
 
@@ -67,12 +68,12 @@ class Jet:
     @classmethod
     def constant(cls, value: ArrayLike, order: int) -> "Jet":
         """Return the jet of a quantity that does not change in time."""
-        return cls((jnp.asarray(value), *[None] * _checked(order)))
+        return cls((in_full(value), *[None] * _checked(order)))
 
     @classmethod
     def variable(cls, value: ArrayLike, order: int) -> "Jet":
         """Return the jet of time itself at the instant (or instants) `value`, in seconds."""
-        value = jnp.asarray(value)
+        value = in_full(value)
         return cls((value, jnp.ones_like(value), *[None] * (order - 1))[: _checked(order) + 1])
 
     @classmethod

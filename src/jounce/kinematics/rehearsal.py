@@ -13,7 +13,7 @@ import jax
 import numpy as np
 
 from jounce.kinematics.compilation import stopped_by
-from jounce.kinematics.threads import callers_device, thread_count
+from jounce.kinematics.threads import callers_context, thread_count
 
 NAME = "jounce-rehearsal"
 _had: set[Any] = set()
@@ -54,7 +54,7 @@ def rehearsed(rehearsal: Callable[[], Any], *, wanted: bool) -> Iterator[None]:
     if not wanted or thread_count() < 2:
         yield
         return
-    enough, context = threading.Event(), callers_device()
+    enough, context = threading.Event(), callers_context()
 
     def rehearse() -> None:
         with tried(), context(), stopped_by(enough):

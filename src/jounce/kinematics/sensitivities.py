@@ -34,6 +34,7 @@ from jounce.mechanism.held_outputs import led_outputs, with_laws_left_out
 from jounce.mechanism.system import System, movable
 from jounce.mechanism.traced import Angles, Part, angles_of, template, traced_model, traced_values
 from jounce.modules import with_fields
+from jounce.precision import called_back
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
@@ -114,7 +115,7 @@ def differentiable_motion(
         if not any(isinstance(value, Tracer) for value in values):
             return jax.tree.map(jnp.asarray, on_the_host(True, values))
         each = partial(_one_by_one, partial(on_the_host, False), shapes, [np.ndim(value) for value in values])
-        return jax.pure_callback(each, shapes, values, vmap_method="broadcast_all")
+        return called_back(each, shapes, values, vmap_method="broadcast_all")
 
     @solution.defjvp
     def along(primals: tuple[Values], tangents: tuple[Values]) -> tuple[Solved, Solved]:

@@ -5,12 +5,13 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any, TypeVar
 
 import jax
 
 from jounce.errors import MechanismError
+from jounce.precision import in_double
 from jounce.shapes import Refused
 
 Item = TypeVar("Item")
@@ -37,10 +38,27 @@ def thread_count(given: int | Refused | None = None) -> int:
     return int(count)
 
 
-def callers_device() -> Callable[[], AbstractContextManager[Any]]:
-    """Return what makes the context of another thread: what `with jax.default_device` says holds for one only."""
+def callers_context() -> Callable[[], AbstractContextManager[Any]]:
+    """Return what makes the context of another thread: what JAX is told by `with` holds for one thread only."""
     device: Any = getattr(jax.config, "jax_default_device", None)
-    return nullcontext if device is None else lambda: jax.default_device(device)
+
+    @contextmanager
+    def context() -> Iterator[None]:
+        with in_double(), nullcontext() if device is None else jax.default_device(device):
+            yield
+
+    return context
+
+
+def in_callers_context(function: Callable[[Item], Result]) -> Callable[[Item], Result]:
+    """Return a function that another thread calls in the context of this one."""
+    context = callers_context()
+
+    def called(item: Item) -> Result:
+        with context():
+            return function(item)
+
+    return called
 
 
 class Threads:
@@ -58,7 +76,6 @@ class Threads:
         self.count = count
         self._pool: ThreadPoolExecutor | None = None
         self._compiled = compiled
-        self._context = callers_device()
 
     def __enter__(self) -> "Threads":
         return self
@@ -82,16 +99,13 @@ class Threads:
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self.count - 1, thread_name_prefix="jounce")  # and the one that asks
         waiting: deque[tuple[Future[Result], Item]] = deque()
+        called = in_callers_context(function)
         for item in items:
-            waiting.append((self._pool.submit(self._called, function, item), item))
+            waiting.append((self._pool.submit(called, item), item))
             if len(waiting) > AHEAD * self.count:
                 yield _first_result(function, waiting)
         while waiting:
             yield _first_result(function, waiting)
-
-    def _called(self, function: Callable[[Item], Result], item: Item) -> Result:
-        with self._context():
-            return function(item)
 
 
 def _first_result(function: Callable[[Item], Result], waiting: deque[tuple[Future[Result], Item]]) -> Result:

@@ -27,3 +27,6 @@ from jounce.mechanism.outputs import (
     RelativeAngleOutput as RelativeAngleOutput,
 )
 from jounce.mechanism.time import TimeGrid as TimeGrid, time_grid as time_grid
+from jounce.precision import compute_in_double as _compute_in_double
+
+_compute_in_double(__name__)

@@ -19,3 +19,6 @@ from jounce.planning.tool_paths.inverse_kinematics import inverse_kinematics as 
 from jounce.planning.tool_paths.joint_poses import JointPoses as JointPoses
 from jounce.planning.tool_paths.tool_path import ToolPath as ToolPath
 from jounce.planning.tool_paths.tool_path_motion import ToolPathMotion as ToolPathMotion
+from jounce.precision import compute_in_double as _compute_in_double
+
+_compute_in_double(__name__)

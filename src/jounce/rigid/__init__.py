@@ -1,5 +1,6 @@
 """Rigid bodies on jets: poses, points, rotations, screws and angular velocity of any order."""
 
+from jounce.precision import compute_in_double as _compute_in_double
 from jounce.rigid.attitude_samples import AttitudeSamples as AttitudeSamples
 from jounce.rigid.orientation import (
     angle_rates as angle_rates,
@@ -30,3 +31,5 @@ from jounce.rigid.spatial import (
     to_body as to_body,
     to_global as to_global,
 )
+
+_compute_in_double(__name__)

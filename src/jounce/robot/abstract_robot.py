@@ -237,7 +237,8 @@ class AbstractRobot(Displayed, abc.ABC):
         >>> arm = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", rod)], [pin])
         >>> def torque(mass):
         ...     return jn.inverse_dynamics(arm.with_inertia("rod", mass=mass), [[0.0], [0.0], [0.0]])[0, 0]
-        >>> round(float(jax.grad(torque)(1.0)), 9)  # N m for each kg at half a metre
+        >>> with jax.enable_x64(True):
+        ...     round(float(jax.grad(torque)(1.0)), 9)  # N m for each kg at half a metre
         4.905
         """
         check_name("link", link, self.links, RobotError, name="link")

@@ -11,6 +11,7 @@ import numpy as np
 from jounce.design.design_space import Grid, Sobol
 from jounce.errors import JounceError, OutputError
 from jounce.kinematics.threads import thread_count
+from jounce.sweeps.manifest import check_same_arithmetic
 from jounce.sweeps.problems import Designs, Problem, Quantity
 from jounce.sweeps.statistics import kept_values
 from jounce.sweeps.store import Store
@@ -68,7 +69,7 @@ class Plan:
         Raises
         ------
         OutputError
-            This process sees another folder than the one that began the sweep, or none.
+            This process sees another folder than the one that began the sweep, or none, or rounds otherwise.
         """
         store = Store(self.folder)
         try:
@@ -78,6 +79,7 @@ class Plan:
         if not same:
             message = "a worker does not see this folder; workers on other machines need one that all of them share"
             raise OutputError(message, path=str(self.folder))
+        check_same_arithmetic(store.manifest, str(self.folder))
         return store
 
     def compute(self, chunk: int, threads: int | None = None) -> None:

@@ -13,8 +13,8 @@ from jounce.reporting.tables import Table, number
 from jounce.sweeps.chunks import Plan
 
 
-def sweep_facts(plan: Plan) -> dict[str, Any]:
-    """Return the facts of a sweep that is done, of which one chunk at a time is read."""
+def sweep_facts(plan: Plan, checksum: str) -> dict[str, Any]:
+    """Return the facts of a sweep that is done, with its checksum; one chunk at a time is read."""
     import zarr
 
     group: Any = zarr.open_group(plan.folder, mode="r")
@@ -49,7 +49,7 @@ def sweep_facts(plan: Plan) -> dict[str, Any]:
         "vary": list(plan.space.variations),
         "failed": failed,
         "peaks": rows,
-        "checksum": plan.store.manifest["checksum"],
+        "checksum": checksum,
     }
 
 

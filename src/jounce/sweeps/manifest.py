@@ -7,14 +7,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
 from jounce.design.design_space import Grid, Sobol
 from jounce.design.variations import Values
 from jounce.errors import OutputError
+from jounce.kinematics.alone import is_wanted
+from jounce.kinematics.device import on_processor
 from jounce.sweeps.fingerprints import fingerprint
 
-FORMAT = 1
+FORMAT = 2  # of 1, digests told nothing of the sweep and the place of a chunk
+COMPARED = ("vary", "options", "versions", "arithmetic")  # groups of a manifest, value by value
 LIBRARIES = ("jax", "jaxlib", "numpy")  # other versions may give other last bits
 
 
@@ -56,8 +60,30 @@ def manifest_of(
         f"digest {fingerprint(instants)[:16]}",
         "options": dict(options),
         "versions": {"jounce": __version__} | {name: importlib.metadata.version(name) for name in LIBRARIES},
+        "arithmetic": arithmetic(),
         "checksum": None,
     }
+
+
+def arithmetic() -> dict[str, str]:
+    """Return what computes in this process: it rounds as it will, so that chunks of one sweep must have the same.
+
+    Examples
+    --------
+    >>> sorted(arithmetic())
+    ['device', 'machine code']
+    """
+    device = jax.devices()[0] if jax.config.jax_default_device is None else jax.config.jax_default_device
+    kind = getattr(device, "device_kind", str(device))
+    code = f"llvmlite {importlib.metadata.version('llvmlite')}" if is_wanted() else "not used"
+    return {"machine code": code, "device": "cpu" if on_processor() else kind}
+
+
+def check_same_arithmetic(there: Mapping[str, Any], folder: str) -> None:
+    """Raise OutputError, with what differs, unless this process computes as the one that began a sweep."""
+    if differences := _others(there["arithmetic"], arithmetic()):
+        message = f"a worker rounds otherwise than what began the sweep: {'; '.join(differences)}"
+        raise OutputError(f"{message}; install the same packages for both", path=folder)
 
 
 def _named(files: Mapping[str, str]) -> dict[str, str]:
@@ -89,14 +115,19 @@ def _differences(there: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[st
         if before != now:
             found.append(f"the file {name} {'was not read' if before is None else 'differs' if now else 'is not read'}")
     others = [{name: x[name] for name in ("sample", "time")} for x in (there, wanted)]
-    for before, now in [*((there[group], wanted[group]) for group in ("vary", "options", "versions")), others]:
-        names = [name for name in {**before, **now} if before.get(name) != now.get(name)]
-        found += [f"{n} is {_shown(before.get(n))} there, and {_shown(now.get(n))} here" for n in names]
+    for before, now in [*((there[group], wanted[group]) for group in COMPARED), others]:
+        found += _others(before, now)
     if list(there["vary"]) != list(wanted["vary"]) and not found:
         found.append(f"the order of what varies is {', '.join(there['vary'])} there")
     if there["model"] != wanted["model"] and not found:
         found.append("the model has other values")
     return found
+
+
+def _others(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """Word what differs in a group of a manifest, value by value."""
+    names = [name for name in {**before, **now} if before.get(name) != now.get(name)]
+    return [f"{n} is {_shown(before.get(n))} there, and {_shown(now.get(n))} here" for n in names]
 
 
 def _shown(value: Any) -> str:

@@ -26,6 +26,10 @@ from jounce.sweeps.problems import Quantity
 from jounce.sweeps.statistics import Variable
 
 SUFFIX = ".zarr"
+AXES = {
+    "time": {"units": "s", "long_name": "time"},
+    "derivative": {"long_name": "order of the time derivative"},
+}
 BYTES = hashlib.sha256().digest_size
 
 
@@ -74,7 +78,7 @@ class Store:
         except OSError as error:
             raise OutputError(f"cannot be written: {reason_of(error)}", path=str(self.folder)) from error
         with replacing(mark) as scratch:
-            scratch.write_bytes(_digest(arrays))
+            scratch.write_bytes(self._digest(chunk, arrays))
 
     def is_done(self, chunk: int) -> bool:
         """Tell whether a chunk is on the disk."""
@@ -88,9 +92,22 @@ class Store:
                 for name, array in self._arrays.items()
                 if (array.metadata.dimension_names or ("",))[0] == "design"
             }
-            return _digest(arrays) == self._mark(chunk).read_bytes()
+            return self._digest(chunk, arrays) == self._mark(chunk).read_bytes()
         except Exception:  # noqa: BLE001 - whatever is wrong with its files, it is computed again
             return False
+
+    def mended(self, axes: Mapping[str, np.ndarray]) -> list[str]:
+        """Return the names of coordinates that are not those that were written, and write them again."""
+        found = []
+        for name, values in axes.items():
+            try:
+                same = np.array_equal(self._arrays[name][:], values)
+            except Exception:  # noqa: BLE001 - whatever is wrong with its files, it is written again
+                same = False
+            if not same:
+                self._arrays[name][:] = values
+                found.append(name)
+        return found
 
     def forget(self, chunk: int) -> None:
         """Have a chunk computed again."""
@@ -115,7 +132,7 @@ class Store:
             shutil.rmtree(self.folder)
 
     def finish(self, count: int) -> str:
-        """Put the digest of the digests of all chunks into the manifest, and return it."""
+        """Return the digest of the digests of all chunks, and put it into the manifest, whatever stands there."""
         digest = hashlib.sha256()
         for chunk in range(count):
             digest.update(self._mark(chunk).read_bytes())
@@ -123,9 +140,11 @@ class Store:
         path = self.folder / "zarr.json"
         content = json.loads(path.read_text(encoding="utf-8"))
         manifest = {**self.manifest, "checksum": checksum}
-        content["attributes"] |= {"manifest": json.dumps(manifest, indent=1), "checksum": checksum}
-        with replacing(path) as scratch:
-            scratch.write_text(json.dumps(content, indent=1), encoding="utf-8")
+        told = {"manifest": json.dumps(manifest, indent=1), "checksum": checksum}
+        if content["attributes"] != content["attributes"] | told:
+            content["attributes"] |= told
+            with replacing(path) as scratch:
+                scratch.write_text(json.dumps(content, indent=1), encoding="utf-8")
         self.__dict__["manifest"] = manifest
         for left in self.folder.glob("*/c/**/*.partial"):  # by processes that were killed
             left.unlink(missing_ok=True)
@@ -158,18 +177,20 @@ class Store:
         finally:
             os.close(descriptor)
 
+    def _digest(self, chunk: int, arrays: Mapping[str, np.ndarray]) -> bytes:
+        """Return the digest of the arrays of a chunk by name; what is not a number is NaN, whatever bits it has.
+
+        It is that of the chunk in its place in this sweep: no other one, of this or of another sweep, may take it.
+        """
+        digest = hashlib.sha256(f"{self.manifest['identity']} {chunk} ".encode())
+        for name in sorted(arrays):
+            values = np.ascontiguousarray(arrays[name])
+            digest.update(f"{name} {values.dtype.str} {values.shape} ".encode())
+            digest.update((np.where(np.isnan(values), np.nan, values) if values.dtype.kind == "f" else values).data)
+        return digest.digest()
+
     def _mark(self, chunk: int) -> Path:
         return self.folder / "chunks" / "digest" / "c" / str(chunk)
-
-
-def _digest(arrays: Mapping[str, np.ndarray]) -> bytes:
-    """Return the digest of arrays by name; what is not a number is NaN, whatever bits it has."""
-    digest = hashlib.sha256()
-    for name in sorted(arrays):
-        values = np.ascontiguousarray(arrays[name])
-        digest.update(f"{name} {values.dtype.str} {values.shape} ".encode())
-        digest.update((np.where(np.isnan(values), np.nan, values) if values.dtype.kind == "f" else values).data)
-    return digest.digest()
 
 
 def find(folder: Path) -> Store | None:
@@ -200,12 +221,10 @@ def create(
     folder: Path,
     manifest: Mapping[str, Any],
     variables: Sequence[Variable],
-    quantities: Sequence[Quantity],
-    instants: np.ndarray,
+    axes: Mapping[str, np.ndarray],
     *,
     count: int,
     chunk: int,
-    levels: int,
 ) -> Store:
     """Make the folder of a sweep, with all arrays and nothing in them; it appears whole or not at all.
 
@@ -226,15 +245,12 @@ def create(
         "manifest": json.dumps(manifest, indent=1),
         "checksum": "",
     }
-    labels = {axis: names for quantity in quantities for axis, names in quantity.axes}
     try:
         with undoing(lambda: shutil.rmtree(scratch, ignore_errors=True)), warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Consolidated metadata is currently not part")
             root = zarr.create_group(scratch, attributes=attributes)
-            _axis(root, "time", np.asarray(instants, float), {"units": "s", "long_name": "time"})
-            _axis(root, "derivative", np.arange(levels), {"long_name": "order of the time derivative"})
-            for axis, names in labels.items():
-                _axis(root, axis, np.array(names, np.dtypes.StringDType()), {})
+            for name, values in axes.items():
+                _axis(root, name, values)
             for variable in variables:
                 root.create_array(
                     variable.name,
@@ -260,14 +276,21 @@ def create(
     return Store(folder)
 
 
-def _axis(root: Any, name: str, values: np.ndarray, attributes: dict[str, Any]) -> None:
+def axes_of(quantities: Sequence[Quantity], instants: np.ndarray, levels: int) -> dict[str, np.ndarray]:
+    """Return the coordinates of the dimensions of a sweep besides the design, by name."""
+    labels = {axis: names for quantity in quantities for axis, names in quantity.axes}
+    named = {axis: np.array(names, np.dtypes.StringDType()) for axis, names in labels.items()}
+    return {"time": np.asarray(instants, float), "derivative": np.arange(levels)} | named
+
+
+def _axis(root: Any, name: str, values: np.ndarray) -> None:
     array = root.create_array(
         name,
         shape=values.shape,
         chunks=values.shape,
         dtype=values.dtype,
         dimension_names=(name,),
-        attributes=attributes,
+        attributes=AXES.get(name, {}),
     )
     array[:] = values
 

@@ -25,7 +25,7 @@ from jounce.sweeps.fingerprints import fingerprint
 from jounce.sweeps.manifest import check_same, manifest_of
 from jounce.sweeps.problems import Motions, Problem, Quantity, Simulations, Torques
 from jounce.sweeps.statistics import variables_of
-from jounce.sweeps.store import Store, create, find
+from jounce.sweeps.store import Store, axes_of, create, find
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 if TYPE_CHECKING:
@@ -171,8 +171,8 @@ def prepare(
         there.remove()  # an attempt of which nothing was computed
         there = None
     if there is None:
-        sizes = {"count": space.count, "chunk": chunk, "levels": problem.levels}
-        create(folder, manifest, variables, quantities, instants, **sizes)
+        sizes = {"count": space.count, "chunk": chunk}
+        create(folder, manifest, variables, axes_of(quantities, instants, problem.levels), **sizes)
     else:
         check_same(there.manifest, manifest, str(folder))
     names = tuple(variable.name for variable in variables[: len(variations)])
@@ -212,12 +212,18 @@ def run(
                     processes = None if workers is None else whole_number("workers", workers, 1, error=JounceError)
                     where = {"scheduler": scheduler, "workers": processes, "timeout": timeout}
                     compute_on_cluster(plan, left, told, **where, user_files=user_files, prepare=prepare_worker)
-        return store.manifest["checksum"] if done.all() and store.manifest["checksum"] else store.finish(plan.chunks)
+        return store.finish(plan.chunks)
 
 
 def _whole(plan: Plan) -> Bool[np.ndarray, " chunk"]:
-    """Tell which chunks are on the disk as they were written; others are forgotten, and told in a warning."""
+    """Tell which chunks are on the disk as they were written; others are forgotten, and told in a warning.
+
+    So are coordinates, which are written again.
+    """
     store = plan.store
+    if changed := store.mended(axes_of(plan.quantities, plan.problem.instants, plan.problem.levels)):
+        message = f"{plan.folder}: files of {', '.join(changed)} were lost or changed since, which are written again"
+        warnings.warn(DamageWarning(message), stacklevel=2)
     done = store.done(plan.chunks)
     damaged = [k for k in np.flatnonzero(done).tolist() if not store.is_whole(k, k * plan.chunk, plan.size(k))]
     for chunk in damaged:

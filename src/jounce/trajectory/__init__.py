@@ -1,5 +1,6 @@
 """Motion laws: expressions, Python functions, splines, profiles; and trajectories, one law for each joint."""
 
+from jounce.precision import compute_in_double as _compute_in_double
 from jounce.trajectory.composed import (
     FollowingMotion as FollowingMotion,
     OutputMotion as OutputMotion,
@@ -30,3 +31,5 @@ from jounce.trajectory.smoothness import (
     continuity as continuity,
 )
 from jounce.trajectory.trapezoid import TrapezoidalMotion as TrapezoidalMotion
+
+_compute_in_double(__name__)

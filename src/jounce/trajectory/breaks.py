@@ -1,4 +1,4 @@
-"""Where derivatives of laws jump or bend, and the instants beside: a largest value may be a limit from one side there."""
+"""Where derivatives of laws jump or bend, and the instants beside: a largest value may be a one-sided limit there."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any

@@ -6,6 +6,8 @@ import threading
 import time
 from collections.abc import Callable
 
+from jounce.precision import double_precision
+
 __all__ = ["Player"]
 
 RATE = 30.0  # pictures a second
@@ -27,7 +29,7 @@ class Player:
         self.now, self.speed, self.loop = start, 1.0, True
         self.playing = False
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="jounce-view-player", daemon=True)
+        self._thread = threading.Thread(target=double_precision(self._run), name="jounce-view-player", daemon=True)
 
     def begin(self) -> None:
         """Start the thread."""

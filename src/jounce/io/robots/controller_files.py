@@ -14,6 +14,7 @@ from jounce.io.files.located_data import Source
 from jounce.io.files.samples import column_names, read_chosen
 from jounce.io.files.writing import check_target, replacing
 from jounce.io.robots.controller_formats import FORMATS, ControllerFormat, checked_format, format_of, joint_count
+from jounce.precision import double_precision
 from jounce.robot import Robot, inverse_dynamics
 from jounce.trajectory import HermiteMotion, JointTrajectory
 
@@ -24,6 +25,7 @@ NANO = 1_000_000_000
 LEVELS = ("positions", "velocities", "accelerations")
 
 
+@double_precision
 def export_trajectory(
     robot: Robot,
     trajectory: JointTrajectory,

@@ -14,6 +14,7 @@ from jounce.io.files.source import read_source
 from jounce.mechanism import Mechanism
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.planning.elastic.drives import Drive
+from jounce.precision import double_precision
 from jounce.robot.robot import Robot
 from jounce.trajectory.dimensions import Dimension, describe_dimension, dimension_of
 
@@ -32,6 +33,7 @@ UNITS = {
 OF_MOTOR = ("rotor_inertia", "torque_limit", "velocity_limit")
 
 
+@double_precision
 def load_drives(path: str | PathLike[str], system: Robot | Mechanism) -> dict[str, Drive]:
     """Read the drives of a robot's joints, or of a mechanism's drivers, from a file.
 

@@ -15,12 +15,14 @@ from jounce.io.robots.mjcf import read_mjcf
 from jounce.io.robots.sdf import read_sdf
 from jounce.io.robots.urdf import read_urdf
 from jounce.io.robots.xml_elements import Element, read_markup
+from jounce.precision import double_precision
 from jounce.robot.robot import Robot
 
 SHAPES = ("visual", "collision")
 XACRO = "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE.urdf"
 
 
+@double_precision
 def load_robot(
     path: str | PathLike[str],
     *,

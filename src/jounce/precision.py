@@ -1,0 +1,195 @@
+"""Double precision wherever this package computes, however JAX is set up around it.
+
+JAX computes in single precision unless it is told otherwise, and what it is told holds for a thread or for the whole
+process, which belongs to whoever imports this package. So the setting of the process is left alone: what a room offers,
+and all that its objects can do, computes in a context of its own, entered at the first of nested calls. Threads, which
+inherit no context, enter it for themselves.
+"""
+
+import functools
+import inspect
+import sys
+import types
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any, ParamSpec, TypeVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax._src import config, core  # what is private to JAX has no public name
+
+from jounce.errors import UnsupportedError
+
+_rooms: list[str] = []  # of which all that they offer computes in double precision
+_modules: set[str] = set()  # of them, whose classes do
+
+P = ParamSpec("P")
+R = TypeVar("R")
+OPERATORS = frozenset(
+    f"__{name}__"
+    for name in (
+        *("init", "post_init", "check_init", "call", "getitem", "iter", "len", "contains", "float", "array", "repr"),
+        *("neg", "pos", "abs", "add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv", "pow", "rpow"),
+        *("matmul", "rmatmul", "mod", "lt", "le", "gt", "ge", "str", "format", "enter", "exit", "next", "getattr"),
+    )
+)
+"""Special methods that may compute. JAX and Python call the others for their own ends: `__eq__` and `__hash__`, say."""
+
+LEFT_ALONE = frozenset({"tree_flatten", "tree_unflatten", "mro"})
+"""Methods that JAX calls within transformations of any precision; they compute nothing."""
+
+
+def in_double() -> AbstractContextManager[Any]:
+    """Return the context in which this package computes, in this thread; nothing to do where it is in force.
+
+    Raises
+    ------
+    UnsupportedError
+        Within a transformation of JAX in single precision: its values are rounded already, and so would results be.
+
+    Examples
+    --------
+    >>> import jax, jax.numpy as jnp
+    >>> from jounce.precision import in_double
+    >>> with jax.enable_x64(False), in_double():
+    ...     print(jnp.asarray(0.1).dtype)
+    float64
+    """
+    if config.enable_x64.value:
+        return nullcontext()
+    if not core.trace_state_clean():
+        raise UnsupportedError(
+            "this would be computed in single precision: JAX transforms a function here (jax.grad, jax.jit, jax.vmap) "
+            'with double precision switched off; call jax.config.update("jax_enable_x64", True) at the start of the '
+            "program, or put `with jax.enable_x64(True):` around the call of the transformed function"
+        )
+    return jax.enable_x64(True)
+
+
+def double_precision(function: Callable[P, R]) -> Callable[P, R]:
+    """Have a function compute in double precision, a generator at each of its steps."""
+    if inspect.isgeneratorfunction(function):
+
+        @functools.wraps(function)
+        def steps(*arguments: Any, **keywords: Any) -> Iterator[Any]:
+            running = function(*arguments, **keywords)
+            while True:
+                with in_double():
+                    try:
+                        value = next(running)
+                    except StopIteration as end:
+                        return end.value
+                yield value
+
+        steps.in_double = True  # pyright: ignore[reportFunctionMemberAccess]
+        return steps  # pyright: ignore[reportReturnType]
+
+    @functools.wraps(function)
+    def door(*arguments: P.args, **keywords: P.kwargs) -> R:
+        if config.enable_x64.value:
+            return function(*arguments, **keywords)
+        with in_double():
+            return function(*arguments, **keywords)
+
+    door.in_double = True  # pyright: ignore[reportFunctionMemberAccess]
+    return door
+
+
+def in_full(value: Any) -> jax.Array:
+    """Return an array of double precision where one of lower precision is given; others as they are.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from jounce.precision import in_double, in_full
+    >>> with in_double():
+    ...     print(in_full(jnp.float32(0.5)).dtype, in_full(2).dtype)
+    float64 int64
+    """
+    array = jnp.asarray(value)
+    narrow = jnp.issubdtype(array.dtype, jnp.inexact) and jnp.finfo(array.dtype).bits < 64
+    return array.astype(complex if jnp.iscomplexobj(array) else float) if narrow else array
+
+
+def called_back(function: Callable[[Any], Any], shapes: Any, values: Any, *, vmap_method: str) -> Any:
+    """Have a compiled program call a function on the host, as `jax.pure_callback` does, in double precision.
+
+    JAX calls it in a thread of its own, where only the setting of the process holds, and rounds what it hands over to
+    single precision there. So numbers are handed over as words of 32 bits.
+
+    Parameters
+    ----------
+    function : callable
+        Maps a pytree of NumPy arrays to one of arrays.
+    shapes : pytree of jax.ShapeDtypeStruct
+        Of what it returns.
+    values : pytree of array
+        Of floats in double precision.
+    vmap_method : str
+        See `jax.pure_callback`.
+    """
+
+    @double_precision
+    def of_words(words: Any) -> Any:
+        return function(jax.tree.map(lambda x: np.ascontiguousarray(x).view(np.float64)[..., 0], words))
+
+    words = jax.tree.map(lambda x: jax.lax.bitcast_convert_type(jnp.asarray(x, float), np.uint32), values)
+    return jax.pure_callback(of_words, shapes, words, vmap_method=vmap_method)
+
+
+def compute_in_double(room: str) -> None:
+    """Have all that a room offers compute in double precision: its functions, and the classes of all its modules.
+
+    Classes that it does not offer count too, since its results are objects of them, and so do those of modules of the
+    rooms below that it is the first to import. It stands at the end of a room's ``__init__.py``, so that whatever is
+    added to the room is included.
+    """
+    _rooms.append(room)
+    offered = vars(sys.modules[room])
+    for name, value in list(offered.items()):
+        if _is_open(value, room) and not name.startswith("_"):
+            home = vars(sys.modules[value.__module__])
+            offered[name] = door = double_precision(value)
+            if home.get(value.__name__) is value:
+                home[value.__name__] = door  # by which pickle finds it
+    for name, module in list(sys.modules.items()):
+        if name in _modules or not name.startswith(tuple(f"{done}." for done in _rooms)):
+            continue
+        _modules.add(name)
+        for value in list(vars(module).values()):
+            if inspect.isclass(value) and value.__module__ == name:
+                _compute_in_double(value)
+
+
+def _is_open(value: Any, room: str) -> bool:
+    """Tell whether a value is a function of a room that has no door yet."""
+    inside = inspect.isfunction(value) and f"{value.__module__}.".startswith(f"{room}.")
+    return inside and not hasattr(value, "in_double")
+
+
+def _compute_in_double(kind: type[Any]) -> None:
+    """Have the methods and properties that a class defines compute in double precision."""
+    for name, member in list(vars(kind).items()):
+        if name in LEFT_ALONE or (name.startswith("_") and name not in OPERATORS and not name.startswith("_repr_")):
+            continue
+        if (door := _with_door(member)) is not None:
+            setattr(kind, name, door)
+
+
+def _with_door(member: Any) -> Any:
+    """Return a method or property that computes in double precision; None for what is none, or has a door."""
+    if isinstance(member, types.FunctionType):
+        generated = member.__code__.co_filename == "<string>"  # by dataclasses: it stores values, or shows them
+        return None if generated or hasattr(member, "in_double") else double_precision(member)
+    if isinstance(member, staticmethod | classmethod):
+        inner = _with_door(member.__func__)
+        return None if inner is None else type(member)(inner)
+    if isinstance(member, property):
+        inner = _with_door(member.fget)
+        return None if inner is None else member.getter(inner)
+    if isinstance(member, functools.cached_property):
+        inner = _with_door(member.func)
+        if inner is not None:
+            member.func = inner
+    return None
