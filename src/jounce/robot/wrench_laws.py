@@ -1,15 +1,15 @@
 """Wrenches on links as functions of time and state, for simulations."""
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jounce.errors import RobotError
+from jounce.jet.compose import OfSample
 from jounce.modules import Module
 from jounce.robot.arguments import floats
 from jounce.robot.kinematics import place_of
@@ -24,7 +24,7 @@ class _Part(Module):
     """The force, or the torque, of a wrench."""
 
     constant: Any
-    function: Callable[..., Any] | None = eqx.field(static=True)
+    function: OfSample | None
     of_state: bool = eqx.field(static=True)
 
     def __call__(self, time: Any, q: Any, rate: Any) -> Any:
@@ -32,12 +32,7 @@ class _Part(Module):
         if self.function is None:
             return jnp.broadcast_to(jnp.asarray(self.constant)[:, None], (3, time.shape[-1]))
         given = (time, q, rate) if self.of_state else (time,)
-        return jax.vmap(lambda *x: self.at(*x), in_axes=-1, out_axes=-1)(*given)
-
-    def at(self, *state: Any) -> Any:
-        """Return three components at one state."""
-        assert self.function is not None
-        return jnp.asarray(self.function(*state), float)
+        return self.function(*given)
 
 
 class WrenchLaws(Module):
@@ -93,10 +88,10 @@ def _part(where: str, given: Any, n: int) -> _Part:
     of_state = len(inspect.signature(given).parameters) == STATE
     state = (jnp.zeros(()), jnp.zeros(n), jnp.zeros(n)) if of_state else (jnp.zeros(()),)
     try:
-        found = jax.eval_shape(lambda *x: jnp.asarray(given(*x), float), *state).shape
+        found = OfSample.of(given, *state)
     except TypeError as error:
         message = f"must be a function of time, or of time, q and rates, by operations of JAX: {error}"
         raise RobotError(message.splitlines()[0], name=where) from error
-    if found != (3,):
-        raise RobotError(f"the function must return three components, not the shape {found}", name=where)
-    return _Part(np.zeros(3), given, of_state)
+    if found.shape != (3,):
+        raise RobotError(f"the function must return three components, not the shape {found.shape}", name=where)
+    return _Part(np.zeros(3), found, of_state)

@@ -7,11 +7,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.jet import Jet
+from jounce.jet.compose import Composed
 from jounce.trajectory.checks import whole_number
 from jounce.trajectory.composed import FollowingMotion, OutputMotion, PiecewiseMotion
 from jounce.trajectory.knots import SMOOTH, Jumps, derivative_sizes, knot_jumps
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion, SplineMotion
 from jounce.trajectory.profiles import AbstractProfile
+from jounce.trajectory.user_laws import ReadMotion
 
 HIGHEST = 10  # derivative that is looked at
 MOST_CROSSINGS = 10_000
@@ -188,8 +190,10 @@ def _jumps(
                 law.expression.folded(lambda _: "", lambda _: "", lambda word, parts: f"{word} {parts}")
             )
             return *none, "it may have kinks where abs is of zero" if kinks else ""
-        case FunctionMotion():
+        case FunctionMotion() | ReadMotion(computes=Composed()):
             return *none, "it is a Python function"
+        case ReadMotion():
+            return *none, f"nothing is known of a {type(law.computes.source.value).__name__}"
     return *none, f"nothing is known of a {type(law).__name__}"
 
 
