@@ -169,11 +169,12 @@ def read_law(law: AbstractLaw, shape: tuple[int, ...]) -> AbstractLaw:
     shape : tuple of int
         Of the displacement: empty, or its number of components.
     """
-    parts = jax.tree.leaves(law, is_leaf=_is_users)
-    return ReadLaw(ReadObject.of(law, (ORDER, ORDER - 1, ORDER), shape)) if any(map(_is_users, parts)) else law
+    parts = jax.tree.leaves(law, is_leaf=is_users_law)
+    return ReadLaw(ReadObject.of(law, (ORDER, ORDER - 1, ORDER), shape)) if any(map(is_users_law, parts)) else law
 
 
-def _is_users(law: Any) -> bool:
+def is_users_law(law: Any) -> bool:
+    """Tell whether a law of a force, or a motion law, is a user's own."""
     if not isinstance(law, AbstractLaw):
         return is_users(law)
     kind = type(law)

@@ -192,6 +192,7 @@ class Pass:
     """Goes through a program, operation by operation, and through those of the functions that it calls."""
 
     def of(self, closed: ClosedJaxpr, arguments: Sequence[Any]) -> list[Any]:
+        """Return what stands for the results of a program."""
         return self._read(closed.jaxpr, closed.consts, arguments)
 
     def captured(self, value: Any, dtype: np.dtype) -> Any:
@@ -332,4 +333,5 @@ class _Description(Pass):
 
 
 def told_array(array: np.ndarray) -> str:
+    """Return what tells an array from others: not rounded, and zero from minus zero."""
     return f"{array.shape} {array.dtype} {hashlib.sha256(array.tobytes()).hexdigest()}"

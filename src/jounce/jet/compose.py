@@ -123,7 +123,11 @@ class OfSample(Module):
 
     def __call__(self, *samples: Any) -> Any:
         """Return the results for samples side by side, which stand along the last axes, there and here."""
-        return jax.vmap(lambda *x: self.program(self.captured, *x)[0], in_axes=-1, out_axes=-1)(*samples)
+        return jax.vmap(self.at, in_axes=-1, out_axes=-1)(*samples)
+
+    def at(self, *sample: Any) -> Any:
+        """Return the result for one sample."""
+        return self.program(self.captured, *sample)[0]
 
 
 def over_instances(
@@ -149,9 +153,7 @@ def over_instances(
     axes = tuple(-1 if its and np.shape(v)[-1] > 1 else None for v, its in zip(captured, several, strict=True))
 
     def of_instance(captured: Any, x: Jet) -> Jet:
-        given = tuple(
-            v[..., 0] if its and a is None else v for v, its, a in zip(captured, several, axes, strict=True)
-        )
+        given = tuple(v[..., 0] if its and a is None else v for v, its, a in zip(captured, several, axes, strict=True))
         return jax.vmap(function, in_axes=(axes, -1), out_axes=-1)(given, x)
 
     each = tuple(-2 if its else None for its in several)

@@ -19,8 +19,7 @@ from jax.extend.core import ClosedJaxpr
 
 from jounce.jet.algebra import Jet
 from jounce.jet.captured import Program, Same, known_as, may_be_old, read_off, value_key
-from jounce.jet.compose import has_rules
-from jounce.jet.compose import on_jets as run
+from jounce.jet.compose import has_rules, on_jets as run
 from jounce.jet.same_programs import is_same
 from jounce.modules import Module, Untraced
 
@@ -46,7 +45,7 @@ class ReadMethod(Module):
             v if np.ndim(v) > len(shape) else jnp.reshape(jnp.asarray(v), (*shape, 1, 1))
             for v, shape in zip(self.captured, self.program.shapes, strict=True)
         ]
-        
+
         def once(given: Any) -> Any:
             values, arguments = given
             return self.once([v[..., 0, 0] for v in values], arguments)
@@ -162,8 +161,8 @@ def read_method(
     """
     leaves, tree = jax.tree.flatten(([*jets], [*rates]))
     reading: Reading = Verbatim((Same(object()),), old=False)  # what is wrong with it is told where it is called
-    functions = [lambda *x: on_jets(*jax.tree.unflatten(tree, x))] + [lambda *_: whole() if whole else None]
-    for function in functions[: 1 if whole is None else 2]:
+    functions = [lambda *x: on_jets(*jax.tree.unflatten(tree, x)), *([] if whole is None else [lambda *_: whole()])]
+    for function in functions:
         try:
             found = read_off(lambda *x, f=function: jax.tree.leaves(f(*x)), *leaves)
         except Exception:  # noqa: BLE001

@@ -7,7 +7,7 @@ An element of a user's class is replaced by one of a class made here, whose meth
 import dataclasses
 import itertools
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -18,6 +18,7 @@ import numpy as np
 from jounce.constraints import AbstractConstraint
 from jounce.constraints.base import field_kinds, value_fields
 from jounce.forces import AbstractForce
+from jounce.forces.laws import AbstractLaw, ReadLaw, is_users_law
 from jounce.jet import Jet
 from jounce.jet.read_methods import Reading, Verbatim, read_method
 from jounce.mechanism.outputs import AbstractOutput
@@ -26,6 +27,7 @@ from jounce.modules import changes_parts, is_ours, unchecked, with_fields
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
 from jounce.trajectory import AbstractMotion
+from jounce.trajectory.user_laws import ReadMotion
 
 ORDER = 2  # to which methods are compared with what was read off
 READINGS = "readings"  # the field that holds them
@@ -62,6 +64,36 @@ def with_readings(element: Any, readings: Mapping[str, Reading]) -> Any:
     return unchecked(_class_for(type(element)), vars(element) | {READINGS: dict(readings)})
 
 
+def holds_users_code(elements: Iterable[Any]) -> bool:
+    """Tell whether there is code of a user in some elements, as they were given."""
+
+    def is_code(value: Any) -> bool:
+        if isinstance(value, list | tuple):
+            return any(map(is_code, value))
+        if isinstance(value, AbstractMotion | AbstractLaw):
+            return any(map(is_users_law, jax.tree.leaves(value, is_leaf=is_users_law)))
+        return callable(value)
+
+    return any(
+        _read_methods(type(element)) or any(is_code(getattr(element, name)) for name in value_fields(type(element)))
+        for element in elements
+    )
+
+
+def users_code(groups: Sequence[Any]) -> tuple[Any, ...] | None:
+    """Return what tells the code of users in the elements of groups from others; None where JAX traces its numbers."""
+    read = ReadMotion, ReadLaw
+    found: list[Any] = []
+    for group in groups:
+        found.append(vars(group.element).get(READINGS))
+        parts = jax.tree.leaves(group.element, is_leaf=lambda x: isinstance(x, read))
+        found += [part for part in parts if isinstance(part, read)]
+    leaves, structure = jax.tree.flatten(found)
+    if any(isinstance(x, jax.core.Tracer) for x in leaves):
+        return None
+    return structure, tuple((np.shape(x), np.asarray(x).tobytes()) for x in leaves)
+
+
 def users_class(kind: type) -> type:
     """Return the class that a user wrote, in the place of the one that was made for it."""
     return vars(kind).get("stands_for", kind)
@@ -69,7 +101,9 @@ def users_class(kind: type) -> type:
 
 def _read_methods(kind: type) -> tuple[str, ...]:
     """Return the names of the methods of a class that a user may have written, or that call such."""
-    role = next(role for role in _METHODS if issubclass(kind, role))
+    role = next((role for role in _METHODS if issubclass(kind, role)), None)
+    if role is None:
+        return ()
     known = [name for name in _METHODS[role] if hasattr(kind, name)]
     if changes_parts(kind, tuple(_METHODS), known):
         return tuple(known)
@@ -132,7 +166,9 @@ class _Prescribed(AbstractMotion):
 
 def _laws(element: Any) -> list[str]:
     kinds = field_kinds(users_class(type(element)))
-    return [name for name, kind in kinds.items() if kind == "motion" and isinstance(getattr(element, name), AbstractMotion)]
+    return [
+        name for name, kind in kinds.items() if kind == "motion" and isinstance(getattr(element, name), AbstractMotion)
+    ]
 
 
 def _inputs(element: Any, arguments: tuple[Any, ...]) -> list[Any]:
@@ -210,6 +246,7 @@ class _Reader:
 
     def _displacement(self) -> tuple[Jet, Jet]:
         """Return what stands for the displacement of a force and its velocity."""
+
         def both(*given: Any) -> Any:
             return self.element.displacement(*given), self.element.velocity(*given)
 

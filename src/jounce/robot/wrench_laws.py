@@ -20,7 +20,7 @@ from jounce.robot.wrenches import Wrench, check_wrenches
 STATE = 3  # arguments of a function of time, coordinates and rates
 
 
-class _Part(Module):
+class WrenchPart(Module):
     """The force, or the torque, of a wrench."""
 
     constant: Any
@@ -34,11 +34,16 @@ class _Part(Module):
         given = (time, q, rate) if self.of_state else (time,)
         return self.function(*given)
 
+    def at(self, *state: Any) -> Any:
+        """Return three components at one state, or at one time, as the function did when it was read off."""
+        assert self.function is not None
+        return self.function.at(*state)
+
 
 class WrenchLaws(Module):
     """Wrenches from outside as functions of time and state; see `wrench_laws`."""
 
-    parts: tuple[tuple[_Part, _Part], ...]
+    parts: tuple[tuple[WrenchPart, WrenchPart], ...]
 
     @property
     def changing(self) -> bool:
@@ -78,13 +83,13 @@ def wrench_laws(
     return WrenchLaws(tuple(parts)), places, tuple(wrench.frame == "base" for wrench in wrenches)
 
 
-def _part(where: str, given: Any, n: int) -> _Part:
+def _part(where: str, given: Any, n: int) -> WrenchPart:
     if not callable(given):
         value = np.asarray(floats(where, given))
         if value.shape != (3,) or not np.isfinite(value).all():
             message = "must be three finite numbers, or a function of time, or of time, q and rates"
             raise RobotError(message, name=where, value=value.tolist())
-        return _Part(value, None, False)
+        return WrenchPart(value, None, False)
     of_state = len(inspect.signature(given).parameters) == STATE
     state = (jnp.zeros(()), jnp.zeros(n), jnp.zeros(n)) if of_state else (jnp.zeros(()),)
     try:
@@ -94,4 +99,4 @@ def _part(where: str, given: Any, n: int) -> _Part:
         raise RobotError(message.splitlines()[0], name=where) from error
     if found.shape != (3,):
         raise RobotError(f"the function must return three components, not the shape {found.shape}", name=where)
-    return _Part(np.zeros(3), found, of_state)
+    return WrenchPart(np.zeros(3), found, of_state)
