@@ -75,7 +75,8 @@ def is_ours(thing: Any) -> bool:
     >>> is_ours(Module), is_ours(print)
     (True, False)
     """
-    return str(getattr(thing, "__module__", "")).partition(".")[0] == "jounce"
+    module = getattr(thing, "__module__", None)
+    return isinstance(module, str) and (module.startswith("jounce.") or module == "jounce")
 
 
 def changes_parts(kind: type, general: tuple[type, ...], known: Iterable[str] = ()) -> bool:

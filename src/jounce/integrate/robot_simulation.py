@@ -238,6 +238,9 @@ class RobotSimulation(Displayed):
         return dataset
 
 
+_at = jax.jit(at)  # outside of a program its loop would be compiled at each call
+
+
 def _states(steps: RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, RobotState]:
     """Return which instants the steps reach, and the states there, batch last."""
     sense = 1.0 if steps.length[0] >= 0 else -1.0
@@ -247,7 +250,7 @@ def _states(steps: RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, RobotS
     since = instants - steps.start[chosen]
     since = np.where(reached, since, 0.0)
     polynomial = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[chosen], 0, -1), steps.polynomial)
-    return reached, jax.tree.map(np.asarray, at(polynomial, since))
+    return reached, jax.tree.map(np.asarray, _at(polynomial, since))
 
 
 def _derivatives(coefficients: np.ndarray) -> np.ndarray:

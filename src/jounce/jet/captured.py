@@ -10,6 +10,7 @@ are part of the program, and so are numbers within loops and branches.
 import dataclasses
 import hashlib
 import itertools
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -30,6 +31,7 @@ _OF_ARRAYS = ("_searchsorted_scan_impl",)  # functions of JAX with loops that ar
 
 _anew = jax.make_user_context(None)
 _count = itertools.count()
+_lock = threading.Lock()
 _known: dict[Any, "Program"] = {}
 
 
@@ -117,14 +119,17 @@ def read_off(function: Callable[..., Any], *examples: Any) -> ReadOff:
     description = _Description()
     captured = tuple(description.of(closed))
     key = description.digest(), tuple(map(Same, description.nameless))
-    program = _known.pop(key, None)
+    with _lock:
+        program = _known.get(key)
     if program is None:
         given = [_shaped(x) for x in captured], [_shaped(v.aval) for v in closed.jaxpr.invars]
         whole = jax.make_jaxpr(lambda values, arguments: _Again(values).of(closed, arguments))(*given)
         program = Program(*key, tuple(np.shape(x) for x in captured), whole)
-    _known[key] = program  # the last one used stands last
-    while len(_known) > KEPT:
-        del _known[next(iter(_known))]
+    with _lock:
+        _known.pop(key, None)
+        _known[key] = program  # the last one used stands last
+        while len(_known) > KEPT:
+            del _known[next(iter(_known))]
     return ReadOff(program, captured, closed, result)
 
 

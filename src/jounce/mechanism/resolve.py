@@ -17,7 +17,7 @@ from jounce.errors import JounceError, MechanismError
 from jounce.forces import AbstractForce, AbstractLaw, ExpressionLaw, FunctionLaw, TimeLaw, VectorLaw
 from jounce.forces.laws import read_law
 from jounce.jet import Jet
-from jounce.modules import Module, unchecked
+from jounce.modules import Module, is_ours, unchecked
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FunctionMotion, SplineMotion
 from jounce.trajectory.user_laws import read_laws
 
@@ -81,7 +81,7 @@ def _check_names(expression: Expression, own: set[str], parameters: Mapping[str,
 
 def _traceable(motion: AbstractMotion) -> AbstractMotion:
     """Return a law after trying it once, on shapes only: Python functions can fail in ways that need words."""
-    if type(motion).__call__ is SplineMotion.__call__:
+    if type(motion).__call__ is SplineMotion.__call__ and is_ours(type(motion)):
         return motion  # numbers that were checked; to trace it takes longer than to solve a short grid
     advice = "it must map a scalar time to a scalar with functions of jax.numpy"
     _tried("motion law", advice, lambda t: motion(Jet([t])), np.zeros((1, 1)))
