@@ -5,7 +5,7 @@ A model is put together of modules that were checked already, and of each severa
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import Any, TypeVar
 
@@ -20,6 +20,14 @@ class Module(eqx.Module):
     """
 
     __getattribute__ = object.__getattribute__
+
+
+@dataclasses.dataclass(unsafe_hash=True)
+class Untraced:
+    """Data of a module that JAX is not to see: all are equal, so that what is compiled does not depend on them."""
+
+    value: Any = dataclasses.field(compare=False)
+    derived: Any = dataclasses.field(default=None, compare=False)
 
 
 M = TypeVar("M", bound=eqx.Module)
@@ -56,3 +64,35 @@ def unchecked(kind: type[M], values: Mapping[str, Any]) -> M:
 def field_names(kind: type[Any]) -> tuple[str, ...]:
     """Return the names of the fields of a dataclass."""
     return tuple(field.name for field in dataclasses.fields(kind))
+
+
+def is_ours(thing: Any) -> bool:
+    """Tell whether a class or a function is one of this package, by the name of its module.
+
+    Examples
+    --------
+    >>> from jounce.modules import Module, is_ours
+    >>> is_ours(Module), is_ours(print)
+    (True, False)
+    """
+    module = getattr(thing, "__module__", None)
+    return isinstance(module, str) and (module.startswith("jounce.") or module == "jounce")
+
+
+def changes_parts(kind: type, general: tuple[type, ...], known: Iterable[str] = ()) -> bool:
+    """Tell whether a user's class has anything else in the place of what methods of this package may use.
+
+    Parameters
+    ----------
+    kind : type
+        A class derived from one of this package.
+    general : tuple of type
+        Classes of this package that say only what there may be.
+    known : iterable of str, optional
+        Names that do not count.
+    """
+    if is_ours(kind):
+        return False
+    ours = [base for base in kind.__mro__ if is_ours(base) and base not in (*general, Module)]
+    named = {name for base in ours for name in vars(base) if name[:2] != "__" and name[:4] != "_abc"}
+    return any(name in named.difference(known) for base in kind.__mro__ if not is_ours(base) for name in vars(base))

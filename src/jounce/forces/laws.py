@@ -5,12 +5,15 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 
 from jounce.jet import Jet, stack
 from jounce.jet.algebra import Quantity
-from jounce.modules import Module
+from jounce.jet.read_methods import ReadObject
+from jounce.modules import Module, changes_parts, is_ours
 from jounce.trajectory import AbstractMotion, Expression
+from jounce.trajectory.user_laws import ORDER, is_users
 
 
 class AbstractLaw(Module):
@@ -138,6 +141,44 @@ class VectorLaw(AbstractLaw):
         """Return the jet of the force, a vector."""
         parts = [part.value(displacement, velocity, time) for part in self.parts]
         return stack([_spread(part, displacement[0], time) for part in parts])
+
+
+class ReadLaw(AbstractLaw):
+    """A law in which there is code of a user, as what it computed when it was read off.
+
+    Parameters
+    ----------
+    computes : ReadObject
+        Of displacement, velocity and time.
+    """
+
+    computes: ReadObject
+
+    def value(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:
+        """Return what the law computes."""
+        return self.computes(displacement, velocity, time)
+
+
+def read_law(law: AbstractLaw, shape: tuple[int, ...]) -> AbstractLaw:
+    """Return a law as what it computes now, where it is a user's own or has such parts.
+
+    Parameters
+    ----------
+    law : AbstractLaw
+        Of a force.
+    shape : tuple of int
+        Of the displacement: empty, or its number of components.
+    """
+    parts = jax.tree.leaves(law, is_leaf=is_users_law)
+    return ReadLaw(ReadObject.of(law, (ORDER, ORDER - 1, ORDER), shape)) if any(map(is_users_law, parts)) else law
+
+
+def is_users_law(law: Any) -> bool:
+    """Tell whether a law of a force, or a motion law, is a user's own."""
+    if not isinstance(law, AbstractLaw):
+        return is_users(law)
+    kind = type(law)
+    return isinstance(law, FunctionLaw) or not is_ours(kind.value) or changes_parts(kind, (AbstractLaw,))
 
 
 def _named(names: tuple[str, ...], jet: Jet) -> dict[str, Jet]:

@@ -20,6 +20,7 @@ from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.options import checked_options, instants_of
 from jounce.integrate.simulation import expanded
 from jounce.integrate.turns import PLACES, attitudes_at
+from jounce.integrate.user_methods import integrator
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, whole_periods
 from jounce.kinematics import Status
@@ -237,6 +238,7 @@ class _Runs:
         equations, _ = self.parametric.picked(self._made, runs)
         tolerance, longest, method = self.settings
         current = jax.tree.map(lambda x: x[..., runs], self._current)
+        method = integrator(method, equations, current)
         found = march(equations, current, self.instants[-1], tolerance, longest, method=method, count=STEPS)
         current, (steps, taken), tried = jax.tree.map(np.asarray, found)
         self._put(runs, current)

@@ -10,8 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.errors import RobotError, check_name
-from jounce.integrate.events import EDGE, INTERPOLATION, NODES, crossings
+from jounce.integrate.events import EDGE, INTERPOLATION, NODES, WIDTHS, crossings
 from jounce.integrate.robot_marching import RobotSteps
+from jounce.jet.compose import OfSample
+from jounce.kinematics.chunks import in_chunks
 from jounce.robot.arguments import whole_number
 from jounce.robot.robot import Robot
 
@@ -69,16 +71,17 @@ class JointEventDetector:
     """The crossings of one event along a run, of which the steps come piece by piece."""
 
     def __init__(self, event: JointEvent, robot: Robot):
+        self._function: OfSample | None = None
         if isinstance(event.of, str):
             check_name("moving joint", event.of, robot.joint_names, RobotError, name="events.of")
         else:
             n, function = len(robot.joint_names), event.of
             state = jnp.zeros(()), jnp.zeros(n), jnp.zeros(n)
-            shape = jax.eval_shape(lambda *s: jnp.asarray(function(*s), float), *state).shape
-            if shape != ():
-                raise RobotError(f"the function must return one number, not the shape {shape}", name="events.of")
+            self._function = OfSample.of(function, *state)
+            if self._function.shape != ():
+                message = f"the function must return one number, not the shape {self._function.shape}"
+                raise RobotError(message, name="events.of")
         self.event, self._names = event, robot.joint_names
-        self._function = None if isinstance(event.of, str) else jax.jit(jax.vmap(event.of))
         self._last = math.nan, 0.0  # time and sense of the last crossing in either direction
         self._begun = False
 
@@ -93,8 +96,12 @@ class JointEventDetector:
         q, rates = (np.stack([_at(x, since, 0) for x in part], axis=-1) for part in parts)
         time = steps.start[:, None] + since
         n = len(self._names)
-        assert self._function is not None
-        found = self._function(time.ravel(), q.reshape(-1, n), rates.reshape(-1, n))
+        given = time.ravel(), q.reshape(-1, n).T, rates.reshape(-1, n).T
+
+        def chunk(lanes: np.ndarray) -> Any:
+            return _at_samples(self._function, *(x[..., lanes] for x in given))
+
+        found = in_chunks(chunk, time.size, WIDTHS)
         return np.asarray(found).reshape(time.shape)
 
     def detect(self, steps: RobotSteps) -> list[tuple[int, float]]:
@@ -110,6 +117,13 @@ class JointEventDetector:
                     found.append((k, after))
         self._begun = True
         return found
+
+
+@jax.jit
+def _at_samples(function: OfSample | None, time: Any, q: Any, rates: Any) -> Any:
+    """Return the values of a function of the state at samples, which stand last."""
+    assert function is not None
+    return function(time, q, rates)
 
 
 def _at(coefficients: np.ndarray, since: np.ndarray, derivative: int) -> np.ndarray:

@@ -15,6 +15,7 @@ from jounce.integrate.events import pose_coordinates
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulation import FEW_INSTANTS, derivatives_of_motion, motion_at
+from jounce.integrate.user_methods import integrator
 from jounce.kinematics.alone import is_wanted
 from jounce.kinematics.compilation import check_wanted
 from jounce.kinematics.device import resident
@@ -87,7 +88,8 @@ class ProgramsAhead(ExitStack):
         def arrived() -> None:
             current = begun()
             current = current._replace(outcome=np.full_like(current.outcome, int(Outcome.ARRIVED)))
-            march(equations, current, last, *self._limits, method=self._method, count=STEPS)
+            method = integrator(self._method, equations, current)
+            march(equations, current, last, *self._limits, method=method, count=STEPS)
 
         def evaluated() -> None:
             dense = self._one_step(begun(), last - first[0])

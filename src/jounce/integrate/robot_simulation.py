@@ -1,8 +1,8 @@
 """The result of a simulation of a robot: coordinates with derivatives of any order, torques, energy and events."""
 
 import dataclasses
-import inspect
 import math
+from collections.abc import Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +28,7 @@ from jounce.kinematics.chunks import in_chunks
 from jounce.robot.base_motion import BaseMotion
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.robot import Robot
-from jounce.robot.wrench_laws import STATE
+from jounce.robot.wrench_laws import WrenchPart
 from jounce.robot.wrenches import Wrench
 from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.shown_units import derivatives_of, time_axes
@@ -142,20 +142,21 @@ class RobotSimulation(Displayed):
             self.q,
             drives=self._problem.equations.drives,
             base=self._cut_base(),
-            wrenches=[self._told(wrench) for wrench in self._wrenches],
+            wrenches=[self._told(*both) for both in zip(self._wrenches, self._problem.wrenches.parts, strict=True)],
             time=self.time if self._wrenches else None,
         )
         found = found if self.base is None else found[..., 6:]
         return np.asarray(found)
 
-    def _told(self, wrench: Wrench) -> Wrench:
-        """Return a wrench with its values along the motion where it depends on the state."""
-        parts = {name: self._along(getattr(wrench, name)) for name in ("force", "torque")}
-        return dataclasses.replace(wrench, **parts)
+    def _told(self, wrench: Wrench, parts: Sequence[WrenchPart]) -> Wrench:
+        """Return a wrench with its values along the motion where it depends on the state; functions as they were."""
+        told = {name: self._along(part) for name, part in zip(("force", "torque"), parts, strict=True)}
+        return dataclasses.replace(wrench, **told)
 
-    def _along(self, given: Any) -> Any:
+    def _along(self, part: WrenchPart) -> Any:
         """Return the derivatives of a function of time and state along the motion, or what depends on time alone."""
-        if not callable(given) or len(inspect.signature(given).parameters) != STATE:
+        given = part.constant if part.function is None else part.at
+        if not part.of_state:
             return given
         levels = max(self.order - 1, 1)
 
@@ -237,6 +238,9 @@ class RobotSimulation(Displayed):
         return xarray.Dataset(variables, axes, attrs={"title": self.robot.name, "source": "jounce"})
 
 
+_at = jax.jit(at)  # outside of a program its loop would be compiled at each call
+
+
 def _states(steps: RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, RobotState]:
     """Return which instants the steps reach, and the states there, batch last."""
     sense = 1.0 if steps.length[0] >= 0 else -1.0
@@ -246,7 +250,7 @@ def _states(steps: RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, RobotS
     since = instants - steps.start[chosen]
     since = np.where(reached, since, 0.0)
     polynomial = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[chosen], 0, -1), steps.polynomial)
-    return reached, jax.tree.map(np.asarray, at(polynomial, since))
+    return reached, jax.tree.map(np.asarray, _at(polynomial, since))
 
 
 def _derivatives(coefficients: np.ndarray) -> np.ndarray:

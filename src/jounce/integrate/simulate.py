@@ -23,6 +23,7 @@ from jounce.integrate.robot_simulation import RobotSimulation
 from jounce.integrate.sensitivities import traced_simulation
 from jounce.integrate.simulate_robot import RobotOptions, simulate_robot
 from jounce.integrate.simulation import Simulation
+from jounce.integrate.user_methods import integrator
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.compilation import compiled
@@ -309,7 +310,8 @@ class _Run:
         self.sense = sense = np.sign(instants[-1] - instants[0])
         order = self.method.expansion_order(self.tolerance)
         current = unexpanded(equations, self.start.state, instants[:1], order=order)
-        how, options = (stop, self.tolerance, self.longest), {"method": self.method, "count": STEPS}
+        method = integrator(self.method, equations, current)
+        how, options = (stop, self.tolerance, self.longest), {"method": method, "count": STEPS}
         while current.outcome.item() in GOING and self.events.stopped_at is None:
             current, steps, attempts = march(equations, current, *how, **options)
             found, taken = steps

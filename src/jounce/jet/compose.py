@@ -6,17 +6,21 @@ condition, a special function) is differentiated by nested forward mode instead:
 with each order.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.extend.core import JaxprEqn
 
 from jounce.jet.algebra import Jet, bilinear
+from jounce.jet.captured import Program, read_off
 from jounce.jet.elementary import FUNCTIONS, erf, tanh
 from jounce.jet.operations import COMPOSED, REARRANGING, STEPWISE
 from jounce.jet.programs import ProgramReader, inner_program
+from jounce.modules import Module
 
 
 def compose(function: Callable[[Any], Any], x: Jet) -> Jet:
@@ -47,21 +51,129 @@ def compose(function: Callable[[Any], Any], x: Jet) -> Jet:
     >>> [round(float(x), 12) for x in jn.compose(lambda t: jnp.exp(-2 * t), t).derivatives()]
     [1.0, -2.0, 4.0, -8.0]
     """
-    example = jax.ShapeDtypeStruct((), jnp.result_type(x.coefficients[0], float))
-    program, result = jax.make_jaxpr(function, return_shape=True)(example)
-    if getattr(result, "shape", None) != ():
-        raise TypeError(f"a function of time must return one scalar for a scalar, got {result}")
-    ruled = all(map(_has_rule, _operations(program.jaxpr)))
+    return Composed.of(function)(x)
 
-    def one(*coefficients):
-        x = Jet(coefficients)
-        (result,) = _OnJets().read(program.jaxpr, program.consts, [x]) if ruled else [_nested(function, x)]
+
+class Composed(Module):
+    """A function of one scalar, read off to be run on jets.
+
+    Parameters
+    ----------
+    program : Program
+        What it computes.
+    captured : tuple of array
+        The numbers that it holds; of several functions of one program, each with two axes more at its end: one for the
+        functions, and one that spreads over the batch.
+    """
+
+    program: Program = eqx.field(static=True)
+    captured: tuple[Any, ...]
+
+    @classmethod
+    def of(cls, function: Callable[[Any], Any]) -> "Composed":
+        """Return what a function computes now.
+
+        Raises
+        ------
+        TypeError
+            If the function does not return one scalar for a scalar.
+        """
+        found = read_off(function, jax.ShapeDtypeStruct((), float))
+        if getattr(found.result, "shape", None) != ():
+            raise TypeError(f"a function of time must return one scalar for a scalar, got {found.result}")
+        return cls(found.program, found.captured)
+
+    def __call__(self, x: Jet) -> Jet:
+        """Return the jet of the function, of the order of `x`; the batch axes stand last."""
+        return over_instances(self._at, self.program.shapes, self.captured, x)
+
+    def _at(self, captured: Sequence[Any], x: Jet) -> Jet:
+        """Return the jet for a scalar of one instance."""
+        if has_rules(self.program):
+            (result,) = on_jets(self.program, captured, [x])
+        else:
+            result = _nested(lambda t: self.program(captured, t)[0], x)
         if not isinstance(result, Jet):
-            result = Jet.constant(jnp.asarray(result, dtype=example.dtype), x.order)
-        return result.coefficients
+            result = Jet.constant(jnp.asarray(result), x.order)
+        return result.map(lambda c: c.astype(float))
 
-    flat = [None if c is None else jnp.asarray(c, dtype=example.dtype).reshape(-1) for c in x.coefficients]
-    return Jet(jax.vmap(one)(*flat)).map(lambda c: jnp.reshape(c, x.shape))
+
+class OfSample(Module):
+    """A function of arrays of one sample, as what it computed when it was read off.
+
+    Parameters
+    ----------
+    program : Program
+        What it computes.
+    captured : tuple of array
+        The numbers that it holds.
+    shape : tuple of int
+        Of its result.
+    """
+
+    program: Program = eqx.field(static=True)
+    captured: tuple[Any, ...]
+    shape: tuple[int, ...] = eqx.field(static=True)
+
+    @classmethod
+    def of(cls, function: Callable[..., Any], *examples: Any) -> "OfSample":
+        """Return what a function computes now of arrays with the shapes and types of examples."""
+        found = read_off(lambda *x: jnp.asarray(function(*x), float), *examples)
+        return cls(found.program, found.captured, found.result.shape)
+
+    def __call__(self, *samples: Any) -> Any:
+        """Return the results for samples side by side, which stand along the last axes, there and here."""
+        return jax.vmap(self.at, in_axes=-1, out_axes=-1)(*samples)
+
+    def at(self, *sample: Any) -> Any:
+        """Return the result for one sample."""
+        return self.program(self.captured, *sample)[0]
+
+
+def over_instances(
+    function: Callable[[Sequence[Any], Any], Any], shapes: Sequence[tuple[int, ...]], captured: Sequence[Any], x: Jet
+) -> Jet:
+    """Return what a function of captured values and a jet of one scalar returns for jets with batch axes.
+
+    Parameters
+    ----------
+    function : callable
+        Of values and of a jet without batch axes.
+    shapes : sequence of tuple of int
+        Of the values; those of several instances have an axis for these and one for the batch at their ends.
+    captured : sequence of array
+        The values.
+    x : Jet
+        The argument.
+    """
+    several = [np.ndim(value) > len(shape) for value, shape in zip(captured, shapes, strict=True)]
+    if not any(several):
+        flat = x.map(lambda c: jnp.reshape(jnp.asarray(c, float), -1))
+        return jax.vmap(lambda x: function(captured, x))(flat).map(lambda c: jnp.reshape(c, x.shape))
+    axes = tuple(-1 if its and np.shape(v)[-1] > 1 else None for v, its in zip(captured, several, strict=True))
+
+    def of_instance(captured: Any, x: Jet) -> Jet:
+        given = tuple(v[..., 0] if its and a is None else v for v, its, a in zip(captured, several, axes, strict=True))
+        return jax.vmap(function, in_axes=(axes, -1), out_axes=-1)(given, x)
+
+    each = tuple(-2 if its else None for its in several)
+    wide = x.map(lambda c: jnp.broadcast_to(c, jnp.broadcast_shapes(x.shape, *_ends(captured, several))))
+    return jax.vmap(of_instance, in_axes=(each, -2), out_axes=-2)(tuple(captured), wide)
+
+
+def _ends(captured: Sequence[Any], several: Sequence[bool]) -> list[tuple[int, ...]]:
+    return [np.shape(v)[-2:] for v, its in zip(captured, several, strict=True) if its]
+
+
+def on_jets(program: Program, captured: Sequence[Any], arguments: Sequence[Any]) -> list[Any]:
+    """Return the results of a program for jets; what does not depend on them is an array."""
+    closed = program.closed
+    return _OnJets().read(closed.jaxpr, closed.consts, [*captured, *arguments])
+
+
+def has_rules(program: Program) -> bool:
+    """Tell whether each operation of a program has a rule for jets."""
+    return all(map(_has_rule, _operations(program.closed.jaxpr)))
 
 
 def _nested(function: Callable[[Any], Any], x: Jet) -> Jet:
@@ -110,12 +222,17 @@ def _along_coefficients(primitive: Any, parameters: dict, operands: list[Any]) -
     order = min(x.order for x in operands if isinstance(x, Jet))
     index_only = primitive.name in ("gather", "dynamic_slice")
 
+    def vanishes(k: int) -> bool:
+        return all(x.coefficients[k] is None for x in operands if isinstance(x, Jet))
+
     def pick(x: Any, k: int) -> Any:
         if isinstance(x, Jet):
             return x.dense().coefficients[k]
         return x if k == 0 or index_only else jnp.zeros_like(x)
 
-    return Jet(primitive.bind(*(pick(x, k) for x in operands), **parameters) for k in range(order + 1))
+    return Jet(
+        None if vanishes(k) else primitive.bind(*(pick(x, k) for x in operands), **parameters) for k in range(order + 1)
+    )
 
 
 def _value(x: Any) -> Any:

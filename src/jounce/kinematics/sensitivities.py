@@ -33,6 +33,7 @@ from jounce.mechanism.builder import grouped_elements
 from jounce.mechanism.held_outputs import led_outputs, with_laws_left_out
 from jounce.mechanism.system import System, movable
 from jounce.mechanism.traced import Angles, Part, angles_of, template, traced_model, traced_values
+from jounce.mechanism.user_code import holds_users_code, users_code
 from jounce.modules import with_fields
 from jounce.precision import called_back
 from jounce.rigid import PlanarPose, SpatialPose
@@ -285,14 +286,21 @@ def _builder(mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism]) ->
     plain = tuple((n, x if isinstance(x, str | Expression) else float(x)) for n, x in numbers.items())
     fields = [field.name for field in dataclasses.fields(mechanism) if field.name != "parameters"]
     held = [getattr(mechanism, name) for name in fields]
-    if traced_values(held):
+    if traced_values(held) or (own := _users_code(mechanism)) is None:
         return _Builder(mechanism, made_of, again=False)
-    key = (made_of, tuple(map(id, held)), tuple(mechanism.parameters), plain)
+    key = (made_of, tuple(map(id, held)), tuple(mechanism.parameters), plain, own)
     if key not in _builders:
         while len(_builders) >= MOST_BUILDERS:
             _builders.pop(next(iter(_builders)))
         _builders[key] = _Builder(mechanism, made_of, again=True)  # which holds what the key is made of
     return _builders[key]
+
+
+def _users_code(mechanism: Mechanism) -> tuple[Any, ...] | None:
+    """Return what tells code of users in a mechanism from others; None where it holds what JAX traces."""
+    if not holds_users_code(element for part in mechanism.elements.values() for element in part.values()):
+        return ()
+    return users_code([group for groups, _ in grouped_elements(mechanism, initial=True) for group in groups])
 
 
 def _where(regular: Any, values: Any, others: Any) -> Any:

@@ -15,10 +15,12 @@ from jax.core import Tracer
 from jounce.constraints.base import field_kinds, value_fields
 from jounce.errors import JounceError, MechanismError
 from jounce.forces import AbstractForce, AbstractLaw, ExpressionLaw, FunctionLaw, TimeLaw, VectorLaw
+from jounce.forces.laws import read_law
 from jounce.jet import Jet
-from jounce.modules import Module, unchecked
+from jounce.modules import Module, is_ours, unchecked
 from jounce.shapes import real_numbers
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FunctionMotion, SplineMotion
+from jounce.trajectory.user_laws import read_laws
 
 Element = Module
 """A joint, driver, force or output."""
@@ -84,11 +86,11 @@ def _check_names(expression: Expression, own: set[str], parameters: Mapping[str,
 
 def _traceable(motion: AbstractMotion) -> AbstractMotion:
     """Return a law after trying it once, on shapes only: Python functions can fail in ways that need words."""
-    if type(motion).__call__ is SplineMotion.__call__:
+    if type(motion).__call__ is SplineMotion.__call__ and is_ours(type(motion)):
         return motion  # numbers that were checked; to trace it takes longer than to solve a short grid
     advice = "it must map a scalar time to a scalar with functions of jax.numpy"
     _tried("motion law", advice, lambda t: motion(Jet([t])), np.zeros((1, 1)))
-    return motion
+    return read_laws(motion)
 
 
 def _tried(what: str, advice: str, function: Callable[..., Jet], *arguments: np.ndarray) -> tuple[int, ...]:
@@ -131,7 +133,7 @@ def resolve_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any], c
     )  # fmt: skip
     if got != shape:
         raise MechanismError(f"the law cannot be used: its value has the shape {got}, not {shape}; {advice}")
-    return found
+    return read_law(found, shape[:-2])
 
 
 def _scalar_law(law: Any, force: AbstractForce, parameters: Mapping[str, Any]) -> AbstractLaw:

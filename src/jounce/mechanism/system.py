@@ -1,7 +1,7 @@
 """A mechanism in numbers: instances of a type stacked, bodies by index, residual and Jacobian of the whole."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -13,7 +13,8 @@ from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
 from jounce.mechanism.fronts import Fronts
 from jounce.mechanism.pattern import Pattern
-from jounce.mechanism.resolve import group_key, resolve_element, stack_elements
+from jounce.mechanism.resolve import along_instances, group_key, resolve_element, stack_elements
+from jounce.mechanism.user_code import READINGS, readings_of, users_class, with_readings
 from jounce.modules import Module, unchecked, with_fields
 from jounce.rigid import SpatialPose
 from jounce.rigid.body_arrays import each_jet
@@ -157,7 +158,7 @@ def law_left_out(group: Group, *, told: bool = False) -> Group:
     told : bool, default False
         Whether the law is left out only if bodies that move by it tell what it says: by `evaluate`.
     """
-    element = type(group.element)
+    element = users_class(type(group.element))
     kind = next(kind for kind in element.__mro__ if "residual" in vars(kind))
     apart = vars(kind).get("law_apart", False)
     if apart and told:  # `evaluate` may have been changed by a class that keeps the residual
@@ -177,14 +178,22 @@ def group_elements(
     found: dict[Any, list[tuple[str, Any, dict]]] = {}
     for name, element in elements.items():
         values = resolve_element(element, parameters, components, name)
+        if readings := readings_of(element, values, components):
+            values[READINGS] = readings
         found.setdefault(group_key(element, values), []).append((name, element, values))
     groups, names = [], []
     for members in found.values():
         instance_names, instances, values = zip(*members, strict=True)
         slots = zip(*([body_index[b] for b in e.bodies] for e in instances), strict=True)
-        groups.append(unchecked(Group, {"element": stack_elements(instances, values), "bodies": tuple(slots)}))
+        groups.append(unchecked(Group, {"element": _stacked(instances, values), "bodies": tuple(slots)}))
         names.append(instance_names)
     return tuple(groups), tuple(names)
+
+
+def _stacked(elements: Sequence[Any], values: Sequence[Mapping[str, Any]]) -> Any:
+    """Return one element with the values of several, and with what its methods compute where a user wrote them."""
+    element, readings = stack_elements(elements, values), [its[READINGS] for its in values if READINGS in its]
+    return with_readings(element, jax.tree.map(along_instances, *readings)) if readings else element
 
 
 class System(Module):

@@ -5,19 +5,20 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import JounceError, RobotError, check_name
 from jounce.jet import Jet
+from jounce.jet.compose import OfSample
 from jounce.modules import Module
 from jounce.robot.arguments import floats
 from jounce.shapes import ArrayLike, Numbers
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.joint_trajectory import JointTrajectory
 from jounce.trajectory.motion import AbstractMotion
+from jounce.trajectory.user_laws import read_laws
 
 RATE = "_d1"  # as columns of files name rates
 
@@ -41,18 +42,6 @@ class _OfTime(Module):
 
     def __call__(self, time: Any, *_: Any) -> Any:
         return self.law(Jet([time])).coefficients[0]
-
-
-class _Feedback(Module):
-    """A function of a user, of one sample."""
-
-    function: Callable[..., Any] = eqx.field(static=True)
-
-    def __call__(self, time: Any, q: Any, rate: Any) -> Any:
-        def number(*state: Any) -> Any:
-            return jnp.asarray(self.function(*state), float)
-
-        return jax.vmap(number, in_axes=-1, out_axes=-1)(time, q, rate)
 
 
 class AbstractJointLaws(Module):
@@ -86,7 +75,7 @@ class JointLaws(AbstractJointLaws):
     """
 
     constant: Any
-    whole: _Feedback | None
+    whole: OfSample | None
     single: tuple[Any, ...]
     columns: tuple[int, ...] = eqx.field(static=True)
 
@@ -140,8 +129,7 @@ def joint_laws(names: Sequence[str], given: GivenLaws | None, what: str = "torqu
     if isinstance(given, JointTrajectory):
         given = given.laws
     if callable(given):
-        _check_shape(given, count, (count,), what)
-        return JointLaws(nothing, _Feedback(given), (), ())
+        return JointLaws(nothing, _read(given, count, (count,), what), (), ())
     if not isinstance(given, Mapping):
         constant = np.asarray(floats(what, given))
         if constant.shape != (count,) or not np.isfinite(constant).all():
@@ -167,10 +155,9 @@ def _single(law: Any, names: tuple[str, ...], where: str) -> Any:
             raise
         return _Expressed(expression, names)
     if isinstance(law, AbstractMotion):
-        return _OfTime(law)
+        return _OfTime(read_laws(law))
     if callable(law):
-        _check_shape(law, len(names), (), where)
-        return _Feedback(law)
+        return _read(law, len(names), (), where)
     value = float(floats(where, law)) if np.ndim(law) == 0 else np.nan
     if not np.isfinite(value):
         message = "must be a finite number, an expression, a motion law or a function of time, q and rates"
@@ -178,13 +165,15 @@ def _single(law: Any, names: tuple[str, ...], where: str) -> Any:
     return value
 
 
-def _check_shape(function: Callable[..., Any], count: int, wanted: tuple[int, ...], where: str) -> None:
+def _read(function: Callable[..., Any], count: int, wanted: tuple[int, ...], where: str) -> OfSample:
+    """Return what a function of a user computes now, checked."""
     state = jnp.zeros(()), jnp.zeros(count), jnp.zeros(count)
     try:
-        found = jax.eval_shape(lambda *state: jnp.asarray(function(*state), float), *state).shape
+        found = OfSample.of(function, *state)
     except TypeError as error:
         message = f"must be a function of time, q and rates, by operations of JAX: {str(error).splitlines()[0]}"
         raise RobotError(message, name=where) from error
-    if found != wanted:
+    if found.shape != wanted:
         noun = f"an array of {count} forces" if wanted else "one number"
-        raise RobotError(f"the function must return {noun}, the shape {wanted}, not {found}", name=where)
+        raise RobotError(f"the function must return {noun}, the shape {wanted}, not {found.shape}", name=where)
+    return found

@@ -1,15 +1,15 @@
 """Wrenches on links as functions of time and state, for simulations."""
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jounce.errors import RobotError
+from jounce.jet.compose import OfSample
 from jounce.modules import Module
 from jounce.robot.arguments import floats
 from jounce.robot.kinematics import place_of
@@ -20,11 +20,11 @@ from jounce.robot.wrenches import Wrench, check_wrenches
 STATE = 3  # arguments of a function of time, coordinates and rates
 
 
-class _Part(Module):
+class WrenchPart(Module):
     """The force, or the torque, of a wrench."""
 
     constant: Any
-    function: Callable[..., Any] | None = eqx.field(static=True)
+    function: OfSample | None
     of_state: bool = eqx.field(static=True)
 
     def __call__(self, time: Any, q: Any, rate: Any) -> Any:
@@ -32,18 +32,18 @@ class _Part(Module):
         if self.function is None:
             return jnp.broadcast_to(jnp.asarray(self.constant)[:, None], (3, time.shape[-1]))
         given = (time, q, rate) if self.of_state else (time,)
-        return jax.vmap(lambda *x: self.at(*x), in_axes=-1, out_axes=-1)(*given)
+        return self.function(*given)
 
     def at(self, *state: Any) -> Any:
-        """Return three components at one state."""
+        """Return three components at one state, or at one time, as the function did when it was read off."""
         assert self.function is not None
-        return jnp.asarray(self.function(*state), float)
+        return self.function.at(*state)
 
 
 class WrenchLaws(Module):
     """Wrenches from outside as functions of time and state; see `wrench_laws`."""
 
-    parts: tuple[tuple[_Part, _Part], ...]
+    parts: tuple[tuple[WrenchPart, WrenchPart], ...]
 
     @property
     def changing(self) -> bool:
@@ -83,20 +83,20 @@ def wrench_laws(
     return WrenchLaws(tuple(parts)), places, tuple(wrench.frame == "base" for wrench in wrenches)
 
 
-def _part(where: str, given: Any, n: int) -> _Part:
+def _part(where: str, given: Any, n: int) -> WrenchPart:
     if not callable(given):
         value = np.asarray(floats(where, given))
         if value.shape != (3,) or not np.isfinite(value).all():
             message = "must be three finite numbers, or a function of time, or of time, q and rates"
             raise RobotError(message, name=where, value=value.tolist())
-        return _Part(value, None, False)
+        return WrenchPart(value, None, False)
     of_state = len(inspect.signature(given).parameters) == STATE
     state = (jnp.zeros(()), jnp.zeros(n), jnp.zeros(n)) if of_state else (jnp.zeros(()),)
     try:
-        found = jax.eval_shape(lambda *x: jnp.asarray(given(*x), float), *state).shape
+        found = OfSample.of(given, *state)
     except TypeError as error:
         message = f"must be a function of time, or of time, q and rates, by operations of JAX: {error}"
         raise RobotError(message.splitlines()[0], name=where) from error
-    if found != (3,):
-        raise RobotError(f"the function must return three components, not the shape {found}", name=where)
-    return _Part(np.zeros(3), given, of_state)
+    if found.shape != (3,):
+        raise RobotError(f"the function must return three components, not the shape {found.shape}", name=where)
+    return WrenchPart(np.zeros(3), found, of_state)

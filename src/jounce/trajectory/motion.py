@@ -1,7 +1,6 @@
 """Motion laws: what a driver prescribes, as a function of time that acts on jets."""
 
 import abc
-import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -14,7 +13,7 @@ from jaxtyping import Float
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, compose
 from jounce.jet.pieces import last_begun
-from jounce.modules import Module
+from jounce.modules import Module, Untraced
 from jounce.shapes import ArrayLike, Numbers, Real, is_traced
 from jounce.trajectory.expression import Expression
 from jounce.trajectory.sample_errors import derivative_errors
@@ -101,14 +100,6 @@ class FunctionMotion(AbstractMotion):
 
 BEYOND = ("refuse", "hold", "repeat", "continue")
 SLACK = 1e-9  # of the duration: how far rounding may take an instant out of the samples
-
-
-@dataclasses.dataclass(unsafe_hash=True)
-class Untraced:
-    """Data of a law that JAX is not to see: all are equal, so that what is compiled does not depend on them."""
-
-    value: Any = dataclasses.field(compare=False)
-    derived: Any = dataclasses.field(default=None, compare=False)
 
 
 class SplineMotion(AbstractMotion):

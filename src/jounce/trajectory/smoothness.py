@@ -7,11 +7,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.jet import Jet
+from jounce.jet.compose import Composed
 from jounce.trajectory.checks import whole_number
 from jounce.trajectory.composed import FollowingMotion, OutputMotion, PiecewiseMotion
 from jounce.trajectory.knots import SMOOTH, Jumps, derivative_sizes, knot_jumps
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion, SplineMotion
 from jounce.trajectory.profiles import AbstractProfile
+from jounce.trajectory.user_laws import ReadMotion
 
 HIGHEST = 10  # derivative that is looked at
 MOST_CROSSINGS = 10_000
@@ -193,8 +195,10 @@ def _jumps(
             words = str(law.expression.folded(lambda _: "", lambda _: "", lambda word, parts: f"{word} {parts}"))
             kinks = [f"{kind} where {word} is of zero" for word, kind in BROKEN.items() if word in words]
             return *none, f"it may have {' and '.join(kinks)}" if kinks else ""
-        case FunctionMotion():
+        case FunctionMotion() | ReadMotion(computes=Composed()):
             return *none, "it is a Python function"
+        case ReadMotion():
+            return *none, f"nothing is known of a {type(law.computes.source.value).__name__}"
     return *none, f"nothing is known of a {type(law).__name__}"
 
 

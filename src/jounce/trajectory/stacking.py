@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from jounce.jet import Jet
 from jounce.trajectory.motion import AbstractMotion
+from jounce.trajectory.user_laws import read_laws
 
 
 def evaluate_laws(laws: Sequence[AbstractMotion], time: Jet) -> Jet:
@@ -35,9 +36,15 @@ def _along_joints(*leaves: Any) -> Any:
     return jnp.stack([jnp.asarray(leaf, float) for leaf in leaves], axis=-1)[..., None]
 
 
-@eqx.filter_jit
 def law_derivatives(
     laws: list[AbstractMotion], times: Float[jax.Array, " time"], order: int
 ) -> Float[jax.Array, "order joint time"]:
     """Return the plain derivatives of laws at instants."""
+    return _derivatives(read_laws(laws), times, order)
+
+
+@eqx.filter_jit
+def _derivatives(
+    laws: list[AbstractMotion], times: Float[jax.Array, " time"], order: int
+) -> Float[jax.Array, "order joint time"]:
     return evaluate_laws(laws, Jet.variable(times, order)).derivatives()

@@ -8,6 +8,7 @@ import numpy as np
 from jounce.errors import RobotError, check_name
 from jounce.planning.elastic.drives import DriveArrays
 from jounce.trajectory import AbstractMotion, ExpressionMotion
+from jounce.trajectory.user_laws import read_laws
 
 MOTOR = "_motor"  # what the joint or body of a rotor is called after what it moves
 
@@ -34,7 +35,7 @@ def torques_of(
         if isinstance(law, str):
             law = ExpressionMotion(law)
         if isinstance(law, AbstractMotion):
-            laws.append((place, law))
+            laws.append((place, read_laws(law)))
         elif isinstance(law, int | float) and np.isfinite(law):
             constant[place] = law
         else:

@@ -6,11 +6,10 @@ rotor, which is the model of Spong (1987), exactly.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -18,6 +17,7 @@ from jounce.errors import RobotError
 from jounce.integrate import RobotSimulation, simulate
 from jounce.integrate.options import SimulationOptions
 from jounce.jet import Jet
+from jounce.jet.compose import OfSample
 from jounce.planning.elastic.driven_systems import robot_drives
 from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.planning.elastic.motor_torques import MOTOR, torques_of
@@ -97,7 +97,7 @@ class _ElasticForces(AbstractJointLaws):
     places: tuple[int, ...] = eqx.field(static=True)  # of the laws among the robot's own joints
     links: tuple[int, ...] = eqx.field(static=True)  # columns of the robot's own joints
     motors: tuple[int, ...] = eqx.field(static=True)  # of what moves each: its rotor, or itself
-    feedback: Callable[..., Any] | None = eqx.field(static=True)
+    feedback: OfSample | None
 
     @property
     def changing(self) -> bool:
@@ -112,7 +112,7 @@ class _ElasticForces(AbstractJointLaws):
             own = own + jnp.stack([found.get(k, zero) for k in range(len(links))])
         if self.feedback is not None:
             parts = time[0], q[links], rate[links], q[motors], rate[motors]
-            own = own + jax.vmap(self.feedback, in_axes=-1, out_axes=-1)(*parts)
+            own = own + self.feedback(*parts)
         spring = jnp.asarray(self.stiffness)[:, None] * (q[motors] - q[links])
         spring = spring + jnp.asarray(self.damping)[:, None] * (rate[motors] - rate[links])
         forces = jnp.zeros(q.shape)
@@ -138,7 +138,9 @@ def simulate_elastic_robot(
         names.index(name + MOTOR) if elastic else names.index(name)
         for name, elastic in zip(arrays.names, arrays.elastic, strict=True)
     )
-    constant, laws, feedback = torques_of(arrays, torque)
+    constant, laws, function = torques_of(arrays, torque)
+    sample = jnp.zeros(()), *[jnp.zeros(len(arrays.names))] * 4
+    feedback = None if function is None else OfSample.of(function, *sample)
     stiffness = np.where(arrays.elastic, arrays.stiffness, 0.0)
     places, functions = tuple(k for k, _ in laws), tuple(law for _, law in laws)
     damping = stiffness * arrays.time_constant

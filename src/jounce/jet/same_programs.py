@@ -1,0 +1,55 @@
+"""Whether two programs of JAX do the same operations on the same numbers, in whatever order they stand."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import numpy as np
+from jax.extend.core import ClosedJaxpr, JaxprEqn
+
+from jounce.jet.captured import Pass, parameters_of, told_array
+
+_SPREADING = frozenset("add add_any sub mul div max min pow atan2 select_n".split())  # which take single numbers too
+
+
+def is_same(first: ClosedJaxpr, second: ClosedJaxpr, captured: Sequence[Any]) -> bool:
+    """Tell whether a program is the same as another one that gets captured values as its first arguments."""
+    nodes: dict[Any, Any] = {}
+    one, two = _Nodes(nodes), _Nodes(nodes)
+    arguments = [("argument", k) for k in range(len(first.jaxpr.invars))]
+    values = [one.fixed(value, np.asarray(value).dtype) for value in captured]
+    return one.of(first, arguments) == two.of(second, [*values, *arguments])
+
+
+class _Nodes(Pass):
+    """Numbers what a program computes; what is computed in the same way has the same number."""
+
+    def __init__(self, nodes: dict[Any, Any]):
+        self._nodes = nodes
+
+    def captured(self, value: Any, dtype: np.dtype) -> Any:
+        return self.fixed(value, dtype)
+
+    def fixed(self, value: Any, dtype: np.dtype) -> Any:
+        if isinstance(value, jax.core.Tracer):
+            return self._node(("held", id(value)))
+        return self._node(("number", told_array(np.asarray(value, dtype))))
+
+    def applied(self, equation: JaxprEqn, operands: list[Any]) -> Sequence[Any]:
+        name, shapes = equation.primitive.name, [(v.aval.shape, str(v.aval.dtype)) for v in equation.outvars]
+        if name in _SPREADING:
+            operands = [self._unspread(x) for x in operands]
+        if name == "reshape" and equation.invars[0].aval.shape == equation.outvars[0].aval.shape:
+            return operands
+        told, nameless = parameters_of(equation)
+        key = name, tuple(told), tuple(map(id, nameless)), tuple(operands), tuple(shapes)
+        node = self._node(key)
+        if name in ("broadcast_in_dim", "reshape") and not equation.invars[0].aval.shape:
+            self._nodes[("spread", node)] = operands[0]
+        return [(node, k) for k in range(len(shapes))]
+
+    def _unspread(self, x: Any) -> Any:
+        return self._nodes.get(("spread", x[0]), x) if isinstance(x, tuple) else x
+
+    def _node(self, key: Any) -> int:
+        return self._nodes.setdefault(key, len(self._nodes))

@@ -1,0 +1,279 @@
+"""Joints, drivers, forces and outputs of users: what their methods compute is read off when a model is built.
+
+An element of a user's class is replaced by one of a class made here, whose methods do what was read off; see
+`jounce.jet.read_methods`. It stays an instance of the user's class, and everything else of it is as it was.
+"""
+
+import dataclasses
+import itertools
+import weakref
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.constraints import AbstractConstraint
+from jounce.constraints.base import field_kinds, value_fields
+from jounce.forces import AbstractForce
+from jounce.forces.laws import AbstractLaw, ReadLaw, is_users_law
+from jounce.jet import Jet
+from jounce.jet.read_methods import Reading, Verbatim, read_method
+from jounce.mechanism.outputs import AbstractOutput
+from jounce.mechanism.resolve import stack_elements
+from jounce.modules import changes_parts, is_ours, unchecked, with_fields
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.pose import Pose
+from jounce.trajectory import AbstractMotion
+from jounce.trajectory.user_laws import ReadMotion
+
+ORDER = 2  # to which methods are compared with what was read off
+READINGS = "readings"  # the field that holds them
+_METHODS = {
+    AbstractConstraint: ("residual", "evaluate", "admissible", "sense_at"),
+    AbstractForce: ("displacement", "velocity", "force", "energy", "variation"),
+    AbstractOutput: ("evaluate",),
+}
+_classes: weakref.WeakKeyDictionary[type, type] = weakref.WeakKeyDictionary()
+
+
+def readings_of(element: Any, values: Mapping[str, Any], components: int) -> dict[str, Reading]:
+    """Return what the methods of a user's element compute, by name; nothing for elements of this package.
+
+    Parameters
+    ----------
+    element : AbstractConstraint, AbstractForce or AbstractOutput
+        As the user gave it.
+    values : mapping
+        Of its fields, as `resolve_element` returns them.
+    components : int
+        Of positions: 2 in the plane, 3 in space.
+    """
+    kind = type(element)
+    names = _read_methods(kind)
+    if not names:
+        return {}
+    reader = _Reader(element, values, components)
+    return {name: reader.reading(name) for name in names} | {"": Verbatim(_words(kind), old=False)}
+
+
+def with_readings(element: Any, readings: Mapping[str, Reading]) -> Any:
+    """Return an element whose methods do what was read off; its values may be those of stacked instances."""
+    return unchecked(_class_for(type(element)), vars(element) | {READINGS: dict(readings)})
+
+
+def holds_users_code(elements: Iterable[Any]) -> bool:
+    """Tell whether there is code of a user in some elements, as they were given."""
+
+    def is_code(value: Any) -> bool:
+        if isinstance(value, list | tuple):
+            return any(map(is_code, value))
+        if isinstance(value, AbstractMotion | AbstractLaw):
+            return any(map(is_users_law, jax.tree.leaves(value, is_leaf=is_users_law)))
+        return callable(value)
+
+    return any(
+        _read_methods(type(element)) or any(is_code(getattr(element, name)) for name in value_fields(type(element)))
+        for element in elements
+    )
+
+
+def users_code(groups: Sequence[Any]) -> tuple[Any, ...] | None:
+    """Return what tells the code of users in the elements of groups from others; None where JAX traces its numbers."""
+    read = ReadMotion, ReadLaw
+    found: list[Any] = []
+    for group in groups:
+        found.append(vars(group.element).get(READINGS))
+        parts = jax.tree.leaves(group.element, is_leaf=lambda x: isinstance(x, read))
+        found += [part for part in parts if isinstance(part, read)]
+    leaves, structure = jax.tree.flatten(found)
+    if any(isinstance(x, jax.core.Tracer) for x in leaves):
+        return None
+    return structure, tuple((np.shape(x), np.asarray(x).tobytes()) for x in leaves)
+
+
+def users_class(kind: type) -> type:
+    """Return the class that a user wrote, in the place of the one that was made for it."""
+    return vars(kind).get("stands_for", kind)
+
+
+def _read_methods(kind: type) -> tuple[str, ...]:
+    """Return the names of the methods of a class that a user may have written, or that call such."""
+    role = next((role for role in _METHODS if issubclass(kind, role)), None)
+    if role is None:
+        return ()
+    known = [name for name in _METHODS[role] if hasattr(kind, name)]
+    if changes_parts(kind, tuple(_METHODS), known):
+        return tuple(known)
+    return tuple(name for name in known if not is_ours(getattr(kind, name)))
+
+
+def _words(kind: type) -> tuple[str, ...]:
+    """Return what a class says of its elements beside its methods."""
+    ours = [base for base in kind.__mro__ if is_ours(base)]
+    named = {name for base in ours for name, value in vars(base).items() if name[0] != "_" and not callable(value)}
+    fields = {field.name for field in dataclasses.fields(kind)}
+    return tuple(f"{name}={getattr(kind, name, None)!r}" for name in sorted(named - fields))
+
+
+def _class_for(kind: type) -> type:
+    """Return the class of elements of a user's class whose methods were read off."""
+    if kind not in _classes:
+        role = next(role for role in _METHODS if issubclass(kind, role))
+        own: dict[str, Any] = {name: _dispatched(name) for name in _METHODS[role] if hasattr(kind, name)}
+        own |= {
+            "__module__": kind.__module__,
+            "__qualname__": kind.__qualname__,
+            "__annotations__": {READINGS: Any},
+            READINGS: eqx.field(default=None, init=False),
+            "stands_for": kind,
+        }
+        _classes[kind] = type(kind)(kind.__name__, (kind,), own)
+    return _classes[kind]
+
+
+def _dispatched(name: str) -> Callable[..., Any]:
+    def method(self: Any, *arguments: Any) -> Any:
+        written = getattr(users_class(type(self)), name)
+        reading = vars(self)[READINGS].get(name)
+        if reading is None:
+            return written(self, *arguments)
+        return reading(lambda: written(_plain(self), *arguments), lambda: _inputs(self, arguments))
+
+    method.__name__ = name
+    return method
+
+
+def _plain(element: Any) -> Any:
+    """Return an element of the user's own class."""
+    kind = users_class(type(element))
+    return unchecked(kind, {name: value for name, value in vars(element).items() if name != READINGS})
+
+
+class _Prescribed(AbstractMotion):
+    """A law of which the value at one time is known, and nothing else."""
+
+    time: Jet
+    value: Jet
+
+    def __call__(self, time: Jet) -> Jet:
+        if time.coefficients[0] is not self.time.coefficients[0]:
+            raise ValueError("the law is asked at another time")
+        return self.value.truncate(time.order)
+
+
+def _laws(element: Any) -> list[str]:
+    kinds = field_kinds(users_class(type(element)))
+    return [
+        name for name, kind in kinds.items() if kind == "motion" and isinstance(getattr(element, name), AbstractMotion)
+    ]
+
+
+def _inputs(element: Any, arguments: tuple[Any, ...]) -> list[Any]:
+    """Return jets and arrays on which the value of a method depends: its arguments, laws at that time, and fields."""
+    jets = [jet for argument in arguments for jet in _jets(argument)]
+    laws = _laws(element)
+    if isinstance(arguments[-1], Jet):
+        jets += [getattr(element, name)(arguments[-1]) for name in laws]
+    names = [name for name in value_fields(users_class(type(element))) if name not in laws]
+    return [*jets, *jax.tree.leaves([getattr(element, name) for name in names])]
+
+
+def _jets(argument: Any) -> list[Jet]:
+    """Return the jets of an argument that have values of order zero."""
+    if isinstance(argument, SpatialPose):
+        return [argument.position, argument.quaternion, *argument.spins, *argument.axes]
+    if isinstance(argument, PlanarPose):
+        return [argument.position, argument.angle, argument.sine, argument.cosine]
+    return [argument] if isinstance(argument, Jet) else []
+
+
+class _Reader:
+    """Reads off the methods of an element."""
+
+    def __init__(self, element: Any, values: Mapping[str, Any], components: int):
+        self.kind = type(element)
+        found = stack_elements([element], [values])
+        if "offset" in value_fields(self.kind) and found.offset is None:
+            found = with_fields(found, offset=np.zeros((1, 1)))  # found later, from the pose of the bodies
+        self.element, self.laws = found, _laws(found)
+        self.settled = all(field.init for field in dataclasses.fields(self.kind))
+        self.poses = [_example(components) for _ in element.bodies]
+        self.time = _series((), ORDER)
+
+    def reading(self, name: str) -> Reading:
+        written, arguments = getattr(self.kind, name), self._arguments(name)
+        of_time = [name for name in self.laws if isinstance(arguments[-1], Jet)]
+        its = {law: _series((), ORDER) for law in of_time}
+        fields = [n for n in value_fields(self.kind) if n not in self.laws]
+        held, tree = jax.tree.flatten([getattr(self.element, n) for n in fields])
+        jets = [*(x for argument in arguments for x in _jets(argument)), *its.values(), *held]
+        rates = [a.angular_velocity for a in arguments if isinstance(a, SpatialPose)]
+
+        def called(given: Sequence[Any], rates: Iterator[Any]) -> Any:
+            parts = iter(given[: len(given) - len(held)])
+            poses = [_rebuilt(argument, parts, rates) for argument in arguments]
+            laws = {law: _Prescribed(poses[-1], next(parts)) for law in of_time}
+            own = jax.tree.unflatten(tree, given[len(given) - len(held) :])
+            return written(with_fields(self.element, **dict(zip(fields, own, strict=True)), **laws), *poses)
+
+        def on_values(*values: Any) -> Any:
+            if not self.settled:
+                raise ValueError("fields that are found later")
+            moving, own = values[: len(values) - len(held)], values[len(values) - len(held) :]
+            found = called([*(Jet([x]) for x in moving), *own], itertools.repeat(None))
+            return found.coefficients[0] if isinstance(found, Jet) else found
+
+        def whole() -> Any:
+            return written(self.element, *jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), arguments))
+
+        return read_method(on_values, lambda given, rates: called(given, iter(rates)), jets, rates, whole)
+
+    def _arguments(self, name: str) -> tuple[Any, ...]:
+        """Return examples of the arguments of a method."""
+        if name == "admissible":
+            return (self.time,)
+        if name == "evaluate":
+            return tuple(self.poses)
+        if name in ("force", "energy"):
+            x, v = self._displacement()
+            return (x, v, self.time) if name == "force" else (x,)
+        if name == "variation":
+            return tuple(self.poses), tuple(self.poses), self.time
+        return (*self.poses, self.time)
+
+    def _displacement(self) -> tuple[Jet, Jet]:
+        """Return what stands for the displacement of a force and its velocity."""
+
+        def both(*given: Any) -> Any:
+            return self.element.displacement(*given), self.element.velocity(*given)
+
+        shapes = [x.coefficients[0].shape for x in jax.eval_shape(both, *self.poses, self.time)]
+        return tuple(_series(shape[:-2], ORDER - k) for k, shape in enumerate(shapes))  # pyright: ignore
+
+
+def _series(shape: tuple[int, ...], order: int) -> Jet:
+    """Return what stands for a jet of one instance at one instant."""
+    return Jet([jax.ShapeDtypeStruct((*shape, 1, 1), float)] * (order + 1))
+
+
+def _example(components: int) -> Pose:
+    """Return what stands for the pose of a body."""
+    if components == 2:
+        return PlanarPose(_series((2,), ORDER), *(_series((), ORDER) for _ in range(3)))
+    spins, axes = (tuple(_series((size,), ORDER) for _ in range(3)) for size in (4, 3))
+    return SpatialPose(_series((3,), ORDER), _series((4,), ORDER), spins, axes, _series((3,), ORDER - 1))
+
+
+def _rebuilt(argument: Any, jets: Iterator[Jet], rates: Iterator[Any]) -> Any:
+    """Return an argument with other jets."""
+    if isinstance(argument, SpatialPose):
+        position, quaternion, *rest = (next(jets) for _ in range(8))
+        return SpatialPose(position, quaternion, tuple(rest[:3]), tuple(rest[3:]), next(rates))
+    if isinstance(argument, PlanarPose):
+        return PlanarPose(*(next(jets) for _ in range(4)))
+    if not isinstance(argument, Jet):
+        raise TypeError("several poses in one argument")
+    return next(jets)
