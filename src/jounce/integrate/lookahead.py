@@ -27,13 +27,16 @@ from jounce.shapes import Numbers
 
 POINTS = 32  # at which each step is looked at
 SPAN_POINTS = 8192  # in the whole run, at least, where steps are few
-HARMLESS = 1e-12  # rad or sizes of the mechanism: what is overlooked may move a body by this
+HARMLESS = 1e-15  # rad or sizes of the mechanism: what is overlooked may move a body by this
 SHAKE = 2.0**-51  # relative change of state and time by which the rounding of a force is measured
 SPARSE = 5  # of so many nodes, one is used for that
 _SHAKEN = (NODES[::SPARSE], np.full(len(NODES[::SPARSE]), SHAKE))
 NOISE = 16.0  # times what it changes by is rounding still
 FAINT = 1e-13  # of a force: rounding of the polynomial through it
-SHORTEST = 1e-12  # of the run: a step over a jump of a force is not made shorter
+SHORTEST = 1e-12  # of the run: a step over a jump of a force is not longer,
+FINEST = 2.0**-60  # and so short if it can: no more than rounding of places and times,
+COARSER = 4.0  # times as long each time that it has not led over the jump: where that is depends on rounding
+AWAY = 1e-9  # of the run: who has taken so long a step is away from the jump before
 JUMP = 1e-6  # rad or sizes of the mechanism: no motion law jumps by more in such a step
 NEAR = 1.0 / 16.0  # of the way to where forces and laws are no longer known: a step ends that close
 
@@ -80,6 +83,7 @@ def look_ahead(
     step: Lanes,
     span: Lanes,
     bound: Lanes,
+    shortest: Lanes,
 ) -> Lookahead:
     """Return how far a step may go so that no force and no motion law on its way stays unseen.
 
@@ -99,13 +103,15 @@ def look_ahead(
         Of the whole run, s: the longer the step in it, the more points it is looked at.
     bound : array of shape (batch,)
         By how much a body may move otherwise than seen, rad or sizes of the mechanism.
+    shortest : array of shape (batch,)
+        Step that may lead over a jump of a force, s: `finest`.
     """
     groups = tuple(group for group in equations.system.groups if group.is_driver)
     blank = jnp.full(step.shape, -1)
     if not equations.system.forces and not groups:
         return Lookahead(step, jnp.ones(step.shape, bool), blank, blank)
     signals = _Signals(equations, path, angles, time, groups)
-    bound, shortest = jnp.maximum(bound, HARMLESS), SHORTEST * jnp.maximum(span, jnp.abs(time))
+    bound = jnp.maximum(bound, HARMLESS)
 
     def seen(part: Any) -> Lookahead:
         away, moved = signals.departure(part * step, span, mobility)
@@ -138,6 +144,18 @@ def look_ahead(
     low, high, best, _ = jax.lax.while_loop(unfinished, narrowed, (none, whole, nothing, jnp.zeros((), bool)))
     kink = jnp.where(best.resolved, best.kink, -1)
     return Lookahead(step * jnp.where(low > 0, low, high), low > 0, kink, best.limiting)
+
+
+def finest(span: Lanes, time: Lanes, crossing: Indices) -> Lanes:
+    """Return how long a step over a jump may be, s, after so many that have not led over it: `crossings`."""
+    longer = jnp.minimum(FINEST * COARSER ** crossing.astype(float), SHORTEST)
+    return longer * jnp.maximum(span, jnp.abs(time))
+
+
+def crossings(before: Indices, step: Lanes, kink: Indices, span: Lanes) -> Indices:
+    """Return how many steps over jumps there are one after the other, with one more step."""
+    over = (kink >= 0) & (jnp.abs(step) <= SHORTEST * span)
+    return jnp.where(over, before + 1, jnp.where(jnp.abs(step) > AWAY * span, 0, before))
 
 
 class _Signals:
