@@ -21,7 +21,7 @@ from jounce.shapes import Numbers
 SMALLEST_STEP = FINEST / 8.0  # of the span, or of the time itself
 MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
 REFUSED = 0.45  # of a step that was refused is tried next: no power of two, or it would end where others have ended
-SHORT = 1.0 / 8.0  # of the longest step so far: shorter ones leave out as much less
+SHORT = 1.0 / 4.0  # of the longest step so far: shorter ones leave out as much less
 STUCK = 64  # steps over a jump one after the other: a force that switches without end
 STUBBORN = 3  # steps refused one after the other: no series that is only too short for its step needs so many
 
@@ -183,7 +183,7 @@ def march(
         angles = followed(equations, current.angles, start.state, look.step)
         span = jnp.abs(stop - current.begun)
         if method.controlled:
-            bound = MARGIN * allowed
+            bound = allowed
             shortest = finest(span, current.time, current.crossing)
             look = look_ahead(
                 equations, start.state, angles, current.mobility, current.time, look.step, span, bound, shortest
