@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, expand, inverted
 from jounce.integrate.lookahead import FINEST, HARMLESS, SHORTEST, Lookahead, crossings, finest, look_ahead, mobility_of
-from jounce.integrate.methods import NEEDED, AbstractMethod, Number, near_singular
+from jounce.integrate.methods import MARGIN, NEEDED, AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import AnglesOfForces, followed, measured
 from jounce.kinematics.compilation import compiled
@@ -19,7 +19,6 @@ from jounce.mechanism.axis_angles import measures_angle
 from jounce.shapes import Numbers
 
 SMALLEST_STEP = FINEST / 8.0  # of the span, or of the time itself
-MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
 REFUSED = 0.45  # of a step that was refused is tried next: no power of two, or it would end where others have ended
 SHORT = 1.0 / 4.0  # of the longest step so far: shorter ones leave out as much less
 STUCK = 64  # steps over a jump one after the other: a force that switches without end

@@ -21,11 +21,14 @@ Sizes = Float[Numbers, "order batch"]
 
 HIGHEST_ORDER = 40
 LOWEST_ORDER = 4
-NEEDED = LOWEST_ORDER + 2  # coefficients that must be finite: beside a jump of a force higher ones are rounding, or none
+NEEDED = (
+    LOWEST_ORDER + 2
+)  # coefficients that must be finite: beside a jump of a force higher ones are rounding, or none
 FAINT = 1e-10  # what grows in the upper coefficients from an amplitude below is rounding, near a singular position
 BRACED = 20.0  # in multiples of the largest mass, by a gap of one: 30 and more where coefficients drown, else below 26
 NEAR = 1e-6  # rad or sizes of the mechanism: what a body moves within the radius of a series near a pole
 ROUGH = 1e-11  # tolerance of a step there, rad or sizes of the mechanism
+MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
 ROUNDING = 1e-14  # relative error of an acceleration that is no sign of a step too long
 
 
