@@ -81,6 +81,12 @@ def watched_names(model: Model) -> list[str]:
     return [f"forces.{name}" for name in force_names(model)] + list(model.drivers) + constraints
 
 
+def hiding_names(model: Model, equations: Equations, path: State, time: Lanes) -> list[str]:
+    """Return the names of the constraints that a series could overlook."""
+    rows, hiding = group_rows(model), _hiding(equations, path, time)
+    return [name for k in hiding for name in model.rows[rows[k]][: model.system.groups[k].instances]]
+
+
 def look_ahead(
     equations: Equations,
     path: State,

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, expand, inverted
+from jounce.integrate.energy_balance import Balance, begun, energies, followed as follow_balance, is_balanced, unknown
 from jounce.integrate.lookahead import FINEST, HARMLESS, SHORTEST, Lookahead, crossings, finest, look_ahead, mobility_of
 from jounce.integrate.methods import MARGIN, NEEDED, AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
@@ -33,6 +34,7 @@ class Outcome(enum.IntEnum):
     COLLAPSED = 2  # steps became too small to move on
     LOST = 3  # the motion is not finite from the start
     UNEXPANDED = 4  # the motion is to be expanded at the start, by the first of the steps tried
+    UNBALANCED = 5  # the energy would change, though nothing takes or gives any
 
 
 MOVING = np.array([Outcome.RUNNING, Outcome.UNEXPANDED])
@@ -54,6 +56,7 @@ class IntegratorState(NamedTuple):
     angles: AnglesOfForces  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
     longest: Lanes  # step so far, s
     crossing: Indices  # number of steps, one after the other, too short to matter, over what is not known
+    balance: Balance | None  # of the energy, where all forces tell what they store
 
 
 class DenseOutput(NamedTuple):
@@ -97,7 +100,8 @@ def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -
     known = np.zeros((bodies + 1, lanes)), np.zeros(time.shape, bool)
     angles = _measured(equations, state) if any(map(measures_angle, equations.system.forces)) else ()
     expansion, refused = Expansion(series, *rates), np.zeros(time.shape, int)
-    counts = nothing, np.zeros(time.shape, int)
+    balance = jax.tree.map(np.asarray, unknown(lanes)) if is_balanced(equations) else None
+    counts = nothing, np.zeros(time.shape, int), balance
     return IntegratorState(time, nothing, expansion, refused, opening, nothing, time, *known, none, angles, *counts)
 
 
@@ -121,7 +125,8 @@ def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) 
     known = mobility_of(equations, inverse), near_singular(equations, inverse)
     count = jnp.zeros(time.shape, int)
     began = time, nothing, expansion, count, outcome, nothing, time
-    return IntegratorState(*began, *known, none, angles, nothing, count)
+    balance = begun(energies(equations, state, time[None])) if is_balanced(equations) else None
+    return IntegratorState(*began, *known, none, angles, nothing, count, balance)
 
 
 def _is_one(_: Equations, current: IntegratorState, *__: Any, **___: Any) -> bool:
@@ -171,7 +176,7 @@ def march(
         How many of them there are.
     """
     length = equations.system.column_scale[0]
-    order = len(current.expansion.state.position) - 1
+    order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
 
     def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
         left = stop - current.time - current.rest
@@ -208,11 +213,21 @@ def march(
         if method.controlled:
             kick = 0.5 * order * (order + 1) * error
             good = good & ~(suspect & _lasting(kick, step, span, MARGIN * allowed, current))
+        balanced, balance = jnp.ones(step.shape, bool), None
+        if current.balance is not None:
+            found = energies(there, state, time[None])
+            kick = MARGIN * allowed * order / jnp.maximum(jnp.abs(step), 1e-300)
+            leeway = kick * length * jnp.sqrt(equations.scale * bodies)
+            balance, balanced = follow_balance(current.balance, found, leeway)
+            balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), begun(found), balance)
+            if method.controlled:
+                good = good & balanced
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(current.time), jnp.abs(stop - current.time))
         polynomial = method.polynomial(start, expansion, step)
         steps = DenseOutput(current.time, step, polynomial, look.kink, current.angles), good
         outcome = jnp.where(good & last, int(Outcome.ARRIVED), current.outcome)
-        outcome = jnp.where(running & ((~good & tiny) | (current.crossing >= STUCK)), int(Outcome.COLLAPSED), outcome)
+        stopped = jnp.where(balanced, int(Outcome.COLLAPSED), int(Outcome.UNBALANCED))
+        outcome = jnp.where(running & ((~good & tiny) | (current.crossing >= STUCK)), stopped, outcome)
         opened = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
         outcome = jnp.where(opening, opened, outcome)
         drift = jnp.where(opening, current.drift, jnp.maximum(current.drift, distance))
@@ -223,7 +238,19 @@ def march(
         farthest = jnp.maximum(current.longest, farthest)
         crossing = crossings(current.crossing, step, look.kink, span)
         onwards = IntegratorState(
-            time, rest, expansion, fresh, outcome, drift, current.begun, *known, none, reached, farthest, crossing
+            time,
+            rest,
+            expansion,
+            fresh,
+            outcome,
+            drift,
+            current.begun,
+            *known,
+            none,
+            reached,
+            farthest,
+            crossing,
+            balance,
         )
         blocked = jnp.where(look.resolved, current.blocked, look.limiting)
         refused = current._replace(refused=current.refused + 1, outcome=outcome, blocked=blocked)

@@ -33,6 +33,19 @@ def is_plain(program: ClosedJaxpr) -> bool:
     return degrees is not None and max(degrees, default=0) <= HIGHEST_DEGREE
 
 
+def uses(program: ClosedJaxpr) -> bool:
+    """Tell whether the results of a program depend on its arguments.
+
+    Examples
+    --------
+    >>> import jax
+    >>> uses(jax.make_jaxpr(lambda t: 3.0 + 0.0)(1.0)), uses(jax.make_jaxpr(lambda t: jax.numpy.exp(t))(1.0))
+    (False, True)
+    """
+    degrees = _degrees(program.jaxpr, [1] * len(program.jaxpr.invars))
+    return degrees is None or any(degrees)
+
+
 def _degrees(jaxpr: Any, arguments: Sequence[int]) -> list[int] | None:
     """Return the degrees of the results in what moves, zero for what does not; None where there is none."""
     known: dict[Any, int] = dict.fromkeys(jaxpr.constvars, 0) | dict(zip(jaxpr.invars, arguments, strict=True))
