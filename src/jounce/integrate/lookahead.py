@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.forward import Equations, Flags, Indices, Inverse, Lanes, State, with_ground
+from jounce.dynamics.forward import Equations, Flags, Indices, Instants, Inverse, Lanes, State, with_ground
 from jounce.dynamics.inverse import force_names
 from jounce.integrate.events import INTERPOLATION, NODES
 from jounce.integrate.methods import MARGIN, evaluated
@@ -81,10 +81,27 @@ def watched_names(model: Model) -> list[str]:
     return [f"forces.{name}" for name in force_names(model)] + list(model.drivers) + constraints
 
 
-def hiding_names(model: Model, equations: Equations, path: State, time: Lanes) -> list[str]:
+def hiding(equations: Equations, state: State, time: Instants) -> dict[int, Float[Numbers, "row instance 1"]]:
+    """Return which groups of constraints have residuals that a series could overlook, and the scales of their rows.
+
+    The law of a driver is looked at by itself.
+    """
+    pose, clock = equations.still(state.position, state.attitude), Jet([time])
+    found, first = {}, 0
+    for k, group in enumerate(equations.system.groups):
+        bare = law_left_out(group) if group.is_driver else group
+        program = jax.make_jaxpr(lambda pose, clock, bare=bare: bare.residual(pose, clock).coefficients[0])(pose, clock)
+        rows, count = program.out_avals[0].shape[0], group.instances
+        if not is_plain(program):
+            found[k] = equations.system.row_scale[first : first + rows * count].reshape(rows, count, -1)
+        first += rows * count
+    return found
+
+
+def hiding_names(model: Model, equations: Equations, state: State, time: Instants) -> list[str]:
     """Return the names of the constraints that a series could overlook."""
-    rows, hiding = group_rows(model), _hiding(equations, path, time)
-    return [name for k in hiding for name in model.rows[rows[k]][: model.system.groups[k].instances]]
+    rows, found = group_rows(model), hiding(equations, state, time)
+    return [name for k in found for name in model.rows[rows[k]][: model.system.groups[k].instances]]
 
 
 def look_ahead(
@@ -177,8 +194,9 @@ class _Signals:
     def __init__(self, equations: Equations, path: State, angles: Angles, time: Lanes):
         forces, groups = equations.system.forces, equations.system.groups
         drivers = tuple(group for group in groups if group.is_driver)
-        hiding, counts = _hiding(equations, path, time), [group.instances for group in (*forces, *drivers, *groups)]
-        joints = [groups[k] for k in hiding]
+        counts = [group.instances for group in (*forces, *drivers, *groups)]
+        watched = hiding(equations, path.map(lambda part: part[0]), time[None])
+        joints = [groups[k] for k in watched]
         bodies = sorted({body for group in (*forces, *joints) for slot in group.bodies for body in slot} - {0})
         places = {body: k for k, body in enumerate([0, *bodies])}
 
@@ -188,10 +206,10 @@ class _Signals:
         self._equations, self._time, self._drivers, self._given = equations, time, drivers, forces
         self._angles = angles
         self._forces = [among_these(group) for group in forces]
-        self._joints = [(among_these(group), scale) for group, scale in zip(joints, hiding.values(), strict=True)]
+        self._joints = [(among_these(group), scale) for group, scale in zip(joints, watched.values(), strict=True)]
         self._path = path.map(lambda part: part[:, :, np.array(bodies, int) - 1])  # of the bodies that these act on
         first, plain = np.cumsum([0, *counts]), len(forces) + len(drivers)
-        seen = [*range(plain), *(plain + k for k in hiding)]
+        seen = [*range(plain), *(plain + k for k in watched)]
         self.numbers = np.concatenate([np.arange(first[k], first[k + 1]) for k in seen] + [np.zeros(0, int)])
         self._split = sum(counts[: len(forces)]), sum(counts[:plain])
 
@@ -269,23 +287,6 @@ class _Signals:
         most = max(len(part) for part in parts)
         padded = [jnp.pad(part, ((0, most - len(part)), (0, 0), (0, 0))) for part in parts]
         return jnp.concatenate([jnp.broadcast_to(p, (*p.shape[:2], lanes)) for p in padded], axis=1)
-
-
-def _hiding(equations: Equations, path: State, time: Lanes) -> dict[int, Float[Numbers, "row instance 1"]]:
-    """Return which groups of constraints have residuals that a series could overlook, and the scales of their rows.
-
-    The law of a driver is looked at by itself.
-    """
-    pose, clock = equations.still(path.position[0], path.attitude[0]), Jet([time[None]])
-    found, first = {}, 0
-    for k, group in enumerate(equations.system.groups):
-        bare = law_left_out(group) if group.is_driver else group
-        program = jax.make_jaxpr(lambda pose, clock, bare=bare: bare.residual(pose, clock).coefficients[0])(pose, clock)
-        rows, count = program.out_avals[0].shape[0], group.instances
-        if not is_plain(program):
-            found[k] = equations.system.row_scale[first : first + rows * count].reshape(rows, count, -1)
-        first += rows * count
-    return found
 
 
 def _combined(

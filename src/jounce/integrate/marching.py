@@ -56,7 +56,7 @@ class IntegratorState(NamedTuple):
     angles: AnglesOfForces  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
     longest: Lanes  # step so far, s
     crossing: Indices  # number of steps, one after the other, too short to matter, over what is not known
-    balance: Balance | None  # of the energy, where all forces tell what they store
+    balance: Balance  # of the energy, where that is to be kept
 
 
 class DenseOutput(NamedTuple):
@@ -100,8 +100,7 @@ def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -
     known = np.zeros((bodies + 1, lanes)), np.zeros(time.shape, bool)
     angles = _measured(equations, state) if any(map(measures_angle, equations.system.forces)) else ()
     expansion, refused = Expansion(series, *rates), np.zeros(time.shape, int)
-    balance = jax.tree.map(np.asarray, unknown(lanes)) if is_balanced(equations) else None
-    counts = nothing, np.zeros(time.shape, int), balance
+    counts = nothing, np.zeros(time.shape, int), unknown(nothing)
     return IntegratorState(time, nothing, expansion, refused, opening, nothing, time, *known, none, angles, *counts)
 
 
@@ -125,7 +124,8 @@ def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) 
     known = mobility_of(equations, inverse), near_singular(equations, inverse)
     count = jnp.zeros(time.shape, int)
     began = time, nothing, expansion, count, outcome, nothing, time
-    balance = begun(energies(equations, state, time[None])) if is_balanced(equations) else None
+    balanced = is_balanced(equations, state, time[None])
+    balance = begun(energies(equations, state, time[None])) if balanced else unknown(nothing)
     return IntegratorState(*began, *known, none, angles, nothing, count, balance)
 
 
@@ -177,6 +177,8 @@ def march(
     """
     length = equations.system.column_scale[0]
     order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
+    begin = current.expansion.state.map(lambda part: part[0])
+    keeps = method.controlled and is_balanced(equations, begin, current.time[None])
 
     def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
         left = stop - current.time - current.rest
@@ -213,15 +215,14 @@ def march(
         if method.controlled:
             kick = 0.5 * order * (order + 1) * error
             good = good & ~(suspect & _lasting(kick, step, span, MARGIN * allowed, current))
-        balanced, balance = jnp.ones(step.shape, bool), None
-        if current.balance is not None:
+        balanced, balance = jnp.ones(step.shape, bool), current.balance
+        if keeps:
             found = energies(there, state, time[None])
             kick = MARGIN * allowed * order / jnp.maximum(jnp.abs(step), 1e-300)
             leeway = kick * length * jnp.sqrt(equations.scale * bodies)
             balance, balanced = follow_balance(current.balance, found, leeway)
             balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), begun(found), balance)
-            if method.controlled:
-                good = good & balanced
+            good = good & balanced
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(current.time), jnp.abs(stop - current.time))
         polynomial = method.polynomial(start, expansion, step)
         steps = DenseOutput(current.time, step, polynomial, look.kink, current.angles), good

@@ -345,7 +345,7 @@ class _Run:
         if names := unfit_rates(here, pose_coordinates(series), time):
             return Status.INADMISSIBLE, f"a derivative of {names} at t = {time:g} s"
         if current.outcome.item() == Outcome.UNBALANCED:
-            names = hiding_names(self.start.model, here.equations, series, np.asarray(current.time))
+            names = hiding_names(self.start.model, here.equations, series.map(lambda x: x[0]), np.array([[time]]))
             return Status.UNBALANCED, f"{', '.join(names) or 'all joints'} at t = {time:g} s"
         if current.crossing.item() >= STUCK:
             kink = int(self.parts[-1].kink[-1])
