@@ -21,8 +21,7 @@ import pytest
 import jounce as jn
 from jounce import jet
 from jounce.constraints import MotionLaw
-from jounce.kinematics import alone, side_by_side
-from jounce.kinematics import store as programs
+from jounce.kinematics import alone, side_by_side, store as programs
 from jounce.kinematics.alone import VARIABLE
 
 GROUND = ("ground", "rod")

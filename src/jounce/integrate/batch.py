@@ -192,7 +192,9 @@ class _Runs:
         """See `Batch`."""
         status = np.where(self._reached, int(Status.OK), int(Status.NOT_REACHED))
         stuck = np.flatnonzero(~self._reached.all(axis=1))
-        status[stuck, np.argmin(self._reached[stuck], axis=1)] = int(Status.COLLAPSED)
+        unbalanced = self._current.outcome[stuck] == Outcome.UNBALANCED
+        reasons = np.where(unbalanced, int(Status.UNBALANCED), int(Status.COLLAPSED))
+        status[stuck, np.argmin(self._reached[stuck], axis=1)] = reasons
         for values in self._values.values():
             finite = np.isfinite(values[:, :, : self.order + 1]).all(axis=(2, 3, 4))
             status[self._reached & ~finite] = int(Status.UNDEFINED)

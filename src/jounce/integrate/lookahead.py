@@ -1,9 +1,10 @@
-"""What a step would pass over unseen: applied forces and motion laws, looked at along its path before it is taken.
+"""What a step would pass over unseen: forces, motion laws and joints, looked at along its path before it is taken.
 
 A Taylor series knows what it has met. A pulse that lies ahead, in time or in place, leaves no trace in it, and both
 ends of a long step may lie beside the pulse. So forces and laws are evaluated on the polynomial of the step at many
 instants, and compared with the polynomial through a few of them: what is analytic over a step is given by these to
-rounding. Where they disagree, and where that would move the mechanism, the step is halved.
+rounding. Where they disagree, and where that would move the mechanism, the step is halved. So it is where the residual
+of a joint does not vanish all along: of those that a series could overlook, as `is_plain` tells.
 """
 
 from typing import Any, NamedTuple
@@ -13,28 +14,35 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.forward import Equations, Flags, Indices, Inverse, Lanes, State, with_ground
+from jounce.dynamics.forward import Equations, Flags, Indices, Instants, Inverse, Lanes, State, with_ground
 from jounce.integrate.events import INTERPOLATION, NODES
-from jounce.integrate.methods import evaluated
+from jounce.integrate.methods import MARGIN, evaluated
+from jounce.integrate.plain_programs import is_plain
 from jounce.integrate.turns import Angles
 from jounce.jet import Jet
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import with_turns
+from jounce.mechanism.builder import group_rows
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.element_indices import force_names
-from jounce.mechanism.system import Group
+from jounce.mechanism.system import Group, law_left_out
 from jounce.shapes import Numbers
 
-POINTS = 32  # at which each step is looked at
+POINTS = 32  # at which each step is looked at,
+ROUNDS_OF_JOINTS = 4  # times as many where joints are looked at
 SPAN_POINTS = 8192  # in the whole run, at least, where steps are few
-HARMLESS = 1e-12  # rad or sizes of the mechanism: what is overlooked may move a body by this
+HARMLESS = 1e-15  # rad or sizes of the mechanism: what is overlooked may move a body by this
 SHAKE = 2.0**-51  # relative change of state and time by which the rounding of a force is measured
 SPARSE = 5  # of so many nodes, one is used for that
 _SHAKEN = (NODES[::SPARSE], np.full(len(NODES[::SPARSE]), SHAKE))
 NOISE = 16.0  # times what it changes by is rounding still
 FAINT = 1e-13  # of a force: rounding of the polynomial through it
-SHORTEST = 1e-12  # of the run: a step over a jump of a force is not made shorter
-JUMP = 1e-6  # rad or sizes of the mechanism: no motion law jumps by more in such a step
+SHORTEST = 1e-12  # of the run: a step over a jump of a force is not longer,
+FINEST = 2.0**-60  # and so short if it can: no more than rounding of places and times,
+COARSER = 4.0  # times as long each time that it has not led over the jump: where that is depends on rounding
+AWAY = 1e-9  # of the run: who has taken so long a step is away from the jump before
+JUMP = 1e-6  # rad or sizes of the mechanism: no motion law and no joint jumps by more in such a step
+GAP = 1e-12  # rad or sizes of the mechanism: joints are not farther from being fulfilled on the way, unless allowed
 NEAR = 1.0 / 16.0  # of the way to where forces and laws are no longer known: a step ends that close
 
 
@@ -67,8 +75,33 @@ def mobility_of(equations: Equations, inverse: Inverse) -> BodyMobility:
 
 
 def watched_names(model: Model) -> list[str]:
-    """Return the names of the forces and drivers of a model, in the order in which they are looked at."""
-    return [f"forces.{name}" for name in force_names(model)] + list(model.drivers)
+    """Return the names of the forces, drivers and constraints of a model, in the order in which they are looked at."""
+    pairs = zip(model.system.groups, group_rows(model), strict=True)
+    constraints = [name for group, rows in pairs for name in model.rows[rows][: group.instances]]
+    return [f"forces.{name}" for name in force_names(model)] + list(model.drivers) + constraints
+
+
+def hiding(equations: Equations, state: State, time: Instants) -> dict[int, Float[Numbers, "row instance 1"]]:
+    """Return which groups of constraints have residuals that a series could overlook, and the scales of their rows.
+
+    The law of a driver is looked at by itself.
+    """
+    pose, clock = equations.still(state.position, state.attitude), Jet([time])
+    found, first = {}, 0
+    for k, group in enumerate(equations.system.groups):
+        bare = law_left_out(group) if group.is_driver else group
+        program = jax.make_jaxpr(lambda pose, clock, bare=bare: bare.residual(pose, clock).coefficients[0])(pose, clock)
+        rows, count = program.out_avals[0].shape[0], group.instances
+        if not is_plain(program):
+            found[k] = equations.system.row_scale[first : first + rows * count].reshape(rows, count, -1)
+        first += rows * count
+    return found
+
+
+def hiding_names(model: Model, equations: Equations, state: State, time: Instants) -> list[str]:
+    """Return the names of the constraints that a series could overlook."""
+    rows, found = group_rows(model), hiding(equations, state, time)
+    return [name for k in found for name in model.rows[rows[k]][: model.system.groups[k].instances]]
 
 
 def look_ahead(
@@ -80,8 +113,9 @@ def look_ahead(
     step: Lanes,
     span: Lanes,
     bound: Lanes,
+    shortest: Lanes,
 ) -> Lookahead:
-    """Return how far a step may go so that no force and no motion law on its way stays unseen.
+    """Return how far a step may go so that no force, no motion law and no joint on its way stays unseen.
 
     Parameters
     ----------
@@ -99,20 +133,19 @@ def look_ahead(
         Of the whole run, s: the longer the step in it, the more points it is looked at.
     bound : array of shape (batch,)
         By how much a body may move otherwise than seen, rad or sizes of the mechanism.
+    shortest : array of shape (batch,)
+        Step that may lead over a jump of a force, s: `finest`.
     """
-    groups = tuple(group for group in equations.system.groups if group.is_driver)
-    blank = jnp.full(step.shape, -1)
-    if not equations.system.forces and not groups:
+    signals, blank = _Signals(equations, path, angles, time), jnp.full(step.shape, -1)
+    if not signals.numbers.size:
         return Lookahead(step, jnp.ones(step.shape, bool), blank, blank)
-    signals = _Signals(equations, path, angles, time, groups)
-    bound, shortest = jnp.maximum(bound, HARMLESS), SHORTEST * jnp.maximum(span, jnp.abs(time))
+    bound = jnp.maximum(bound, HARMLESS)
 
     def seen(part: Any) -> Lookahead:
         away, moved = signals.departure(part * step, span, mobility)
         short = jnp.abs(part * step) <= shortest
-        allowed = jnp.where(short[None], signals.at_a_jump(bound), bound[None])
-        over = jnp.where(jnp.isfinite(moved), moved / allowed, jnp.inf)
-        resolved, index = jnp.all(over <= 1.0, axis=0), jnp.argmax(over, axis=0)
+        over = jnp.where(jnp.isfinite(moved), moved / signals.allowed(bound, short), jnp.inf)
+        resolved, index = jnp.all(over <= 1.0, axis=0), jnp.asarray(signals.numbers)[jnp.argmax(over, axis=0)]
         return Lookahead(part, resolved, jnp.where(jnp.any(away > 0, axis=0), index, -1), index)
 
     def open_(low: Any, high: Any) -> Any:
@@ -140,39 +173,69 @@ def look_ahead(
     return Lookahead(step * jnp.where(low > 0, low, high), low > 0, kink, best.limiting)
 
 
-class _Signals:
-    """Forces and motion laws of a mechanism along the path of a step; arrays have the instances and the batch last."""
+def finest(span: Lanes, time: Lanes, crossing: Indices) -> Lanes:
+    """Return how long a step over a jump may be, s, after so many that have not led over it: `crossings`."""
+    longer = jnp.minimum(FINEST * COARSER ** crossing.astype(float), SHORTEST)
+    return longer * jnp.maximum(span, jnp.abs(time))
 
-    def __init__(self, equations: Equations, path: State, angles: Angles, time: Lanes, drivers: tuple[Group, ...]):
-        forces = equations.system.forces
-        bodies = sorted({body for group in forces for slot in group.bodies for body in slot} - {0})
+
+def crossings(before: Indices, step: Lanes, kink: Indices, span: Lanes) -> Indices:
+    """Return how many steps over jumps there are one after the other, with one more step."""
+    over = (kink >= 0) & (jnp.abs(step) <= SHORTEST * span)
+    return jnp.where(over, before + 1, jnp.where(jnp.abs(step) > AWAY * span, 0, before))
+
+
+class _Signals:
+    """What is looked at along the path of a step: forces, motion laws, and joints that a series could overlook.
+
+    Arrays have the instances and the batch last. `numbers` tells where each instance is in `watched_names`.
+    """
+
+    def __init__(self, equations: Equations, path: State, angles: Angles, time: Lanes):
+        forces, groups = equations.system.forces, equations.system.groups
+        drivers = tuple(group for group in groups if group.is_driver)
+        counts = [group.instances for group in (*forces, *drivers, *groups)]
+        watched = hiding(equations, path.map(lambda part: part[0]), time[None])
+        joints = [groups[k] for k in watched]
+        bodies = sorted({body for group in (*forces, *joints) for slot in group.bodies for body in slot} - {0})
         places = {body: k for k, body in enumerate([0, *bodies])}
+
+        def among_these(group: Group) -> Group:
+            return Group(group.element, tuple(tuple(places[body] for body in slot) for slot in group.bodies))
+
         self._equations, self._time, self._drivers, self._given = equations, time, drivers, forces
         self._angles = angles
-        self._forces = [
-            Group(group.element, tuple(tuple(places[body] for body in slot) for slot in group.bodies))
-            for group in forces
-        ]
-        self._path = path.map(lambda part: part[:, :, np.array(bodies, int) - 1])  # of the bodies that forces act on
+        self._forces = [among_these(group) for group in forces]
+        self._joints = [(among_these(group), scale) for group, scale in zip(joints, watched.values(), strict=True)]
+        self._path = path.map(lambda part: part[:, :, np.array(bodies, int) - 1])  # of the bodies that these act on
+        first, plain = np.cumsum([0, *counts]), len(forces) + len(drivers)
+        seen = [*range(plain), *(plain + k for k in watched)]
+        self.numbers = np.concatenate([np.arange(first[k], first[k + 1]) for k in seen] + [np.zeros(0, int)])
+        self._split = sum(counts[: len(forces)]), sum(counts[:plain])
 
-    def at_a_jump(self, bound: Lanes) -> Signals:
-        """Return what is allowed over the shortest steps: forces may jump, laws hardly."""
-        forces = jnp.full((sum(group.instances for group in self._given), *bound.shape), jnp.finfo(float).max)
-        laws = jnp.full((sum(group.instances for group in self._drivers), *bound.shape), JUMP)
-        return jnp.concatenate([forces, jnp.maximum(laws, bound[None])])
+    def allowed(self, bound: Lanes, short: Flags) -> Signals:
+        """Return what may be overlooked; over the shortest steps forces may jump, laws and joints hardly."""
+        forces, laws = self._split
+        place = np.arange(len(self.numbers))[:, None]
+        least = jnp.where(place < laws, bound[None], jnp.maximum(MARGIN * bound, GAP)[None])
+        jump = jnp.where(place < forces, jnp.finfo(float).max, jnp.maximum(JUMP, bound)[None])
+        return jnp.where(short[None], jump, least)
 
     def departure(self, step: Lanes, span: Lanes, mobility: BodyMobility) -> tuple[Signals, Signals]:
         """Return how far forces and laws are from the polynomials through the nodes of a step, and what that moves.
 
-        What may be rounding is taken off. The second is in rad or sizes of the mechanism:
-        of a force, what its departure over the step moves bodies by in the whole run.
+        Of joints, how far they are from being fulfilled. What may be rounding is taken off. The second is in rad or
+        sizes of the mechanism: of a force, what its departure over the step moves bodies by in the whole run.
         """
         places, shakes = (np.concatenate(parts) for parts in zip((NODES, 0.0 * NODES), _SHAKEN, strict=True))
         found = jax.vmap(lambda s, shake: self._values(s * step, shake))(places, shakes)
         knots, shaken = found[: len(NODES)], found[len(NODES) :]
         coefficients = _combined(INTERPOLATION, knots)
+        if self._joints:
+            coefficients = coefficients * (np.arange(len(self.numbers)) < self._split[1])[:, None]
+        least = ROUNDS_OF_JOINTS if self._joints else 1
         wanted = jnp.max(jnp.where(span > 0, jnp.abs(step) / span, 0.0)) * (SPAN_POINTS / POINTS)
-        rounds = jnp.clip(jnp.ceil(wanted), 1, SPAN_POINTS // POINTS)
+        rounds = jnp.clip(jnp.ceil(wanted), least, SPAN_POINTS // POINTS)
         count = rounds * POINTS
         size = jnp.max(jnp.abs(knots), axis=0)
         noise = NOISE * jnp.max(jnp.abs(shaken - knots[::SPARSE]), axis=0) + FAINT * size
@@ -200,7 +263,7 @@ class _Signals:
             departure = largest[first : first + group.instances]
             parts.append(departure if is_turning(group.element) else departure / length)
             first += group.instances
-        return jnp.concatenate(parts)
+        return jnp.concatenate([*parts, largest[first:]])
 
     def _values(self, since: Lanes, shake: Float[Numbers, ""] | float) -> Float[Numbers, "component instance batch"]:
         """Return forces and laws a time after the beginning of the step.
@@ -209,15 +272,18 @@ class _Signals:
         """
         lanes = since.shape[-1]
         clock = Jet.variable(((self._time + since) * (1.0 + shake))[None], 1)
-        parts = []
-        if self._forces:
+        parts, pose = [], None
+        if self._forces or self._joints:
             state = evaluated(self._path, since).map(lambda part: part * (1.0 + shake * _signs(part.shape[:2])))
             pose = self._equations.pose(state)
+        if self._forces:
             forces = with_turns(self._forces, self._angles.at(since))
             parts += [group.force(pose, clock).coefficients[0] for group in forces]
         for group in self._drivers:
             law = group.element.motion(clock).coefficients[0]
             parts.append(jnp.broadcast_to(law, (group.instances, lanes))[None])
+        for group, scale in self._joints:
+            parts.append(group.residual(pose.truncate(0), clock.truncate(0)).coefficients[0] * scale)
         most = max(len(part) for part in parts)
         padded = [jnp.pad(part, ((0, most - len(part)), (0, 0), (0, 0))) for part in parts]
         return jnp.concatenate([jnp.broadcast_to(p, (*p.shape[:2], lanes)) for p in padded], axis=1)

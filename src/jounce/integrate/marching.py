@@ -9,8 +9,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, expand, inverted
-from jounce.integrate.lookahead import HARMLESS, SHORTEST, Lookahead, look_ahead, mobility_of
-from jounce.integrate.methods import AbstractMethod, Number, near_singular
+from jounce.integrate.energy_balance import Balance, begun, energies, followed as follow_balance, is_balanced, unknown
+from jounce.integrate.lookahead import FINEST, HARMLESS, SHORTEST, Lookahead, crossings, finest, look_ahead, mobility_of
+from jounce.integrate.methods import MARGIN, NEEDED, AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import AnglesOfForces, followed, measured
 from jounce.kinematics.compilation import compiled
@@ -18,8 +19,10 @@ from jounce.kinematics.kernels import LIBRARIES, in_one_piece
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.shapes import Numbers
 
-SMALLEST_STEP = 1e-13  # of the span, or of the time itself
-MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
+SMALLEST_STEP = FINEST / 8.0  # of the span, or of the time itself
+REFUSED = 0.45  # of a step that was refused is tried next: no power of two, or it would end where others have ended
+SHORT = 1.0 / 4.0  # of the longest step so far: shorter ones leave out as much less
+STUCK = 64  # steps over a jump one after the other: a force that switches without end
 STUBBORN = 3  # steps refused one after the other: no series that is only too short for its step needs so many
 
 
@@ -31,6 +34,7 @@ class Outcome(enum.IntEnum):
     COLLAPSED = 2  # steps became too small to move on
     LOST = 3  # the motion is not finite from the start
     UNEXPANDED = 4  # the motion is to be expanded at the start, by the first of the steps tried
+    UNBALANCED = 5  # the energy would change, though nothing takes or gives any
 
 
 MOVING = np.array([Outcome.RUNNING, Outcome.UNEXPANDED])
@@ -40,6 +44,7 @@ class IntegratorState(NamedTuple):
     """How far a batch of runs has come."""
 
     time: Lanes  # s
+    rest: Lanes  # what the time is greater by than that number, which is rounded, s
     expansion: Expansion
     refused: Indices  # number of steps refused from here, one after the other
     outcome: Indices  # see Outcome
@@ -49,6 +54,9 @@ class IntegratorState(NamedTuple):
     singular: Flags  # whether the equations of motion are near to singular here
     blocked: Indices  # index of the force or law over which no step is possible from here, or -1
     angles: AnglesOfForces  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
+    longest: Lanes  # step so far, s
+    crossing: Indices  # number of steps, one after the other, too short to matter, over what is not known
+    balance: Balance  # of the energy, where that is to be kept
 
 
 class DenseOutput(NamedTuple):
@@ -92,7 +100,8 @@ def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -
     known = np.zeros((bodies + 1, lanes)), np.zeros(time.shape, bool)
     angles = _measured(equations, state) if any(map(measures_angle, equations.system.forces)) else ()
     expansion, refused = Expansion(series, *rates), np.zeros(time.shape, int)
-    return IntegratorState(time, expansion, refused, opening, nothing, time, *known, none, angles)
+    counts = nothing, np.zeros(time.shape, int), unknown(nothing)
+    return IntegratorState(time, nothing, expansion, refused, opening, nothing, time, *known, none, angles, *counts)
 
 
 @compiled(narrow=True, alone=True)
@@ -113,7 +122,11 @@ def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) 
     outcome = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
     none, nothing = jnp.full(time.shape, -1), jnp.zeros(time.shape)
     known = mobility_of(equations, inverse), near_singular(equations, inverse)
-    return IntegratorState(time, expansion, jnp.zeros(time.shape, int), outcome, nothing, time, *known, none, angles)
+    count = jnp.zeros(time.shape, int)
+    began = time, nothing, expansion, count, outcome, nothing, time
+    balanced = is_balanced(equations, state, time[None])
+    balance = begun(energies(equations, state, time[None])) if balanced else unknown(nothing)
+    return IntegratorState(*began, *known, none, angles, nothing, count, balance)
 
 
 def _is_one(_: Equations, current: IntegratorState, *__: Any, **___: Any) -> bool:
@@ -163,22 +176,31 @@ def march(
         How many of them there are.
     """
     length = equations.system.column_scale[0]
-    order = len(current.expansion.state.position) - 1
+    order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
+    begin = current.expansion.state.map(lambda part: part[0])
+    keeps = method.controlled and is_balanced(equations, begin, current.time[None])
 
     def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
-        left = stop - current.time
-        start, reach, allowed = method.prepared(current.expansion, length, tolerance, current.singular)
-        step = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left))) * 0.5 ** current.refused.astype(float)
+        left = stop - current.time - current.rest
+        usual = SHORT * current.longest
+        start, reach, allowed = method.prepared(current.expansion, length, tolerance, current.singular, usual)
+        step = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left))) * REFUSED ** current.refused.astype(float)
         look = Lookahead(jnp.sign(left) * step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), current.blocked)
         angles = followed(equations, current.angles, start.state, look.step)
+        span = jnp.abs(stop - current.begun)
         if method.controlled:
-            span, bound = jnp.abs(stop - current.begun), MARGIN * allowed
-            look = look_ahead(equations, start.state, angles, current.mobility, current.time, look.step, span, bound)
+            bound = allowed
+            shortest = finest(span, current.time, current.crossing)
+            look = look_ahead(
+                equations, start.state, angles, current.mobility, current.time, look.step, span, bound, shortest
+            )
         suspect = (look.kink >= 0) & (jnp.abs(look.step) < step) | (current.refused >= STUBBORN)
         step = jnp.abs(look.step)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
         step = jnp.where(last, left, jnp.sign(left) * step)
-        time = jnp.where(last, stop, current.time + step)
+        since = step + current.rest
+        time = jnp.where(last, stop, current.time + since)
+        rest = jnp.where(last, 0.0, since - (time - current.time))
         running, opening = (current.outcome == int(x) for x in (Outcome.RUNNING, Outcome.UNEXPANDED))
         step = jnp.where(running, step, 0.0)
         time = jnp.where(running, time, current.time)
@@ -192,19 +214,45 @@ def march(
         good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.resolved
         if method.controlled:
             kick = 0.5 * order * (order + 1) * error
-            good = good & ~(suspect & _lasting(kick, step, jnp.abs(stop - current.begun), MARGIN * allowed, current))
+            good = good & ~(suspect & _lasting(kick, step, span, MARGIN * allowed, current))
+        balanced, balance = jnp.ones(step.shape, bool), current.balance
+        if keeps:
+            found = energies(there, state, time[None])
+            kick = MARGIN * allowed * order / jnp.maximum(jnp.abs(step), 1e-300)
+            leeway = kick * length * jnp.sqrt(equations.scale * bodies)
+            balance, balanced = follow_balance(current.balance, found, leeway)
+            balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), begun(found), balance)
+            good = good & balanced
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(current.time), jnp.abs(stop - current.time))
         polynomial = method.polynomial(start, expansion, step)
         steps = DenseOutput(current.time, step, polynomial, look.kink, current.angles), good
         outcome = jnp.where(good & last, int(Outcome.ARRIVED), current.outcome)
-        outcome = jnp.where(running & ~good & tiny, int(Outcome.COLLAPSED), outcome)
+        stopped = jnp.where(balanced, int(Outcome.COLLAPSED), int(Outcome.UNBALANCED))
+        outcome = jnp.where(running & ((~good & tiny) | (current.crossing >= STUCK)), stopped, outcome)
         opened = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
         outcome = jnp.where(opening, opened, outcome)
         drift = jnp.where(opening, current.drift, jnp.maximum(current.drift, distance))
         none = jnp.full(step.shape, -1)
         known = mobility_of(equations, inverse), near_singular(equations, inverse)
         fresh, reached = jnp.zeros_like(current.refused), measured(there, state)
-        onwards = IntegratorState(time, expansion, fresh, outcome, drift, current.begun, *known, none, reached)
+        farthest = jnp.where(reach > longest, jnp.minimum(jnp.minimum(reach, longest / SHORT), span), jnp.abs(step))
+        farthest = jnp.maximum(current.longest, farthest)
+        crossing = crossings(current.crossing, step, look.kink, span)
+        onwards = IntegratorState(
+            time,
+            rest,
+            expansion,
+            fresh,
+            outcome,
+            drift,
+            current.begun,
+            *known,
+            none,
+            reached,
+            farthest,
+            crossing,
+            balance,
+        )
         blocked = jnp.where(look.resolved, current.blocked, look.limiting)
         refused = current._replace(refused=current.refused + 1, outcome=outcome, blocked=blocked)
         return jax.tree.map(lambda a, b: jnp.where(good | opening, a, b), onwards, refused), steps
@@ -254,5 +302,6 @@ def _kept(expansion: Expansion) -> Expansion:
 
 
 def _finite(expansion: Expansion) -> Flags:
-    parts = [jnp.all(jnp.isfinite(x.reshape(-1, x.shape[-1])), axis=0) for x in jax.tree.leaves(expansion)]
+    needed = [x[:NEEDED] for x in jax.tree.leaves(expansion)]
+    parts = [jnp.all(jnp.isfinite(x.reshape(-1, x.shape[-1])), axis=0) for x in needed]
     return jnp.all(jnp.stack(parts), axis=0)

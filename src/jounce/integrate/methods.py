@@ -21,10 +21,14 @@ Sizes = Float[Numbers, "order batch"]
 
 HIGHEST_ORDER = 40
 LOWEST_ORDER = 4
+NEEDED = (
+    LOWEST_ORDER + 2
+)  # coefficients that must be finite: beside a jump of a force higher ones are rounding, or none
 FAINT = 1e-10  # what grows in the upper coefficients from an amplitude below is rounding, near a singular position
 BRACED = 20.0  # in multiples of the largest mass, by a gap of one: 30 and more where coefficients drown, else below 26
 NEAR = 1e-6  # rad or sizes of the mechanism: what a body moves within the radius of a series near a pole
 ROUGH = 1e-11  # tolerance of a step there, rad or sizes of the mechanism
+MARGIN = 10.0  # an estimate of the error that is so many times the tolerance is still accepted: estimates are rough
 ROUNDING = 1e-14  # relative error of an acceleration that is no sign of a step too long
 
 
@@ -57,9 +61,13 @@ class AbstractMethod(Module):
         """
 
     def prepared(
-        self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags
+        self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags, usual: Lanes
     ) -> tuple[Expansion, Lanes, Lanes]:
         """Return the expansion as the step shall use it, how far that may go, s, and by which tolerance to judge it.
+
+        Steps that are shorter than usual, as those from a jump of a force on, may leave out less (`in_proportion`): a
+        place that is wrong by so much means a velocity that is wrong by as much by the time of the step, and that goes
+        on to the end of the run.
 
         Parameters
         ----------
@@ -71,9 +79,11 @@ class AbstractMethod(Module):
             Of the error of the step, rad or sizes of the mechanism.
         singular : array of bool, shape (batch,)
             Whether the equations of motion are near to singular there, as `near_singular` tells.
+        usual : array of shape (batch,)
+            Length of a step that is not short, s; zero where none is known.
         """
         step = self.longest_step(coefficient_sizes(expansion, length), tolerance)
-        return expansion, step, jnp.full(step.shape, tolerance)
+        return expansion, step, in_proportion(jnp.full(step.shape, tolerance), step, usual)
 
     @abc.abstractmethod
     def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
@@ -131,15 +141,22 @@ def _drowned(sizes: Sizes) -> Flags:
 
 
 def coefficient_sizes(expansion: Expansion, length: Number) -> Sizes:
-    """Return the sizes of the Taylor coefficients 1 to order + 1 of positions, rad or sizes of the mechanism."""
+    """Return the sizes of the Taylor coefficients 1 to order + 1 of positions, rad or sizes of the mechanism.
+
+    Those that are no finite numbers are infinite.
+    """
     velocity, spin = (jnp.max(jnp.abs(c), axis=(1, 2)) for c in expansion.state[2:])
     sizes = jnp.maximum(velocity / length, spin) / jnp.arange(1.0, len(velocity) + 1)[:, None]
     attitude = expansion.state.attitude
     if attitude.shape[1] == 1:
-        return sizes
+        return _finite_or_infinite(sizes)
     # Euler parameters of a body that spins evenly go on where its angular velocity has no more terms
     turned = 2.0 * jnp.max(jnp.abs(attitude[1:]), axis=(1, 2))
-    return jnp.concatenate([jnp.maximum(sizes[:-1], turned), sizes[-1:]])
+    return _finite_or_infinite(jnp.concatenate([jnp.maximum(sizes[:-1], turned), sizes[-1:]]))
+
+
+def _finite_or_infinite(sizes: Sizes) -> Sizes:
+    return jnp.where(jnp.isfinite(sizes), sizes, jnp.inf)
 
 
 def reach(sizes: Sizes, first: int) -> Lanes:
@@ -152,7 +169,12 @@ def reach(sizes: Sizes, first: int) -> Lanes:
     return jnp.min(roots, axis=0)
 
 
-def furthest(sizes: Sizes, allowed: Lanes) -> tuple[Bool[Numbers, "order batch"], Lanes]:
+def in_proportion(allowed: Lanes, step: Lanes, usual: Lanes) -> Lanes:
+    """Return the error that is allowed of steps, less of those that are shorter than usual."""
+    return allowed * jnp.minimum(step / jnp.maximum(usual, 1e-300), 1.0)
+
+
+def furthest(sizes: Sizes, allowed: Lanes, usual: Lanes | None = None) -> tuple[Bool[Numbers, "order batch"], Lanes]:
     """Return which coefficients of series to keep, from order zero on, so that they carry furthest, and how far, s.
 
     Parameters
@@ -161,6 +183,9 @@ def furthest(sizes: Sizes, allowed: Lanes) -> tuple[Bool[Numbers, "order batch"]
         Of the coefficients from order one on.
     allowed : array of shape (batch,)
         Error of a step.
+    usual : array of shape (batch,), optional
+        Length of steps, s, below which the error is allowed by the square of the proportion: rounding beside a jump
+        grows from term to term, so that all that is allowed is left out.
     """
     orders = np.arange(1.0, len(sizes) + 1)
     roots = -jnp.log(jnp.maximum(sizes, 1e-300)) / orders[:, None]  # logarithms: powers would cost far more
@@ -168,6 +193,9 @@ def furthest(sizes: Sizes, allowed: Lanes) -> tuple[Bool[Numbers, "order batch"]
     counted = (orders >= (cuts + 1) // 2) & (orders <= cuts + 1)  # the upper half of what is kept, and the next
     reaches = jnp.min(jnp.where(counted[:, :, None], roots[None], jnp.inf), axis=1)
     steps = reaches + jnp.log(allowed)[None] / (cuts + 1.0)
+    if usual is not None:
+        shorter = (cuts + 1.0) * steps - 2.0 * jnp.log(jnp.maximum(usual, 1e-300))[None]
+        steps = jnp.minimum(steps, shorter / (cuts - 1.0))
     best = jnp.argmax(steps, axis=0)
     kept = np.arange(len(sizes))[:, None] <= best[None] + LOWEST_ORDER
     return kept, jnp.exp(jnp.max(steps, axis=0))
@@ -211,7 +239,7 @@ class Taylor(AbstractMethod):
         return reach(sizes, count // 2) * tolerance ** (1.0 / count)
 
     def prepared(
-        self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags
+        self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags, usual: Lanes
     ) -> tuple[Expansion, Lanes, Lanes]:
         """Return the series cut where it carries furthest, and how far that is.
 
@@ -220,15 +248,15 @@ class Taylor(AbstractMethod):
         the distance from there, and steps that keep it small would come near, and nearer.
         """
         if self.step is not None:
-            return super().prepared(expansion, length, tolerance, singular)
+            return super().prepared(expansion, length, tolerance, singular, usual)
         sizes = coefficient_sizes(expansion, length)
         allowed = jnp.where(singular & _drowned(sizes), jnp.maximum(tolerance, ROUGH), tolerance)
-        kept, step = furthest(sizes, allowed)
+        kept, step = furthest(sizes, allowed, usual)
 
         def cut(part: Any) -> Any:
             return jnp.where(kept[:, None, None], part, 0.0)
 
-        return expansion._replace(state=expansion.state.map(cut)), step, allowed
+        return expansion._replace(state=expansion.state.map(cut)), step, in_proportion(allowed, step, usual)
 
     def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
         """Return the value of the series."""

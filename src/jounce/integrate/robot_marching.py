@@ -11,8 +11,8 @@ import jax.numpy as jnp
 from jaxtyping import Bool, Float, Int
 
 from jounce.integrate.lookahead import HARMLESS, POINTS, SHORTEST, SPAN_POINTS
-from jounce.integrate.marching import MARGIN, Outcome
-from jounce.integrate.methods import ROUNDING, Lanes, furthest
+from jounce.integrate.marching import Outcome
+from jounce.integrate.methods import MARGIN, ROUNDING, Lanes, furthest
 from jounce.jet.series import Recursion
 from jounce.kinematics.compilation import compiled
 from jounce.modules import Module

@@ -14,8 +14,8 @@ from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
 from jounce.integrate.events import Event, EventDetector, EventLog, pose_coordinates
-from jounce.integrate.lookahead import watched_names
-from jounce.integrate.marching import MOVING, DenseOutput, IntegratorState, Outcome, march, unexpanded
+from jounce.integrate.lookahead import hiding_names, watched_names
+from jounce.integrate.marching import MOVING, STUCK, DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.methods import AbstractMethod, evaluated
 from jounce.integrate.options import checked_options, instants_of
 from jounce.integrate.programs_ahead import STEPS, ProgramsAhead
@@ -325,7 +325,7 @@ class _Run:
                 progress(int(np.sum(sense * instants <= sense * current.time.item())), len(instants))
         if not self.parts:
             self._stand(current)
-        if current.outcome.item() in (Outcome.COLLAPSED, Outcome.LOST):
+        if current.outcome.item() in (Outcome.COLLAPSED, Outcome.LOST, Outcome.UNBALANCED):
             self.ending = self._explained(current)
 
     def _stand(self, current: IntegratorState) -> None:
@@ -346,6 +346,13 @@ class _Run:
                 return Status.INADMISSIBLE, f"{names} at t = {instant:g} s"
         if names := unfit_rates(here, pose_coordinates(series), time):
             return Status.INADMISSIBLE, f"a derivative of {names} at t = {time:g} s"
+        if current.outcome.item() == Outcome.UNBALANCED:
+            names = hiding_names(self.start.model, here.equations, series.map(lambda x: x[0]), np.array([[time]]))
+            return Status.UNBALANCED, f"{', '.join(names) or 'all joints'} at t = {time:g} s"
+        if current.crossing.item() >= STUCK:
+            kink = int(self.parts[-1].kink[-1])
+            words = "switches without end, as dry friction does at rest: smooth it, as by tanh(v/v0)"
+            return Status.COLLAPSED, f"{watched_names(self.start.model)[kink]} at t = {time:g} s {words}"
         if (blocked := current.blocked.item()) >= 0:
             return Status.COLLAPSED, f"{watched_names(self.start.model)[blocked]} at t = {time:g} s"
         acceleration = np.abs(np.asarray(current.expansion.acceleration[0])[..., 0])

@@ -16,6 +16,7 @@ class Status(enum.IntEnum):
     COLLAPSED = 7
     UNDEFINED = 8
     INCONSISTENT = 9
+    UNBALANCED = 10
 
     @property
     def advice(self) -> str:
@@ -42,5 +43,8 @@ _ADVICE = {
     "last axes are parallel; ask for a lower order, for another sequence, or leave it out",
     Status.INCONSISTENT: "redundant constraints contradict each other here: they agree at the start, and not all along "
     "the motion; correct lengths, axes and laws of those named, or free a direction there",
+    Status.UNBALANCED: "the energy of the motion would change here, though nothing takes or gives any: a joint has a "
+    "kink or a jump, at which velocities would have to jump, too, or a feature too narrow for the steps; make its "
+    "residual smooth, or ask for a `longest_step` as short as the feature",
     Status.NOT_REACHED: "not computed, because the motion could not be followed up to here",
 }

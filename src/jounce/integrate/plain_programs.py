@@ -1,0 +1,82 @@
+"""What a Taylor series cannot overlook: programs of few sums, products, sines and cosines.
+
+The first coefficients of a polynomial of low degree tell all of it, wherever it is looked at, and those of a sine its
+waves. Those of a bell, a step or a table tell nothing of what lies beside the place.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+from jax.extend.core import ClosedJaxpr, Literal
+
+from jounce.jet.operations import ADDITIVE, REARRANGING
+from jounce.jet.programs import inner_program
+
+HIGHEST_DEGREE = 8  # of what is moving: a power such as x**40 is flat, and then a wall
+SUMS = (ADDITIVE | REARRANGING | frozenset(["neg", "optimization_barrier"])) - {"select_n", "gather", "dynamic_slice"}
+WAVES = frozenset(["sin", "cos"])
+PRODUCTS = frozenset(["mul", "dot_general"])
+
+
+def is_plain(program: ClosedJaxpr) -> bool:
+    """Tell whether a program is of sums, products, sines and cosines of its arguments, and of low degree.
+
+    Examples
+    --------
+    >>> import jax
+    >>> is_plain(jax.make_jaxpr(lambda x, y: x * x * y - jax.numpy.cos(3.0 * x) / 7.0)(1.0, 2.0))
+    True
+    >>> is_plain(jax.make_jaxpr(lambda x: x - jax.numpy.exp(-x * x))(1.0))
+    False
+    """
+    degrees = _degrees(program.jaxpr, [1] * len(program.jaxpr.invars))
+    return degrees is not None and max(degrees, default=0) <= HIGHEST_DEGREE
+
+
+def uses(program: ClosedJaxpr) -> bool:
+    """Tell whether the results of a program depend on its arguments.
+
+    Examples
+    --------
+    >>> import jax
+    >>> uses(jax.make_jaxpr(lambda t: 3.0 + 0.0)(1.0)), uses(jax.make_jaxpr(lambda t: jax.numpy.exp(t))(1.0))
+    (False, True)
+    """
+    degrees = _degrees(program.jaxpr, [1] * len(program.jaxpr.invars))
+    return degrees is None or any(degrees)
+
+
+def _degrees(jaxpr: Any, arguments: Sequence[int]) -> list[int] | None:
+    """Return the degrees of the results in what moves, zero for what does not; None where there is none."""
+    known: dict[Any, int] = dict.fromkeys(jaxpr.constvars, 0) | dict(zip(jaxpr.invars, arguments, strict=True))
+
+    def of(variable: Any) -> int:
+        return 0 if isinstance(variable, Literal) else known[variable]
+
+    for equation in jaxpr.eqns:
+        degrees = [of(x) for x in equation.invars]
+        found = [0] * len(equation.outvars) if not any(degrees) else _made(equation, degrees)
+        if found is None:
+            return None
+        known.update(zip(equation.outvars, found, strict=True))
+    return [of(x) for x in jaxpr.outvars]
+
+
+def _made(equation: Any, degrees: list[int]) -> list[int] | None:
+    """Return the degrees of the results of an operation."""
+    name, inner = equation.primitive.name, inner_program(equation.params)
+    if name in SUMS:
+        return [max(degrees)] * len(equation.outvars)
+    if name in PRODUCTS:
+        return [sum(degrees)]
+    if name in WAVES:
+        return degrees
+    if name == "square":
+        return [2 * degrees[0]]
+    if name == "integer_pow" and equation.params["y"] > 0:
+        return [equation.params["y"] * degrees[0]]
+    if name == "div" and not degrees[1]:
+        return degrees[:1]
+    if inner is not None and name not in ("while", "scan", "cond"):
+        return _degrees(getattr(inner, "jaxpr", inner), degrees)
+    return None
