@@ -32,7 +32,7 @@ class Wire(jn.AbstractConstraint, type="outside_wire", space="planar"):
     height: jn.Scalar
     width: jn.Scalar
 
-    def residual(self, body_i, body_j, time):  # noqa: ARG002 - the wire is at rest
+    def residual(self, body_i, body_j, time):
         """Vanish where the bead is on the wire."""
         x, y = body_j.position[0], body_j.position[1]
         u = (x - 1.0) / self.width
@@ -54,7 +54,7 @@ def bead(height, width, speed):
     )
 
 
-@pytest.mark.parametrize(("height", "passes"), [(0.19, True), (0.22, False)])
+@pytest.mark.parametrize("height, passes", [(0.19, True), (0.22, False)])
 def test_a_bead_passes_a_bump_only_with_energy_for_it(height, passes):
     """Bead on a wire of any shape (physicsanimations.org, "Bead on a Wire", checks kinetic plus potential energy).
 
@@ -148,7 +148,7 @@ class Tuned:
 
     stiffness = 1.0
 
-    def __call__(self, t, q, rate):  # noqa: ARG002 - the signature of a feedback law
+    def __call__(self, t, q, rate):
         """Return the torque of the joint."""
         return -self.stiffness * q - 2.0 * rate
 
@@ -171,7 +171,7 @@ def test_a_loop_over_gains_of_one_controller_object():
 DRAG = 0.5  # N s/m
 
 
-def drag(x, v, t):  # noqa: ARG001 - the signature of a law
+def drag(x, v, t):
     """Return a force that a global constant decides."""
     return -DRAG * v
 
