@@ -40,6 +40,41 @@ def test_peaks_do_not_depend_on_the_instants(count):
     assert peaks(motion) is peaks(motion)
 
 
+KNOT = 1 / 3
+# from rest by t^4, then on with what its velocity and acceleration are at the knot: jerk and jounce end there
+BRAKED = f"{KNOT}**4 + 4*{KNOT}**3*(t - {KNOT}) + 6*{KNOT}**2*(t - {KNOT})**2"
+
+
+KINKED = jn.ExpressionMotion(jn.Expression("abs(t - a)**3*(1 - abs(t - a))/6"), {"a": KNOT})  # sign (1 - 4 |t - a|)
+
+
+@pytest.mark.parametrize(
+    "law, order, value",
+    [
+        (jn.PiecewiseMotion(["t**4", BRAKED], until=[KNOT]), 3, 24 * KNOT),
+        (KINKED, 3, 1.0),
+        (KINKED, 3, -1.0),
+    ],
+)
+@pytest.mark.parametrize("count", [4, 14, 301])
+def test_a_peak_at_a_knot_is_the_limit_from_its_side(law, order, value, count):
+    driver = dataclasses.replace(CRANK.drivers["turn"], motion=law)
+    motion = jn.solve(dataclasses.replace(CRANK, drivers={"turn": driver}), np.linspace(0.0, 0.5, count), order=4)
+    peak = peaks(motion)[order]
+    found, at = (peak.maximum, peak.maximum_at) if value > 0 else (peak.minimum, peak.minimum_at)
+    assert found == pytest.approx(value, rel=1e-9)
+    assert at == pytest.approx(KNOT, abs=1e-11)
+
+
+def test_the_end_of_a_law_at_the_end_of_the_time_is_seen_from_before():
+    """A 3-4-5 profile ends with the jerk that it begins with, 60 by way and duration, where the law is at rest."""
+    law = jn.SegmentedMotion([jn.Segment("polynomial_3_4_5", 0.5, by=0.1)], beyond="hold")
+    driver = dataclasses.replace(CRANK.drivers["turn"], motion=law)
+    motion = jn.solve(dataclasses.replace(CRANK, drivers={"turn": driver}), np.linspace(0.0, 0.5, 6), order=3)
+    jerk = peaks(motion)[3]
+    assert jerk.maximum == pytest.approx(60 * 0.1 / 0.5**3, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     "minimum, maximum, largest",
     [

@@ -453,3 +453,41 @@ def test_a_killed_worker_and_a_killed_client_lose_nothing(tmp_path):
     assert client.returncode == 0, errors
     assert kept
     assert text.strip() == swept(tmp_path / "whole.zarr", chunk=4).attrs["checksum"]
+
+
+def test_peaks_at_the_knots_of_a_law_are_kept_of_every_design(tmp_path):
+    """A 3-4-5 profile, whose jerk is 60 by way and duration at both ends, at instants that depend on the design."""
+    law = jn.SegmentedMotion([jn.Segment("dwell", "T/3"), jn.Segment("polynomial_3_4_5", "T", by=0.1)], beyond="hold")
+    crank = jn.Mechanism(
+        space="planar",
+        parameters={"T": 0.5},
+        bodies={"crank": jn.Body([0, 0])},
+        joints={"O": jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])},
+        drivers={"turn": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion=law)},
+        outputs={"angle": jn.AngleOutput("crank")},
+    )
+    durations = np.array([0.4, 0.5, 0.7])
+    settings = {"time": np.linspace(0.0, 1.0, 8), "order": 3, "workers": 0}
+    found = jn.sweep(crank, {"T": durations.tolist()}, tmp_path / "sweep.zarr", **settings)
+    np.testing.assert_allclose(found["angle_peak"].values[:, 3], 6 / durations**3, rtol=1e-8)
+    np.testing.assert_allclose(found["angle_max"].values[:, 3], 6 / durations**3, rtol=1e-8)
+    at = found["angle_peak_time"].values[:, 3]
+    assert np.minimum(np.abs(at - durations / 3), np.abs(at - durations * 4 / 3)).max() < 1e-12
+
+
+def test_torque_rates_at_the_knots_of_a_law_are_kept(tmp_path):
+    """A rod about a vertical axis: its torque is the acceleration by its inertia, whose rate jumps at the knot."""
+    rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    pin = jn.Joint("pin", "base", "rod", axis=[0, 0, 1])
+    robot = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", rod)], [pin])
+    knot = 0.337
+    law = jn.PiecewiseMotion(["t**4", f"{knot}**4 + 4*{knot}**3*(t-{knot}) + 6*{knot}**2*(t-{knot})**2"], until=[knot])
+    trajectory = jn.JointTrajectory({"pin": law}, start=0.0, stop=0.5, times=np.linspace(0.0, 0.5, 6))
+    swept_torques = Torques(robot, trajectory, rates=1)
+    from jounce.sweeps.statistics import statistics
+
+    histories = swept_torques.histories({"speed": np.array([1.0, 2.0])}, 1)
+    beside = histories.sides.values["pin"], histories.sides.instants
+    told = statistics(histories.values["pin"], swept_torques.instants, histories.pace, beside)
+    np.testing.assert_allclose(told["peak"][:, 1], 24 * knot / 3 * np.array([1.0, 2.0**3]), rtol=1e-9)
+    np.testing.assert_allclose(told["peak_time"][:, 1], [knot, knot / 2], rtol=1e-12)

@@ -5,6 +5,7 @@ import itertools
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+import jax
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -27,12 +28,14 @@ from jounce.mechanism import (
     with_outputs_held,
 )
 from jounce.mechanism.axis_angles import measures_angle
-from jounce.mechanism.law_breaks import breaks_of_laws, laws_may_break
+from jounce.mechanism.law_breaks import breaks_of_laws, laws_may_break, laws_of
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
+from jounce.precision import double_precision
 from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory.breaks import both_sides
+from jounce.trajectory.motion import SplineMotion
 from jounce.trajectory.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
@@ -81,7 +84,8 @@ def solve_batch(
 
     Each design is followed in steps of its own, as `jounce.solve` does it alone. One that locks, or that comes to a
     singular position, is solved alone; so are all of them where outputs are forces, energies or Euler angles, where
-    constraints are redundant, and where the mechanism asks for one of its assemblies.
+    constraints are redundant, where laws of pieces depend on what varies, and where the mechanism asks for one of its
+    assemblies.
 
     Parameters
     ----------
@@ -150,6 +154,7 @@ def _family(
     return _Family(mechanism, names, rows, instants, order, float(tolerance), progress), values
 
 
+@double_precision
 def solve_with_sides(
     mechanism: Mechanism,
     parameters: Mapping[str, ArrayLike],
@@ -194,6 +199,7 @@ class Sides:
         return dataclasses.replace(self, values=named)
 
 
+@double_precision
 def sides_of_designs(
     mechanism: Mechanism, parameters: Mapping[str, np.ndarray], first: float, last: float, order: int
 ) -> tuple[Float[np.ndarray, "design side"], Float[np.ndarray, "design side"]]:
@@ -270,7 +276,7 @@ class _Family:
     def solve(self, threads: int, *, alone: bool = True) -> None:
         """Solve all designs: most side by side, the others alone, if they are wanted."""
         count = len(self.rows)
-        apart = self.mechanism.assembly is not None or self._of_whole_motions()
+        apart = self.mechanism.assembly is not None or self._of_whole_motions() or self._pieces_vary()
         left = np.arange(count) if apart else self._side_by_side(threads)
         if not (alone or apart):
             return
@@ -309,6 +315,20 @@ class _Family:
         """Tell whether outputs are asked for that follow from whole motions, not from one instant."""
         outputs = self.mechanism.outputs.values()
         return any(isinstance(output, AbstractMotionOutput) or getattr(output, "wraps", ()) for output in outputs)
+
+    def _pieces_vary(self) -> bool:
+        """Tell whether laws of pieces depend on the parameters that vary: their tables have no lane for each design."""
+        tables: list[Any] = []
+
+        def pieces(values: Any) -> Any:
+            design = self.held.with_parameters(**dict(zip(self.names, values, strict=True)))
+            for law in laws_of(design):
+                tables.extend(x for x in jax.tree.leaves(law, is_leaf=_is_of_pieces) if _is_of_pieces(x))
+            return values
+
+        if laws_may_break(self.mechanism):
+            jax.eval_shape(pieces, self.rows[0])
+        return any(isinstance(leaf, jax.core.Tracer) for table in tables for leaf in jax.tree.leaves(table))
 
     def _side_by_side(self, threads: int) -> Int[np.ndarray, " design"]:
         """Solve designs side by side; return which are left to be solved alone."""
@@ -422,6 +442,10 @@ class _Family:
         told = ", ".join(f"{name} = {value:g}" for name, value in zip(self.names, self.rows[k], strict=True))
         error.message = f"{error.message} (design {k}: {told})"
         return error
+
+
+def _is_of_pieces(part: Any) -> bool:
+    return isinstance(part, SplineMotion)
 
 
 def _flags() -> str:
