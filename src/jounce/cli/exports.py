@@ -60,7 +60,7 @@ def export(
         examples/trajectories/ur5_stack.yaml --format ros --rate 50Hz \
         --torques --out stack.yaml
     """
-    from jounce.dynamics.trajectory_ends import trajectory_ends
+    from jounce.dynamics.motion_ends import trajectory_ends
     from jounce.io import export_trajectory
     from jounce.reporting.motion_ends import between_words, ends_words
     from jounce.reporting.summaries import wrapped

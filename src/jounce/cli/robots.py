@@ -136,8 +136,8 @@ def torques(
       jounce torques examples/robots/panda.urdf \
         examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg"
     """
+    from jounce.dynamics.motion_ends import trajectory_ends
     from jounce.dynamics.trajectories import trajectory_torques
-    from jounce.dynamics.trajectory_ends import trajectory_ends
     from jounce.reporting.json_results import torques_result
     from jounce.reporting.peaks import table_peaks
     from jounce.reporting.summaries import torques_summary

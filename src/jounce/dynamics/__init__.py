@@ -36,6 +36,7 @@ from jounce.dynamics.limits import LimitReport as LimitReport, LimitRow as Limit
 from jounce.dynamics.linearisation import Linearisation as Linearisation, StateSpace as StateSpace
 from jounce.dynamics.many_equilibria import equilibria as equilibria
 from jounce.dynamics.modes import Modes as Modes
+from jounce.dynamics.motion_ends import TrajectoryEnd as TrajectoryEnd, trajectory_ends as trajectory_ends
 from jounce.dynamics.outputs import (
     AppliedForceOutput as AppliedForceOutput,
     AppliedTorqueOutput as AppliedTorqueOutput,
@@ -57,7 +58,6 @@ from jounce.dynamics.reactions import (
 from jounce.dynamics.small_motions import linearise as linearise
 from jounce.dynamics.static_equilibrium import Equilibrium as Equilibrium, equilibrium as equilibrium
 from jounce.dynamics.trajectories import trajectory_torques as trajectory_torques
-from jounce.dynamics.trajectory_ends import TrajectoryEnd as TrajectoryEnd, trajectory_ends as trajectory_ends
 from jounce.precision import compute_in_double as _compute_in_double
 
 _compute_in_double(__name__)

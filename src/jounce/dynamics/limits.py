@@ -11,8 +11,8 @@ from jaxtyping import Float
 from jounce.display import Displayed
 from jounce.dynamics.highest import local_maxima
 from jounce.dynamics.limit_jumps import Infinite, infinite_quantities, jumps_of
+from jounce.dynamics.motion_ends import TrajectoryEnd, end_jumps, told_ends
 from jounce.dynamics.trajectories import FollowedTrajectory, why_not
-from jounce.dynamics.trajectory_ends import TrajectoryEnd, end_jumps, told_ends
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
 from jounce.robot.model import Limits
 from jounce.robot.robot import Robot

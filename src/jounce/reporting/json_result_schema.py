@@ -247,6 +247,7 @@ class RetimeResult(Result):
     deviation: float
     deviation_allowed: float | None
     kept: bool
+    drives: bool
     limits: list[LimitRow]
     ends: list[EndFacts]
     hand_over: bool

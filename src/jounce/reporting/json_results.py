@@ -10,8 +10,8 @@ from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits import LimitReport
+from jounce.dynamics.motion_ends import TrajectoryEnd
 from jounce.dynamics.trajectories import told_drives
-from jounce.dynamics.trajectory_ends import TrajectoryEnd
 from jounce.errors import UNSET, JounceError, show_value
 from jounce.kinematics import Motion, Stretches
 from jounce.reporting.mechanism_facts import grid_facts

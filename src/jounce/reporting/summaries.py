@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits import LimitReport
+from jounce.dynamics.motion_ends import TrajectoryEnd
 from jounce.dynamics.trajectories import told_drives
-from jounce.dynamics.trajectory_ends import TrajectoryEnd
 from jounce.mechanism.time import last_step_words
 from jounce.reporting.law_facts import law_words
 from jounce.reporting.motion_ends import between_words, breaks_words, ends_words

@@ -10,8 +10,8 @@ import numpy as np
 from jounce.dynamics.highest import local_maxima
 from jounce.dynamics.limit_jumps import infinite_quantities, jumps_of
 from jounce.dynamics.limits import FIELDS, LimitReport, LimitRow, check_limits, word_of
+from jounce.dynamics.motion_ends import TrajectoryEnd, end_jumps
 from jounce.dynamics.trajectories import FollowedTrajectory
-from jounce.dynamics.trajectory_ends import TrajectoryEnd, end_jumps
 from jounce.errors import SampleWarning
 from jounce.planning.retiming.limits import MotionLimits, limits_of
 from jounce.planning.retiming.path import Path

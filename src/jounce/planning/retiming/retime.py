@@ -1,5 +1,6 @@
 """The fastest time law along a path within limits of velocity to jounce, torque and torque rate."""
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -176,14 +177,31 @@ def _repaired(
     path = checked(path_of_samples(trajectory, chosen, between.deviation, timed=True), chosen)
     source = RobotQuantities(robot, path, limits, drives=drives)
     source.check_range()
+    given = JointTrajectory(path.laws, path.start, path.stop, trajectory.times)
+    ends = _ends(robot, given, source, drives, hand_over)
     cells = cells or cells_needed(path, chosen)
     speeds = np.abs(path.derivatives(np.linspace(path.start, path.stop, 501), 1)[:, 1]).max(axis=1)
     keeps = keeps_limits(source, np.array([path.start, path.stop])) & (speeds[[0, -1]] > SPEEDS * speeds.max())
     first, last = (1.0 if as_it_was else None for as_it_was in keeps.tolist())
     conditions = Conditions(chosen, (first, last), highest=1.0)
     law, search = slowed_only(source, source.labels, path.start, path.stop, conditions, cells)
-    found = _certified(robot, path, law, search, source, drives, hand_over=hand_over)
-    for end in () if hand_over else found.report.ends:
+    found = _certified(robot, path, law, search, source, drives, hand_over=True)
+    # what samples make of rest is known of the given laws only, not of those that follow the slowed time
+    told = ends if all(end.at_rest for end in ends) else found.report.ends
+    found.report = dataclasses.replace(found.report, ends=told, hand_over=hand_over)
+    return found
+
+
+def _ends(robot: Robot, given: JointTrajectory, source: RobotQuantities, drives: bool, hand_over: bool) -> Any:
+    """Return the ends of a trajectory that is to be repaired.
+
+    Raises
+    ------
+    TrajectoryError
+        If it jumps there, and the robot does not move already.
+    """
+    ends = check_motion(robot, given, source.limits, drives=drives).ends
+    for end in () if hand_over else ends:
         if end.breaks:
             owner, quantity = end.breaks[0]
             message = (
@@ -192,7 +210,7 @@ def _repaired(
                 "hand_over if the robot moves already"
             )
             raise TrajectoryError(message, name="repair")
-    return found
+    return ends
 
 
 def keeps_limits(source: RobotQuantities, s: np.ndarray) -> np.ndarray:

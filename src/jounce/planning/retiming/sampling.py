@@ -1,5 +1,6 @@
 """Retimed trajectories as samples for a controller: whole periods, and limits kept by splines through the samples."""
 
+import dataclasses
 import warnings
 
 import numpy as np
@@ -73,8 +74,9 @@ def fit_to_samples(
             read = JointTrajectory.from_samples(times, positions, found.names, degree)
             report = worst = check_motion(robot, read, limits, drives=drives, hand_over=hand_over)
         if report.kept:
-            found.report = worst = check_motion(robot, found, limits, drives=drives, hand_over=hand_over)
+            worst = check_motion(robot, found, limits, drives=drives, hand_over=True)
             if worst.kept:
+                found.report = dataclasses.replace(worst, ends=trajectory.report.ends, hand_over=hand_over)
                 return found, report
         over = max((worst.worst.ratio or 1.0) if worst.worst else 1.0, 1.0) - 1
         told = "" if worst.worst is None else f" of the {worst.worst.quantity} of {worst.worst.joint}"

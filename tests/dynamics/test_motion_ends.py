@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.dynamics.trajectory_ends import trajectory_ends
+from jounce.dynamics.motion_ends import trajectory_ends
 from jounce.planning.retiming.motion_limits_check import check_motion
 
 ROD = jn.Inertia(1.0, center_of_mass=[0.2, 0, 0], tensor=[0.02, 0.03, 0.04])

@@ -16,7 +16,7 @@ ORDER = 3  # up to jerk
 SMALL = 1e-6  # of the size of a derivative: less is rest
 LEAST = np.array([0.0, 1e-9, 1e-6, 1e-3])  # the same, by s to the power of the order: rad or m
 LOOKS = 201
-INSIDE = 1e-10  # of the duration: how far from the ends these are looked at
+INSIDE = 1e-10  # of the duration: how long before the stop it is looked at, too
 UNSUPPORTED = 0.5  # of its peak: the error of a derivative that samples say nothing of
 SAFE = 3.0  # times the estimated error: less is none
 SLOW, FAR = 0.02, 4.0  # of the largest velocity, and deviations: less is none where noise hides what splines say
@@ -82,7 +82,8 @@ def trajectory_ends(robot: Robot, trajectory: JointTrajectory) -> tuple[Trajecto
     --------
     >>> import jounce as jn
     >>> robot = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", jn.Inertia(1.0))], [jn.Joint("pin", "base", "rod")])
-    >>> start, stop = jn.dynamics.trajectory_ends(robot, jn.JointTrajectory({"pin": "t - t**2/4"}, 0.0, 2.0))
+    >>> from jounce.dynamics import trajectory_ends
+    >>> start, stop = trajectory_ends(robot, jn.JointTrajectory({"pin": "t - t**2/4"}, 0.0, 2.0))
     >>> dict(start.velocities), dict(stop.velocities), dict(stop.accelerations)
     ({'pin': 1.0}, {}, {'pin': -0.5})
     """
@@ -103,8 +104,8 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
     """
     trajectory, order = followed.trajectory, values.shape[1] - 1
     times = np.array([trajectory.start, trajectory.stop])
-    inside = INSIDE * float(times[1] - times[0])  # a law may be another one from its last instant on
-    moving = followed.coordinates(times + np.array([inside, -inside]), order)
+    inside = INSIDE * float(times[1] - times[0])
+    *moving, before = followed.coordinates(np.append(times, times[1] - inside), order)
     sizes = level_sizes(values, float(times[1] - times[0]))
     least = np.zeros(order + 1)
     least[: len(LEAST)] = LEAST[: order + 1]
@@ -112,6 +113,8 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
     near[:-1] = np.maximum(near[:-1], 2 * inside * sizes[1:])
     near = np.stack([near, near])
     span = float(times[1] - times[0])
+    # a law may be another one from its last instant on, as polynomials between points are
+    moving = np.stack([moving[0], np.where(np.abs(moving[1] - before) > near[1], before, moving[1])])
     for column, name in zip(followed.columns, trajectory.names, strict=True):
         law = trajectory.laws[name]
         if not isinstance(law, SplineMotion) or not law.samples.value:
