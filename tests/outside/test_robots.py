@@ -65,7 +65,7 @@ def test_followers_with_ranges_of_the_wrong_sign_leave_the_leader_its_own(load, 
     assert (limits.lower, limits.upper) == (0.0, 0.8757)
     over = jn.JointTrajectory({"finger": "0.4 + 0.5*sin(t)"}, start=0.0, stop=2.0)
     rows = {row.quantity: row for row in jn.check_limits(robot, over).rows}
-    assert not rows["position"].kept  # reaches 0.9 rad
+    assert rows["position"].ratio > 1  # reaches 0.9 rad
 
 
 def test_a_follower_of_a_follower_multiplies(load):
@@ -125,7 +125,7 @@ def test_the_torques_of_both_doors_are_the_same(load):
     q = swing.derivatives(np.linspace(0.0, 2.0, 5001), order=3)
     tau = jn.inverse_dynamics(robot, q)
     (row,) = (row for row in jn.check_limits(robot, swing).rows if row.quantity == "torque")
-    assert abs(tau[:, 0]).max() == pytest.approx(row.value, rel=1e-6)
+    assert abs(tau[:, 0]).max() == pytest.approx(abs(row.value), rel=1e-6)
     back = jn.forward_dynamics(robot, q[:, :2], tau[:, :1])
     np.testing.assert_allclose(back[:, 2], q[:, 2], atol=1e-12)
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Float, Int
 
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError, SolveError, check_name
@@ -328,7 +329,7 @@ class _Family:
 
         if laws_may_break(self.mechanism):
             jax.eval_shape(pieces, self.rows[0])
-        return any(isinstance(leaf, jax.core.Tracer) for table in tables for leaf in jax.tree.leaves(table))
+        return any(isinstance(leaf, Tracer) for table in tables for leaf in jax.tree.leaves(table))
 
     def _side_by_side(self, threads: int) -> Int[np.ndarray, " design"]:
         """Solve designs side by side; return which are left to be solved alone."""

@@ -94,7 +94,7 @@ def _uneven_repeat(law: AbstractMotion, mechanism: Mechanism) -> str:
     return ""
 
 
-def _same(motion: Any, law: AbstractMotion, parameters: Mapping[str, Any]) -> bool:
+def _same(motion: Any, law: AbstractMotion | None, parameters: Mapping[str, Any]) -> bool:
     """Tell whether what a driver has for a law is a law."""
     found = resolve_motion(motion, parameters)
     if isinstance(found, ExpressionMotion) and isinstance(law, ExpressionMotion):

@@ -330,7 +330,7 @@ def _check_growth(
     size = max(float(np.max(np.abs(values))), *given, 0.0)
     local = np.diff(knots) * (np.arange(1, PLACES + 1) / PLACES)[:, None]
     along = sum(c * local**k for k, c in enumerate(pieces))
-    missed = float(np.max(np.abs(along[-1] - values[1:])))
+    missed = float(np.max(np.abs(np.asarray(along)[-1] - values[1:])))
     if not missed <= AT_KNOTS * size:
         message = f"the law misses the values at its own knots, by {missed:.3g}: errors grow from knot to knot"
     elif not np.max(np.abs(along)) <= LARGEST_GROWTH * size:

@@ -43,6 +43,7 @@ OF_DYNAMICS = dict.fromkeys(("stiffness", "spring_stiffness", "spring_k"), JOINT
     ("armature", "rotor_inertia"), ROTORS
 )
 SPRINGS = ("springStiffness", "spring_stiffness")
+OTHER_ROTORS = ("rotorInertia", "rotor_inertia", "motorInertia", "motor_inertia")  # of actuators, by nobody's rule
 VERSIONS = ((1, 0), (1, 1), (1, 2))
 YES, NO = ("true", "1"), ("false", "0")
 
@@ -139,6 +140,10 @@ def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]],
         elif element.tag == "gazebo":
             for heading, shown, part in _of_gazebo(element, root, robot, names):
                 _leave(faults, heading, shown, part, LEAVE)
+        elif element.tag == "transmission":
+            for part in (part for actuator in element.every("actuator") for part in actuator.children):
+                if part.tag in OTHER_ROTORS:
+                    _leave(faults, ROTORS, element.attributes.get("name") or part.tag, part, LEAVE)
         elif element.tag == "mujoco":
             for part in element.children:
                 _note_mujoco(part, faults)
