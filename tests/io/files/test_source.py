@@ -8,7 +8,8 @@ import hypothesis.strategies as st
 import pytest
 
 from jounce.errors import MechanismFileError
-from jounce.io.files import located_data
+from jounce.io.files import located_data, parsers
+from jounce.io.files.dumping import dumped
 from jounce.io.files.located_data import MAX_DEPTH, dotted
 from jounce.io.files.reading import MAX_BYTES
 from jounce.io.files.source import read_source
@@ -214,6 +215,15 @@ def test_fifty_megabytes_are_refused_by_size(tmp_path):
 )
 def test_monstrous_lines_are_refused(tmp_path, text, words):
     assert words in str(refusal(tmp_path, text))
+
+
+@pytest.mark.parametrize("suffix", [".json", ".yaml", ".toml"])
+def test_too_many_names_in_a_mapping_are_refused(tmp_path, monkeypatch, suffix):
+    for module in (located_data, parsers):
+        monkeypatch.setattr(module, "MAX_KEYS", 100)
+    names = {f"p{k}": 1 for k in range(101)}
+    error = refusal(tmp_path, dumped({"parameters": names}, suffix), suffix)
+    assert "more than 100 names in one mapping" in str(error)
 
 
 def test_too_many_values_are_refused(tmp_path, monkeypatch):

@@ -12,9 +12,10 @@ from jounce.io.files.reading import named_file
 from jounce.trajectory.dimensions import Dimension
 from jounce.trajectory.units import Value, parse_value
 
-MAX_VALUES = 100_000
+MAX_VALUES, MAX_KEYS = 200_000, 20_000  # of a file, and of one mapping in it
 MAX_DEPTH = 50
 TOO_DEEP = f"nested more than {MAX_DEPTH} deep; 6 are enough for any file"
+TOO_WIDE = "more than {} names in one mapping"
 TOO_MANY = "more than {} entries; long tables of samples belong in a CSV file"
 
 Location = tuple[str | int, ...]
@@ -160,6 +161,8 @@ class Builder:
             first = self.source.lines[(*location, name)]
             message = f"duplicate name, already given in line {first}"
             raise MechanismFileError(message, path=self.source.path, line=line, name=dotted((*location, name)))
+        if len(container) >= MAX_KEYS:
+            raise MechanismFileError(TOO_WIDE.format(MAX_KEYS), path=self.source.path, line=line, name=dotted(location))
         self._key = name
         self.source.lines[(*location, name)] = line
 

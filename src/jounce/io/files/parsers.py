@@ -12,7 +12,17 @@ from collections.abc import Iterator
 from typing import Any
 
 from jounce.errors import MechanismFileError
-from jounce.io.files.located_data import MAX_DEPTH, MAX_VALUES, TOO_DEEP, TOO_MANY, Builder, Location, Source
+from jounce.io.files.located_data import (
+    MAX_DEPTH,
+    MAX_KEYS,
+    MAX_VALUES,
+    TOO_DEEP,
+    TOO_MANY,
+    TOO_WIDE,
+    Builder,
+    Location,
+    Source,
+)
 
 # The core schema of YAML 1.2 (section 10.3.2 of its specification).
 _NULL = {"", "~", "null", "Null", "NULL"}
@@ -222,6 +232,8 @@ def _check_size(path: str, data: Any) -> None:
             raise MechanismFileError(TOO_DEEP, path=path)
         if count > MAX_VALUES:
             raise MechanismFileError(TOO_MANY.format(MAX_VALUES), path=path)
+        if isinstance(value, dict) and len(value) > MAX_KEYS:
+            raise MechanismFileError(TOO_WIDE.format(MAX_KEYS), path=path)
         if isinstance(value, (dict, list)):
             pending.extend((item, depth + 1) for item in (value.values() if isinstance(value, dict) else value))
 
