@@ -409,8 +409,8 @@ class Halves(jn.Taylor):
 
     part = 1.0
 
-    def prepared(self, expansion, length, tolerance, singular):
-        start, step, allowed = jn.Taylor.prepared(self, expansion, length, tolerance, singular)
+    def prepared(self, expansion, length, tolerance, singular, usual):
+        start, step, allowed = jn.Taylor.prepared(self, expansion, length, tolerance, singular, usual)
         return start, self.part * step, allowed
 
 

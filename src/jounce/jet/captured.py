@@ -289,7 +289,8 @@ class _Description(Pass):
 
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> Sequence[Any]:
         names = [f"%{next(self._results)}" for _ in equation.outvars]
-        kinds = [f"{v.aval.shape} {v.aval.dtype}" for v in equation.outvars]
+        made: list[Any] = [v.aval for v in equation.outvars]
+        kinds = [f"{aval.shape} {aval.dtype}" for aval in made]
         self._told.append(f"{names} {kinds} = {equation.primitive.name} {self.parameters(equation)} {operands}")
         return names
 
