@@ -286,6 +286,33 @@ def test_a_class_that_is_defined_again():
         assert rate_after_half(defined(c)(("rod",))) == pytest.approx(np.exp(-5 * c), abs=1e-13)
 
 
+class Scaling(jn.AbstractForce):
+    """A brake whose size is a parameter, times a number of the class."""
+
+    body_count = 1
+    size: jn.Scalar
+    part = 0.1
+
+    def displacement(self, body, time):
+        return body.angle
+
+    def force(self, displacement, velocity, time):
+        return -self.part * self.size * velocity
+
+
+def test_batches_and_gradients_of_forces(monkeypatch):
+    braked = dataclasses.replace(spun(Scaling(("rod",), size="size")), parameters={"size": 1.0})
+
+    def rate(size: Any) -> Any:
+        return jn.simulate(braked.with_parameters(size=size), [0.0, 0.5], order=1).outputs["angle"][1, 1]
+
+    for part in (0.1, 0.2):
+        monkeypatch.setattr(Scaling, "part", part)
+        many = jn.simulate_batch(braked, {"size": [1.0, 2.0]}, [0.0, 0.5], order=1)
+        assert many.outputs["angle"][:, 1, 1] == pytest.approx(np.exp([-5 * part, -10 * part]), abs=1e-13)
+        assert float(jax.grad(rate)(1.0)) == pytest.approx(-5 * part * np.exp(-5 * part), abs=1e-12)
+
+
 # -- joints, drivers and outputs --------------------------------------------------------------------------------------
 
 
@@ -382,8 +409,8 @@ class Halves(jn.Taylor):
 
     part = 1.0
 
-    def prepared(self, expansion, length, tolerance, singular):
-        start, step, allowed = jn.Taylor.prepared(self, expansion, length, tolerance, singular)
+    def prepared(self, expansion, length, tolerance, singular, usual):
+        start, step, allowed = jn.Taylor.prepared(self, expansion, length, tolerance, singular, usual)
         return start, self.part * step, allowed
 
 

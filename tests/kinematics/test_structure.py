@@ -81,8 +81,20 @@ def test_the_structure_of_a_mechanism_has_its_laws_in_its_name():
     again = [tree_description(structure(jn.forces.ExpressionLaw(law))) for law in laws]
     assert told == again
     assert len(set(told)) == len(laws)
+
+
+def test_a_function_has_what_it_computes_in_its_name():
+    functions = [lambda x, v, t: -2.0 * x, lambda x, v, t: -3.0 * x, lambda x, v, t: -2.0 * v, lambda x, v, t: x / 2.0]
+    told = [tree_description(structure(jn.forces.FunctionLaw(function))) for function in functions]
+    assert told[0] == told[1]  # the numbers are arguments
+    assert len(set(told)) == 3
+
+    def of_python(x, v, t):
+        said = jax.ShapeDtypeStruct(x.shape, float)
+        return x.map(lambda c: jax.pure_callback(lambda y: y, said, c, vmap_method="expand_dims"))
+
     with pytest.raises(UndescribedError):
-        tree_description(structure(jn.forces.FunctionLaw(lambda x, v, t: -2 * x)))
+        tree_description(structure(jn.forces.FunctionLaw(of_python)))
 
 
 def test_a_program_is_named_by_all_that_it_depends_on():

@@ -43,10 +43,10 @@ class ReadIntegrator(AbstractMethod):
         return self.method.longest_step(sizes, tolerance)
 
     def prepared(
-        self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags
+        self, expansion: Expansion, length: Number, tolerance: Number, singular: Flags, usual: Lanes
     ) -> tuple[Expansion, Lanes, Lanes]:
         """See `AbstractMethod`."""
-        return self.method.prepared(expansion, length, tolerance, singular)
+        return self.method.prepared(expansion, length, tolerance, singular, usual)
 
     def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
         """See `AbstractMethod`."""
@@ -71,7 +71,7 @@ def integrator(method: AbstractMethod, equations: Equations, current: Integrator
     def whole(*given: Any) -> Any:
         method, equations, current = jax.tree.unflatten(tree, given)
         step, length = jnp.ones(current.time.shape), equations.system.column_scale[0]
-        start, *told = method.prepared(current.expansion, length, jnp.ones(()), current.singular)
+        start, *told = method.prepared(current.expansion, length, jnp.ones(()), current.singular, step)
         arrived = method.arrive(equations, start, current.time, step)
         ends = method.polynomial(start, current.expansion, step), method.error(start, current.expansion, step, length)
         return jax.tree.leaves((start, told, arrived, ends))

@@ -115,7 +115,7 @@ def read_off(function: Callable[..., Any], *examples: Any) -> ReadOff:
     >>> first.program == second.program, [float(x) for x in second.captured]
     (True, [5.0, 7.0])
     """
-    closed, result = _traced(function, examples)
+    closed, result = _traced(function, jax.tree.map(_shaped, examples))  # of no weak types, which are other programs
     description = _Description()
     captured = tuple(description.of(closed))
     key = description.digest(), tuple(map(Same, description.nameless))
@@ -157,7 +157,7 @@ def parameters_of(equation: JaxprEqn) -> tuple[list[str], list[Any]]:
 
 
 def _shaped(x: Any) -> jax.ShapeDtypeStruct:
-    return jax.ShapeDtypeStruct(np.shape(x), jnp.result_type(x))
+    return jax.ShapeDtypeStruct(np.shape(x), np.result_type(x.dtype if hasattr(x, "dtype") else x))
 
 
 def _traced(function: Callable[..., Any], examples: Sequence[Any]) -> tuple[ClosedJaxpr, Any]:
@@ -289,7 +289,8 @@ class _Description(Pass):
 
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> Sequence[Any]:
         names = [f"%{next(self._results)}" for _ in equation.outvars]
-        kinds = [f"{v.aval.shape} {v.aval.dtype}" for v in equation.outvars]
+        made: list[Any] = [v.aval for v in equation.outvars]
+        kinds = [f"{aval.shape} {aval.dtype}" for aval in made]
         self._told.append(f"{names} {kinds} = {equation.primitive.name} {self.parameters(equation)} {operands}")
         return names
 

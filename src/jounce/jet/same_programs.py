@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-import jax
 import numpy as np
+from jax.core import Tracer
 from jax.extend.core import ClosedJaxpr, JaxprEqn
 
 from jounce.jet.captured import Pass, parameters_of, told_array
@@ -31,20 +31,22 @@ class _Nodes(Pass):
         return self.fixed(value, dtype)
 
     def fixed(self, value: Any, dtype: np.dtype) -> Any:
-        if isinstance(value, jax.core.Tracer):
+        if isinstance(value, Tracer):
             return self._node(("held", id(value)))
         return self._node(("number", told_array(np.asarray(value, dtype))))
 
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> Sequence[Any]:
-        name, shapes = equation.primitive.name, [(v.aval.shape, str(v.aval.dtype)) for v in equation.outvars]
+        given: list[Any] = [v.aval for v in equation.invars]
+        made: list[Any] = [v.aval for v in equation.outvars]
+        name, shapes = equation.primitive.name, [(aval.shape, str(aval.dtype)) for aval in made]
         if name in _SPREADING:
             operands = [self._unspread(x) for x in operands]
-        if name == "reshape" and equation.invars[0].aval.shape == equation.outvars[0].aval.shape:
+        if name == "reshape" and given[0].shape == made[0].shape:
             return operands
         told, nameless = parameters_of(equation)
         key = name, tuple(told), tuple(map(id, nameless)), tuple(operands), tuple(shapes)
         node = self._node(key)
-        if name in ("broadcast_in_dim", "reshape") and not equation.invars[0].aval.shape:
+        if name in ("broadcast_in_dim", "reshape") and not given[0].shape:
             self._nodes[("spread", node)] = operands[0]
         return [(node, k) for k in range(len(shapes))]
 

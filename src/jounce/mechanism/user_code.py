@@ -14,6 +14,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 
 from jounce.constraints import AbstractConstraint
 from jounce.constraints.base import field_kinds, value_fields
@@ -89,7 +90,7 @@ def users_code(groups: Sequence[Any]) -> tuple[Any, ...] | None:
         parts = jax.tree.leaves(group.element, is_leaf=lambda x: isinstance(x, read))
         found += [part for part in parts if isinstance(part, read)]
     leaves, structure = jax.tree.flatten(found)
-    if any(isinstance(x, jax.core.Tracer) for x in leaves):
+    if any(isinstance(x, Tracer) for x in leaves):
         return None
     return structure, tuple((np.shape(x), np.asarray(x).tobytes()) for x in leaves)
 
