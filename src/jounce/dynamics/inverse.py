@@ -265,19 +265,20 @@ class MotionForces:
 
         Force, global, and moment about the origin of the body, in its axes.
         """
-        place = self.indices.get(name)
-        index, instance = self._force_index(name) if place is None else (place.group, place.instance)
+        if place := self.indices.get(name):
 
-        def of_constraint(lanes: np.ndarray) -> Any:
-            return programs.wrenches(self._slopes(index, slot, lanes), self._of_group(place)[..., lanes])
+            def of_constraint(lanes: np.ndarray) -> Any:
+                return programs.wrenches(self._slopes(place.group, slot, lanes), self._of_group(place)[..., lanes])
+
+            return self._once(of_constraint, "joint", place.group, slot)[:, :, place.instance]
+        index, instance = self._force_index(name)
 
         def of_force(lanes: np.ndarray) -> Any:
             element, poses, instants = self._acting(index, lanes, self.levels)
             slope = programs.force_slopes(element, poses, instants, self.pose_type, slot, self.levels)
             return programs.wrenches(slope, -self._sizes(index)[..., lanes])  # a residual is held against
 
-        kind, chunk = ("force", of_force) if place is None else ("joint", of_constraint)
-        return self._once(chunk, kind, index, slot)[:, :, instance]
+        return self._once(of_force, "force", index, slot)[:, :, instance]
 
     def applied_force(self, name: str) -> Numbers:
         """Return an applied force, as Taylor coefficients, (levels, components, time)."""
