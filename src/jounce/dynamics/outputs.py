@@ -106,7 +106,13 @@ class DriverTorqueOutput(_DriverOutput):
             raise MechanismError("this driver prescribes a length, so that it exerts a force", name="quantity")
 
 
-class _JointOutput(AbstractForceOutput):
+class _Reaction(AbstractForceOutput):
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell whether the reaction has components: a torque has in space."""
+        return self.unit == "N" or mechanism.space == "spatial"
+
+
+class _JointOutput(_Reaction):
     joint: str = eqx.field(static=True)
     body: str | None = eqx.field(
         static=True, default=None
@@ -170,11 +176,6 @@ class JointForceOutput(_JointOutput):
     unit = "N"
     rate_names = ("force", *RATES)
 
-    def is_vector(self, mechanism: Mechanism) -> bool:
-        """Tell that the force has components."""
-        del mechanism
-        return True
-
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
         return self._values(motion, None, 0, 1.0)
@@ -191,10 +192,6 @@ class JointTorqueOutput(_JointOutput):
     unit = "N*m"
     rate_names = ("torque", *RATES)
 
-    def is_vector(self, mechanism: Mechanism) -> bool:
-        """Tell whether the torque has components: in space."""
-        return mechanism.space == "spatial"
-
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the torque, (levels, components, time)."""
         mechanism = motion.mechanism
@@ -203,7 +200,7 @@ class JointTorqueOutput(_JointOutput):
         return self._values(motion, values["point"], 1, motion.model.length)
 
 
-class _GroundOutput(AbstractForceOutput):
+class _GroundOutput(_Reaction):
     source = "mechanism"  # the key of a file that says what it is of
 
     def check(self, mechanism: Mechanism) -> None:
@@ -229,11 +226,6 @@ class GroundForceOutput(_GroundOutput):
     unit = "N"
     rate_names = ("force", *RATES)
 
-    def is_vector(self, mechanism: Mechanism) -> bool:
-        """Tell that the force has components."""
-        del mechanism
-        return True
-
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
         return self._values(motion, np.zeros(len(self.component_labels(motion.mechanism))), 0, 1.0)
@@ -246,10 +238,6 @@ class GroundTorqueOutput(_GroundOutput):
 
     unit = "N*m"
     rate_names = ("torque", *RATES)
-
-    def is_vector(self, mechanism: Mechanism) -> bool:
-        """Tell whether the torque has components: in space."""
-        return mechanism.space == "spatial"
 
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the torque, (levels, components, time)."""

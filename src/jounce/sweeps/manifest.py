@@ -73,7 +73,8 @@ def arithmetic() -> dict[str, str]:
     >>> sorted(arithmetic())
     ['device', 'machine code']
     """
-    device = jax.devices()[0] if jax.config.jax_default_device is None else jax.config.jax_default_device
+    chosen: Any = jax.config.values["jax_default_device"]
+    device = jax.devices()[0] if chosen is None else chosen
     kind = getattr(device, "device_kind", str(device))
     code = f"llvmlite {importlib.metadata.version('llvmlite')}" if is_wanted() else "not used"
     return {"machine code": code, "device": "cpu" if on_processor() else kind}
