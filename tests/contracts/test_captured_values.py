@@ -23,6 +23,7 @@ from jounce import jet
 from jounce.constraints import MotionLaw
 from jounce.kinematics import alone, side_by_side, store as programs
 from jounce.kinematics.alone import VARIABLE
+from tests.problems.own_types import taken_back
 
 GROUND = ("ground", "rod")
 ROD = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
@@ -325,17 +326,19 @@ class Hook(jn.AbstractConstraint):
         return body_j.point([self.place, 0.0]) - body_i.point([0.0, 0.0])
 
 
-class Geared(jn.AbstractConstraint, type="captured_ratio", space="planar", role="driver"):
-    """A driver of a gear whose ratio the class knows."""
+with taken_back():
 
-    motion: MotionLaw
-    ratio = 1.0
+    class Geared(jn.AbstractConstraint, type="captured_ratio", space="planar", role="driver"):
+        """A driver of a gear whose ratio the class knows."""
 
-    def residual(self, body_i, body_j, time):
-        return body_j.angle - body_i.angle - self.ratio * self.motion(time)
+        motion: MotionLaw
+        ratio = 1.0
 
-    def admissible(self, time):
-        return abs(self.ratio) * jnp.ones_like(time.coefficients[0]) < 5.0
+        def residual(self, body_i, body_j, time):
+            return body_j.angle - body_i.angle - self.ratio * self.motion(time)
+
+        def admissible(self, time):
+            return abs(self.ratio) * jnp.ones_like(time.coefficients[0]) < 5.0
 
 
 class Scaled(jn.AbstractOutput):

@@ -11,6 +11,7 @@ import pytest
 
 import jounce as jn
 from jounce import jet
+from tests.problems.own_types import taken_back
 
 
 def block(law, x0=0.0, v0=0.0, guess=0.0):
@@ -26,17 +27,19 @@ def block(law, x0=0.0, v0=0.0, guess=0.0):
     )
 
 
-class Wire(jn.AbstractConstraint, type="outside_wire", space="planar"):
-    """A wire with a bump at x = 1 m."""
+with taken_back():
 
-    height: jn.Scalar
-    width: jn.Scalar
+    class Wire(jn.AbstractConstraint, type="outside_wire", space="planar"):
+        """A wire with a bump at x = 1 m."""
 
-    def residual(self, body_i, body_j, time):
-        """Vanish where the bead is on the wire."""
-        x, y = body_j.position[0], body_j.position[1]
-        u = (x - 1.0) / self.width
-        return y - self.height * jet.exp(-(u * u))
+        height: jn.Scalar
+        width: jn.Scalar
+
+        def residual(self, body_i, body_j, time):
+            """Vanish where the bead is on the wire."""
+            x, y = body_j.position[0], body_j.position[1]
+            u = (x - 1.0) / self.width
+            return y - self.height * jet.exp(-(u * u))
 
 
 def bead(height, width, speed):

@@ -10,6 +10,7 @@ from jounce.constraints import base
 from jounce.constraints.base import field_kind, value_fields
 from jounce.mechanism.system import POSITION_COMPONENTS, group_elements
 from jounce.rigid import PlanarPose, SpatialPose
+from tests.problems.own_types import taken_back
 
 BODIES = ("ground", "one", "two", "three", "four")
 INDEX = {name: k for k, name in enumerate(BODIES)}
@@ -18,24 +19,21 @@ LAW = "0.9 + 0.4*sin(1.3*t + 0.2) + 0.1*t**2"
 
 def users_own_joint():
     """Return a joint as a user writes it: registered by a type of its own, then taken out of the registry again."""
-    before = {key: dict(found) for key, found in base._REGISTRY.items()}
+    with taken_back():
 
-    class PointOnParabola(jn.AbstractConstraint, type="point_on_parabola", space="planar", role="joint"):
-        point_j: jn.Vector
-        curvature: jn.Scalar
+        class PointOnParabola(jn.AbstractConstraint, type="point_on_parabola", space="planar", role="joint"):
+            point_j: jn.Vector
+            curvature: jn.Scalar
 
-        def residual(self, body_i, body_j, time):
-            d = body_j.point(self.point_j) - body_i.position
-            x, y = (
-                body_i.direction(np.array([1.0, 0.0])[:, None, None]),
-                body_i.direction(np.array([0.0, 1.0])[:, None, None]),
-            )
-            return y.dot(d) - self.curvature * x.dot(d) ** 2
+            def residual(self, body_i, body_j, time):
+                d = body_j.point(self.point_j) - body_i.position
+                x, y = (
+                    body_i.direction(np.array([1.0, 0.0])[:, None, None]),
+                    body_i.direction(np.array([0.0, 1.0])[:, None, None]),
+                )
+                return y.dot(d) - self.curvature * x.dot(d) ** 2
 
-    registered = base.catalogue("planar", "joint")["point_on_parabola"]
-    base._REGISTRY.clear()
-    base._REGISTRY.update(before)
-    return registered
+        return base.catalogue("planar", "joint")["point_on_parabola"]
 
 
 OWN = users_own_joint()

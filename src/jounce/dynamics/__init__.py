@@ -32,7 +32,8 @@ from jounce.dynamics.equations import (
     mangeron_nielsen as mangeron_nielsen,
     printed_coefficient as printed_coefficient,
 )
-from jounce.dynamics.limits import LimitReport as LimitReport, LimitRow as LimitRow, check_limits as check_limits
+from jounce.dynamics.limit_report import LimitReport as LimitReport, LimitRow as LimitRow
+from jounce.dynamics.limits import check_limits as check_limits
 from jounce.dynamics.linearisation import Linearisation as Linearisation, StateSpace as StateSpace
 from jounce.dynamics.many_equilibria import equilibria as equilibria
 from jounce.dynamics.modes import Modes as Modes

@@ -1,6 +1,5 @@
 """Families: many designs of one mechanism solved in one program, each with an outcome of its own at every instant."""
 
-import dataclasses
 import itertools
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ from jaxtyping import Float, Int
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError, SolveError, check_name
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.design_paths import DesignPaths
+from jounce.kinematics.design_sides import Sides, sides_of_designs
 from jounce.kinematics.designs import Designs, put_together
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
@@ -29,13 +29,12 @@ from jounce.mechanism import (
     with_outputs_held,
 )
 from jounce.mechanism.axis_angles import measures_angle
-from jounce.mechanism.law_breaks import breaks_of_laws, laws_may_break, laws_of
+from jounce.mechanism.law_breaks import laws_may_break, laws_of
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
 from jounce.precision import double_precision
 from jounce.shapes import ArrayLike, real_numbers
-from jounce.trajectory.breaks import both_sides
 from jounce.trajectory.motion import SplineMotion
 from jounce.trajectory.shown_units import derivatives_of, time_axes
 
@@ -178,51 +177,6 @@ def solve_with_sides(
     family.look_beside_breaks()
     family.solve(thread_count(threads))
     return family.dataset(values), family.sides()
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Sides:
-    """Outputs of designs on both sides of where their laws jump or bend; NaN where a design has fewer of them.
-
-    Attributes
-    ----------
-    instants : array of shape (designs, sides)
-        Of the breaks, s.
-    values : dict of str to array of shape (designs, sides, order + 1, ...)
-    """
-
-    instants: Float[np.ndarray, "design side"]
-    values: dict[str, np.ndarray]
-
-    def like(self, values: Mapping[str, np.ndarray]) -> "Sides":
-        """Return them with the axes of other values of the same outputs."""
-        named = {name: found.reshape(*found.shape[:3], *values[name].shape[3:]) for name, found in self.values.items()}
-        return dataclasses.replace(self, values=named)
-
-
-@double_precision
-def sides_of_designs(
-    mechanism: Mechanism, parameters: Mapping[str, np.ndarray], first: float, last: float, order: int
-) -> tuple[Float[np.ndarray, "design side"], Float[np.ndarray, "design side"]]:
-    """Return where the laws of each design jump or bend, and the instants on both sides of it.
-
-    A design with fewer of them than others has the first instant in their place.
-    """
-    count = len(next(iter(parameters.values())))
-    found = []
-    for k in range(count if laws_may_break(mechanism) else 0):
-        try:
-            design = mechanism.with_parameters(**{name: float(values[k]) for name, values in parameters.items()})
-            breaks = breaks_of_laws(design, first, last, order)
-        except JounceError:  # told when the design is solved
-            breaks = np.zeros(0)
-        sides, which = both_sides(breaks, first, last)
-        found.append((breaks[which], sides))
-    most = max((len(sides) for _, sides in found), default=0)
-    both = np.full((2, count, most), first)
-    for k, pair in enumerate(found):
-        both[:, k, : len(pair[0])] = pair
-    return both[0], both[1]
 
 
 class _Family:

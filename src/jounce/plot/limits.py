@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jounce.dynamics.limits import FIELDS, LimitReport, LimitRow
+from jounce.dynamics.limit_report import LimitReport, LimitRow
+from jounce.dynamics.limits import FIELDS
 from jounce.errors import RobotError
 from jounce.plot.instants import evenly_chosen
 from jounce.plot.labels import unit_label

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.dynamics.limits import LimitRows
+from jounce.dynamics.limit_report import LimitRows
 from jounce.planning.elastic.link_errors import LinkErrors
 from jounce.planning.elastic.motor_motion import Feedforward
 from jounce.reporting.summaries import count

@@ -11,49 +11,12 @@ from typing_extensions import TypedDict
 from jounce.reporting.cam_facts import CamFacts
 from jounce.reporting.curve_facts import CurveFacts
 from jounce.reporting.design_facts import DesignFacts
+from jounce.reporting.json_schema_parts import Extremes, Result, TorquePeak, Written
 from jounce.reporting.law_facts import LawFacts
 from jounce.reporting.mechanism_facts import Grid, InspectedMechanism
 from jounce.reporting.modes_facts import ModesFacts
 from jounce.reporting.motion_facts import MotionFacts, SimulationFacts
 from jounce.reporting.robot_facts import InspectedRobot
-
-
-class Result(TypedDict):
-    """What all results begin with."""
-
-    jounce: str
-    record: Literal[1]
-
-
-class Extremes(TypedDict):
-    """Extreme values, with their times."""
-
-    derivative: str
-    unit: str
-    minimum: float | None
-    minimum_at: float | None
-    maximum: float | None
-    maximum_at: float | None
-
-
-class OutputPeak(Extremes):
-    """Extreme values of a derivative of an output."""
-
-    output: str
-
-
-class TorquePeak(Extremes):
-    """Extreme values, at the instants of the trajectory, of a torque or force of a joint, or of one of its rates."""
-
-    joint: str
-
-
-class Written(TypedDict):
-    """What a motion is told with."""
-
-    file: str
-    peaks: list[OutputPeak]
-    written: str | None
 
 
 class RunResult(Result, MotionFacts, Written):

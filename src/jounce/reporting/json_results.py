@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
-from jounce.dynamics.limits import LimitReport
+from jounce.dynamics.limit_report import LimitReport
 from jounce.dynamics.motion_ends import TrajectoryEnd
 from jounce.dynamics.trajectories import told_drives
 from jounce.errors import UNSET, JounceError, show_value

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.dynamics.limits import LimitReport
+from jounce.dynamics.limit_report import LimitReport
 from jounce.dynamics.trajectories import told_drives
 from jounce.planning import RetimedTrajectory
 from jounce.planning.retiming.path import Path as JointPath

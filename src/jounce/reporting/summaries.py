@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jounce.dynamics.limits import LimitReport
+from jounce.dynamics.limit_report import LimitReport
 from jounce.dynamics.motion_ends import TrajectoryEnd
 from jounce.dynamics.trajectories import told_drives
 from jounce.mechanism.time import last_step_words

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from jounce.dynamics.limits import LimitReport
+from jounce.dynamics.limit_report import LimitReport
 from jounce.reporting.peaks import Peak
 from jounce.reporting.summaries import Facts
 

@@ -18,7 +18,8 @@ from jounce.integrate import simulate_batch
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.options import checked_options, instants_of
 from jounce.kinematics import Motion, Status, solve
-from jounce.kinematics.families import Sides, sides_of_designs, solve_with_sides
+from jounce.kinematics.design_sides import Sides, sides_of_designs
+from jounce.kinematics.families import solve_with_sides
 from jounce.kinematics.motion import output_group
 from jounce.kinematics.solve import checked_settings
 from jounce.mechanism import (

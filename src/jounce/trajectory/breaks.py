@@ -21,10 +21,11 @@ BESIDE = 2e-11  # of a span of time: how far beside a break its sides are; kinks
 MOST = 1000  # breaks of the derivative above those asked for; of more, as of a spline through samples, none is told
 
 Times = Float[np.ndarray, " time"]
+Breaks = Float[np.ndarray, " break"]
 
 
 @double_precision
-def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order: int) -> Times:
+def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order: int) -> Breaks:
     """Return the instants at which a derivative up to an order jumps or bends, in the sequence of time, s.
 
     Where pieces of a law meet is known, also where they are passed by what leads the law. Kinks of expressions with
@@ -58,7 +59,7 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
     return _apart(np.concatenate(found), first, last)
 
 
-def both_sides(breaks: Times, first: float, last: float) -> tuple[Times, Int[np.ndarray, " time"]]:
+def both_sides(breaks: Breaks, first: float, last: float) -> tuple[Times, Int[np.ndarray, " time"]]:
     """Return the instants just before and just after breaks, within a first and a last instant, and of which they are.
 
     Examples
@@ -74,12 +75,12 @@ def both_sides(breaks: Times, first: float, last: float) -> tuple[Times, Int[np.
     return instants[inside], which[inside]
 
 
-def with_sides(instants: Times, breaks: Times) -> Times:
+def with_sides(instants: Times, breaks: Breaks) -> Times:
     """Return a grid with the instants just before and just after breaks."""
     return np.union1d(instants, both_sides(breaks, float(instants[0]), float(instants[-1]))[0])
 
 
-def at_breaks(instants: Times, breaks: Times, first: float, last: float) -> Times:
+def at_breaks(instants: Times, breaks: Breaks, first: float, last: float) -> Times:
     """Return instants, a break in the place of each that is just beside it.
 
     Examples

@@ -240,7 +240,7 @@ def test_derived_parameters_follow_when_one_is_changed(tmp_path):
         ("{start: 0, stop: 2, step: 0.5}", [0, 0.5, 1, 1.5, 2]),
         ("{stop: 0.3, step: 0.1}", [0, 0.1, 0.2, 0.3]),
         ("{start: 1 s, stop: tau, count: 3}", [1, 1.5, 2]),
-        ("{stop: 1, step: 400 ms}", [0, 0.4, 0.8]),
+        ("{stop: 1, step: 400 ms}", [0, 0.4, 0.8, 1]),
         ("{start: 1, stop: 1, step: 1}", [1]),
     ],
 )

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.dynamics.limits import LimitReport, LimitRow
+from jounce.dynamics.limit_report import LimitReport, LimitRow
 from jounce.errors import MechanismError, SolveError
 from jounce.mechanism import Mechanism
 from jounce.planning.retiming.fastest import fastest

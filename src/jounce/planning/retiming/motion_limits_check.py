@@ -9,7 +9,8 @@ import numpy as np
 
 from jounce.dynamics.highest import local_maxima
 from jounce.dynamics.limit_jumps import infinite_quantities, jumps_of
-from jounce.dynamics.limits import FIELDS, LimitReport, LimitRow, check_limits, word_of
+from jounce.dynamics.limit_report import LimitReport, LimitRow
+from jounce.dynamics.limits import FIELDS, check_limits, word_of
 from jounce.dynamics.motion_ends import TrajectoryEnd, end_jumps
 from jounce.dynamics.trajectories import FollowedTrajectory
 from jounce.errors import SampleWarning

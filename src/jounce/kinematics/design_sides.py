@@ -1,0 +1,58 @@
+"""Outputs of designs on both sides of where their laws jump or bend: a largest value may be a one-sided limit there."""
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import JounceError
+from jounce.mechanism import Mechanism
+from jounce.mechanism.law_breaks import breaks_of_laws, laws_may_break
+from jounce.precision import double_precision
+from jounce.trajectory.breaks import both_sides
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Sides:
+    """Outputs of designs on both sides of where their laws jump or bend; NaN where a design has fewer of them.
+
+    Attributes
+    ----------
+    instants : array of shape (designs, sides)
+        Of the breaks, s.
+    values : dict of str to array of shape (designs, sides, order + 1, ...)
+    """
+
+    instants: Float[np.ndarray, "design side"]
+    values: dict[str, np.ndarray]
+
+    def like(self, values: Mapping[str, np.ndarray]) -> "Sides":
+        """Return them with the axes of other values of the same outputs."""
+        named = {name: found.reshape(*found.shape[:3], *values[name].shape[3:]) for name, found in self.values.items()}
+        return dataclasses.replace(self, values=named)
+
+
+@double_precision
+def sides_of_designs(
+    mechanism: Mechanism, parameters: Mapping[str, np.ndarray], first: float, last: float, order: int
+) -> tuple[Float[np.ndarray, "design side"], Float[np.ndarray, "design side"]]:
+    """Return where the laws of each design jump or bend, and the instants on both sides of it.
+
+    A design with fewer of them than others has the first instant in their place.
+    """
+    count = len(next(iter(parameters.values())))
+    found = []
+    for k in range(count if laws_may_break(mechanism) else 0):
+        try:
+            design = mechanism.with_parameters(**{name: float(values[k]) for name, values in parameters.items()})
+            breaks = breaks_of_laws(design, first, last, order)
+        except JounceError:  # told when the design is solved
+            breaks = np.zeros(0)
+        sides, which = both_sides(breaks, first, last)
+        found.append((breaks[which], sides))
+    most = max((len(sides) for _, sides in found), default=0)
+    both = np.full((2, count, most), first)
+    for k, pair in enumerate(found):
+        both[:, k, : len(pair[0])] = pair
+    return both[0], both[1]
