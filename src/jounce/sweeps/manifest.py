@@ -87,7 +87,7 @@ def intact(manifest: Mapping[str, Any], path: str) -> dict[str, Any]:
     groups = [manifest.get(name) for name in ("files", *COMPARED)]
     if all(isinstance(group, dict) for group in groups) and manifest.get("identity") == _identity(manifest):
         chunk = manifest["options"].get("chunk")
-        if isinstance(chunk, int) and 1 <= chunk <= LARGEST_CHUNK:
+        if type(chunk) is int and 1 <= chunk <= LARGEST_CHUNK:
             return dict(manifest)
     message = "its manifest was changed since it was written, so that nothing tells what was computed; give another name"
     raise OutputError(message, path=path)

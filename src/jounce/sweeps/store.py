@@ -32,6 +32,7 @@ SUFFIX = ".zarr"
 ROOT = "zarr.json"
 LARGEST_ROOT = 200_000_000  # bytes of the descriptions of all arrays
 SCRATCH = ".scratch-"
+REMOVE = "remove it, and what it held is computed again"
 
 
 class Store:
@@ -287,14 +288,11 @@ class Store:
         try:
             with os.scandir(folder) as entries:
                 names = [entry.name for entry in entries]
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return
         except OSError as error:
             raise OutputError(f"cannot be read: {reason_of(error)}", path=str(folder)) from None
         yield from (name for name in names if name.isascii() and name.isdecimal() and len(name) < 16)
-
-
-REMOVE = "remove it, and what it held is computed again"
 
 
 def find(folder: Path) -> Store | None:
@@ -411,6 +409,9 @@ def _worded(path: Path) -> Iterator[None]:
     """Name the file in what the system says, or a folder where it names none."""
     try:
         yield
+    except (IsADirectoryError, NotADirectoryError) as error:
+        message = f"something else has the place of a file of the sweep; {REMOVE}"
+        raise OutputError(message, path=os.fsdecode(error.filename2 or error.filename or path)) from error
     except OSError as error:
         named = error.filename2 or error.filename or path
         raise OutputError(f"cannot be written: {reason_of(error)}", path=os.fsdecode(named)) from error
