@@ -186,8 +186,8 @@ def _local(count: int, scratch: Path) -> Any:
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise UnsupportedError(f"a worker process runs the script that starts it: {GUARD}")
     settings: dict[str, Any] = {"dashboard_address": None, "memory_limit": 0, "silence_logs": logging.CRITICAL}
-    settings["local_directory"] = str(scratch)
     lean = {
+        "temporary-directory": str(scratch),
         "distributed.worker.use-file-locking": False,  # nobody else has this folder
         "distributed.worker.profile.enabled": False,  # it looks at all stacks a hundred times a second
         # a worker has one core: threads of XLA would take it from the others. Dask's own MALLOC_TRIM_THRESHOLD_ is left
