@@ -90,11 +90,12 @@ def _check_releases(client: Any, timeout: float) -> None:
 
     What a worker that joins later has, is compared with the manifest where it computes.
     """
-    own = versions()
+    names = list(versions())
     try:
-        found = client.sync(client._get_versions, packages=list(own), callback_timeout=max(timeout, PATIENCE))
-    except TimeoutError as error:
+        found = client.sync(client._get_versions, packages=names, callback_timeout=max(timeout, PATIENCE))
+    except (OSError, TimeoutError) as error:
         raise _lost(error) from None
+    own = {name: found["client"]["packages"].get(name) for name in names}  # told in the same way
     for address, told in sorted(found["workers"].items()):
         packages = told["packages"] if isinstance(told, dict) else {}
         for name, release in own.items():
@@ -186,6 +187,8 @@ def _local(count: int, scratch: Path) -> Any:
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise UnsupportedError(f"a worker process runs the script that starts it: {GUARD}")
     settings: dict[str, Any] = {"dashboard_address": None, "memory_limit": 0, "silence_logs": logging.CRITICAL}
+    # no page of the cluster is served, but its server is started: on any port, for this machine only
+    settings["scheduler_kwargs"] = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
     lean = {
         "temporary-directory": str(scratch),
         "distributed.worker.use-file-locking": False,  # nobody else has this folder
