@@ -288,7 +288,7 @@ EDITS = (
 )
 
 
-@pytest.mark.parametrize(("name", "edit"), EDITS)
+@pytest.mark.parametrize("name, edit", EDITS)
 def test_every_edit_of_a_description_is_mended(copy, whole, name, edit):
     edit(copy / name)
     assert_mended(copy, whole)
@@ -335,7 +335,7 @@ def test_a_manifest_that_was_changed_is_refused(copy, whole, key):
 @pytest.mark.parametrize("chunk", [0, -2, 2.0, 2**21, "2", None, True, [2], 10**400])
 def test_a_size_of_chunks_that_cannot_be_is_refused(copy, chunk):
     manifest_edited(copy, lambda told: told["options"].update(chunk=chunk), sign=True)
-    with pytest.raises(OutputError, match="manifest was changed|another sweep is there"):
+    with pytest.raises(OutputError, match=r"manifest was changed|another sweep is there"):
         swept(copy, chunk=None)
 
 
@@ -452,6 +452,6 @@ def test_counts_are_bounded_before_work_begins(tmp_path, monkeypatch):
     with pytest.raises(OutputError, match=r"10000000000 designs of \d+ bytes each are \d.* TB, and 100 GB are free"):
         swept(tmp_path / "a.zarr", {"size": (0.0, 1.0, 10**5), "phase": (0.0, 1.0, 10**5)})
     monkeypatch.setattr(layout, "_free_files", lambda _: 15)
-    with pytest.raises(OutputError, match="3 designs take .* files, and the disk has room for 15"):
+    with pytest.raises(OutputError, match=r"3 designs take .* files, and the disk has room for 15"):
         swept(tmp_path / "a.zarr")
     assert not list(tmp_path.iterdir())

@@ -51,7 +51,7 @@ def folder(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    ("name", "send", "when"),
+    "name, send, when",
     [
         ("SIGINT", "killpg", "computing"),
         ("SIGTERM", "kill", "starting"),

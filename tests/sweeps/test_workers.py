@@ -1,4 +1,4 @@
-"""Workers that are not as the client is: of other releases, without its files or its folder; clients that are killed."""
+"""Workers that are not as the client is: of other releases, without its files or folder; clients that are killed."""
 
 import json
 import os
@@ -147,6 +147,9 @@ def test_a_killed_client_of_a_cluster_loses_nothing(scheduler, tmp_path):
     client.wait()
     subprocess.run([*command, "--out", str(out), "--scheduler", scheduler], check=True, timeout=200)
     subprocess.run([*command, "--out", str(tmp_path / "b.zarr"), "--workers", "0"], check=True, timeout=200)
-    sums = [json.loads((tmp_path / name / "zarr.json").read_text())["attributes"]["checksum"] for name in ("a.zarr", "b.zarr")]
+    sums = [
+        json.loads((tmp_path / name / "zarr.json").read_text())["attributes"]["checksum"]
+        for name in ("a.zarr", "b.zarr")
+    ]
     assert sums[0] == sums[1] != ""
     assert not any(out.glob(".scratch-*"))

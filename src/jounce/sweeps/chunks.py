@@ -56,7 +56,7 @@ class Plan:
     identity: str
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what another process is given: it finds out by itself whether it sees the folder, and computes alike."""
+        """Return what another process is given, which finds out by itself whether it sees the folder."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
     @cached_property
@@ -168,7 +168,7 @@ def _unpickled(content: bytes) -> Any:
 
     try:
         return pickle.loads(content)
-    except Exception as error:
+    except Exception as error:  # noqa: BLE001 - whatever it needs and does not find
         said = " ".join(f"{type(error).__name__}: {error}".split())
         message = (
             f"a worker cannot load what is to be computed ({said}); it needs the same release of jounce as the client, "

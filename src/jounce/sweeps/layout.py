@@ -49,6 +49,7 @@ def files_of(
         Designs that are computed together.
     """
     import zarr
+    from zarr.storage import MemoryStore
 
     files: dict[str, Any] = {}
     attributes = {
@@ -58,7 +59,7 @@ def files_of(
         "manifest": json.dumps(manifest, indent=1),
         "checksum": "",
     }
-    store = zarr.storage.MemoryStore(files)
+    store = MemoryStore(files)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Consolidated metadata is currently not part")
         root = zarr.create_group(store, attributes=attributes)

@@ -89,7 +89,9 @@ def intact(manifest: Mapping[str, Any], path: str) -> dict[str, Any]:
         chunk = manifest["options"].get("chunk")
         if type(chunk) is int and 1 <= chunk <= LARGEST_CHUNK:
             return dict(manifest)
-    message = "its manifest was changed since it was written, so that nothing tells what was computed; give another name"
+    message = (
+        "its manifest was changed since it was written, so that nothing tells what was computed; give another name"
+    )
     raise OutputError(message, path=path)
 
 

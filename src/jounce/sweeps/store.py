@@ -22,17 +22,26 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import JounceError, OutputError
+from jounce.errors import OutputError
 from jounce.interrupts import undoing
 from jounce.io.files.reading import read_file, reason_of
+from jounce.sweeps.folder_files import (
+    LARGEST_ROOT,
+    REMOVE,
+    ROOT,
+    attributes_in,
+    is_blank,
+    is_sweep,
+    parsed,
+    put,
+    sync as _sync,
+    worded,
+)
 from jounce.sweeps.layout import DIGEST
 from jounce.sweeps.manifest import intact
 
 SUFFIX = ".zarr"
-ROOT = "zarr.json"
-LARGEST_ROOT = 200_000_000  # bytes of the descriptions of all arrays
 SCRATCH = ".scratch-"
-REMOVE = "remove it, and what it held is computed again"
 
 
 class Store:
@@ -62,7 +71,7 @@ class Store:
         """Return the manifest that is there now."""
         path = self.folder / ROOT
         try:
-            manifest = _parsed(_attributes(path)["manifest"], path)
+            manifest = parsed(attributes_in(path)["manifest"], path)
         except KeyError:
             raise OutputError("has no manifest of a sweep", path=str(path)) from None
         return intact(manifest, str(path))
@@ -72,7 +81,7 @@ class Store:
         """Arrays over the designs, whose descriptions were compared before."""
         import zarr
 
-        found = dict(zarr.open_group(self.folder, mode="r+", use_consolidated=True).arrays())
+        found: dict[str, Any] = dict(zarr.open_group(self.folder, mode="r+", use_consolidated=True).arrays())
         return {name: x for name, x in found.items() if (x.metadata.dimension_names or ("",))[0] == "design"}
 
     def write(self, chunk: int, start: int, arrays: Mapping[str, np.ndarray]) -> None:
@@ -84,14 +93,14 @@ class Store:
             The disk is full, or what else the system says.
         """
         written = []
-        with _worded(self.folder):
+        with worded(self.folder):
             for name, values in arrays.items():
                 self._arrays[name][start : start + len(values)] = values
                 written.append(self._part(name, chunk))
             for path in written:
                 _sync(path)
             self._mark(chunk).parent.mkdir(exist_ok=True)
-            _put(self._mark(chunk), self._digest(chunk, arrays))
+            put(self._mark(chunk), self._digest(chunk, arrays))
 
     def is_done(self, chunk: int) -> bool:
         """Tell whether a chunk is on the disk."""
@@ -118,7 +127,7 @@ class Store:
             Something else has the place of a file or a folder, and would have to be removed.
         """
         found = []
-        with _worded(self.folder):
+        with worded(self.folder):
             for folder in sorted({*self._folders(files)}):
                 if folder.is_symlink() or (os.path.lexists(folder) and not folder.is_dir()):
                     raise OutputError(f"has the place of a folder of the sweep; {REMOVE}", path=str(folder))
@@ -126,7 +135,7 @@ class Store:
                 path = self.folder / name
                 if (wanted := self._wanted(path, content)) is not None:
                     path.parent.mkdir(parents=True, exist_ok=True)
-                    _put(path, wanted)
+                    put(path, wanted)
                     found.append(Path(name).parts[0])
         return list(dict.fromkeys(found))
 
@@ -150,7 +159,7 @@ class Store:
             return content
         wanted = json.loads(content)
         try:
-            found = _parsed(there, path)
+            found = parsed(there, path)
         except OutputError:
             return content
         if path.parent == self.folder and isinstance(attributes := found.get("attributes"), dict):
@@ -166,7 +175,7 @@ class Store:
         OutputError
             Its digest cannot be removed.
         """
-        with _worded(self._mark(chunk)):
+        with worded(self._mark(chunk)):
             self._mark(chunk).unlink(missing_ok=True)
 
     def done(self, count: int) -> np.ndarray:
@@ -179,14 +188,14 @@ class Store:
         """Tell whether there is nothing but what was there before any chunk."""
         if next(self._marked(), None) is not None:
             return False
-        with _worded(self.folder):
+        with worded(self.folder):
             entries = [entry for entry in self.folder.iterdir() if not entry.name.startswith(SCRATCH)]
-            own = {ROOT: True} | {x.name: _is_blank(x) for x in entries if x.is_dir() and not x.is_symlink()}
+            own = {ROOT: True} | {x.name: is_blank(x) for x in entries if x.is_dir() and not x.is_symlink()}
         return all(own.get(entry.name, False) for entry in entries)
 
     def remove(self) -> None:
         """Remove the folder, which no other process may be writing to."""
-        with self.locked(), _worded(self.folder):
+        with self.locked(), worded(self.folder):
             shutil.rmtree(self.folder)
 
     def finish(self, count: int) -> str:
@@ -202,13 +211,13 @@ class Store:
             digest.update(read_file(self._mark(chunk), DIGEST, error=OutputError, is_input=False))
         checksum = digest.hexdigest()
         path = self.folder / ROOT
-        content = _parsed(read_file(path, LARGEST_ROOT, error=OutputError, is_input=False), path)
+        content = parsed(read_file(path, LARGEST_ROOT, error=OutputError, is_input=False), path)
         manifest = {**self.manifest, "checksum": checksum}
         told = {"manifest": json.dumps(manifest, indent=1), "checksum": checksum}
         if content["attributes"] != content["attributes"] | told:
             content["attributes"] |= told
-            with _worded(self.folder):
-                _put(path, json.dumps(content, indent=1).encode())
+            with worded(self.folder):
+                put(path, json.dumps(content, indent=1).encode())
         self.__dict__["manifest"] = manifest
         with suppress(OSError):
             for left in self.folder.rglob("*.partial"):  # by processes that were killed
@@ -221,7 +230,7 @@ class Store:
 
         Only what kills the process at once leaves it behind, for the next one to remove.
         """
-        with _worded(self.folder):
+        with worded(self.folder):
             path = Path(tempfile.mkdtemp(prefix=SCRATCH, dir=self.folder))
         try:
             with undoing(lambda: shutil.rmtree(path, ignore_errors=True)):
@@ -248,7 +257,7 @@ class Store:
         except ImportError:  # there is none on Windows
             yield
             return
-        with _worded(self.folder):
+        with worded(self.folder):
             descriptor = os.open(self.folder, os.O_RDONLY)
         try:
             try:
@@ -311,7 +320,7 @@ def find(folder: Path) -> Store | None:
         if not real.parent.is_dir():
             raise OutputError(f"the folder {real.parent} does not exist", path=str(folder))
         for above in real.parents:
-            if _is_sweep(above):
+            if is_sweep(above):
                 message = f"the folder {above} above is that of another sweep; give a name outside of it"
                 raise OutputError(message, path=str(folder))
         if not real.exists() or (real.is_dir() and not any(real.iterdir())):
@@ -321,12 +330,14 @@ def find(folder: Path) -> Store | None:
     except (OSError, ValueError) as error:
         raise OutputError(f"cannot be read: {reason_of(error)}", path=str(folder)) from None
     try:
-        found = "manifest" in _attributes(folder / ROOT)
+        found = "manifest" in attributes_in(folder / ROOT)
         reason = f"{ROOT} has no manifest"
     except OutputError as error:
         found, reason = False, f"{ROOT}: {error.message}"
     if not found:
-        message = f"something is there that is no sweep of jounce, or one that was damaged ({reason}); give another name"
+        message = (
+            f"something is there that is no sweep of jounce, or one that was damaged ({reason}); give another name"
+        )
         raise OutputError(message, path=str(folder))
     store = Store(folder)
     store.manifest  # noqa: B018 - it is compared with its digest
@@ -344,7 +355,7 @@ def create(folder: Path, files: Mapping[str, bytes]) -> Store:
     real = Path(os.path.realpath(folder))
     scratch = real.with_name(f".jounce-{secrets.token_hex(6)}")
     try:
-        with _worded(folder), undoing(lambda: shutil.rmtree(scratch, ignore_errors=True)):
+        with worded(folder), undoing(lambda: shutil.rmtree(scratch, ignore_errors=True)):
             for name, content in files.items():
                 path = scratch / name
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -356,85 +367,3 @@ def create(folder: Path, files: Mapping[str, bytes]) -> Store:
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
     return Store(folder)
-
-
-def _attributes(path: Path) -> dict[str, Any]:
-    """Return the attributes in the description of a group.
-
-    Raises
-    ------
-    OutputError
-        It cannot be read.
-    """
-    attributes = _parsed(read_file(path, LARGEST_ROOT, error=OutputError, is_input=False), path).get("attributes", {})
-    if not isinstance(attributes, dict):
-        raise OutputError("is no description of a group", path=str(path))
-    return attributes
-
-
-def _parsed(text: Any, path: Path) -> dict[str, Any]:
-    """Return what a text in JSON says, by name."""
-    try:
-        found = json.loads(text)
-    except (TypeError, ValueError, RecursionError):
-        raise OutputError("is no JSON", path=str(path)) from None
-    if not isinstance(found, dict):
-        raise OutputError("is no description of a group", path=str(path))
-    return found
-
-
-def _is_sweep(folder: Path) -> bool:
-    """Tell whether a folder says that it is that of a sweep."""
-    try:
-        return "manifest" in _attributes(folder / ROOT)
-    except JounceError:
-        return False
-
-
-def _is_blank(folder: Path) -> bool:
-    """Tell whether the folder of an array, or of a group, has nothing but descriptions and coordinates."""
-    inside = [path.relative_to(folder) for path in folder.rglob("*") if path.is_symlink() or not path.is_dir()]
-    others = [path for path in inside if path.name != ROOT]
-    if not others:
-        return True
-    try:
-        names = _parsed(read_file(folder / ROOT, LARGEST_ROOT, error=OutputError, is_input=False), folder)
-    except JounceError:
-        return False
-    return names.get("dimension_names") == [folder.name] and others == [Path("c", "0")]
-
-
-@contextmanager
-def _worded(path: Path) -> Iterator[None]:
-    """Name the file in what the system says, or a folder where it names none."""
-    try:
-        yield
-    except (IsADirectoryError, NotADirectoryError) as error:
-        message = f"something else has the place of a file of the sweep; {REMOVE}"
-        raise OutputError(message, path=os.fsdecode(error.filename2 or error.filename or path)) from error
-    except OSError as error:
-        named = error.filename2 or error.filename or path
-        raise OutputError(f"cannot be written: {reason_of(error)}", path=os.fsdecode(named)) from error
-
-
-def _put(path: Path, content: bytes) -> None:
-    """Put a whole file in its place, of which no link is followed; a folder there stays, and is an error."""
-    scratch = path.with_name(f"{path.name}.{secrets.token_hex(6)}.partial")
-    try:
-        with undoing(lambda: scratch.unlink(missing_ok=True)):
-            scratch.write_bytes(content)
-            _sync(scratch)
-            scratch.replace(path)
-            _sync(path.parent)
-    finally:
-        scratch.unlink(missing_ok=True)
-
-
-def _sync(path: Path) -> None:
-    """Bring a file, or the entries of a folder, onto the disk; what equals the fill value has no file."""
-    with suppress(FileNotFoundError, PermissionError):
-        descriptor = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
