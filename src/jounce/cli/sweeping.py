@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -107,7 +108,7 @@ def sweep(
     find(out)  # before anything is read
     with recording() as files:
         problem = _problem(file, trajectory, order, reading, payload, simulate, (method, tolerance, longest_step))
-    user_files = [str(path.absolute()) for path in reading.import_ or ()]
+    user_files = {str(path.absolute()): files[os.path.realpath(path)] for path in reading.import_ or ()}
     with errors_about(file):
         plan = prepare(
             problem, forms, out, _title(problem, file), files, sample=sample, histories=histories, chunk=chunk

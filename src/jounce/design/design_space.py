@@ -11,7 +11,7 @@ from jaxtyping import Float
 from jounce.design.variations import Interval, Values, Variation, spreads
 from jounce.errors import MechanismError
 
-MOST_DESIGNS = 10**12
+MOST_DESIGNS = 10**10
 BITS = 30  # of a Sobol sequence: as many points as there are
 SEED = 20260101  # of its scrambling, the same for all, so that a sweep can be continued
 

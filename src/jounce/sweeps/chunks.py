@@ -1,19 +1,24 @@
 """The work of one chunk of designs: computed, summarised and written where it is computed, by one worker or another."""
 
 import dataclasses
+import os
 import re
 import threading
+from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from jounce.design.design_space import Grid, Sobol
-from jounce.errors import JounceError, OutputError
+from jounce.errors import JounceError, MechanismFileError, OutputError
+from jounce.io.files.reading import recording
 from jounce.kinematics.threads import thread_count
+from jounce.sweeps.layout import axes_of, files_of
 from jounce.sweeps.manifest import check_same_arithmetic
 from jounce.sweeps.problems import Designs, Problem, Quantity
-from jounce.sweeps.statistics import kept_values
+from jounce.sweeps.statistics import Variable, kept_values, variables_of
 from jounce.sweeps.store import Store
 
 _computing = threading.Lock()
@@ -38,8 +43,6 @@ class Plan:
         Designs that are computed together.
     histories : bool
         Whether all instants are kept.
-    names : tuple of str
-        Arrays in which the parameters are kept.
     identity : str
         Of the folder's manifest.
     """
@@ -50,8 +53,27 @@ class Plan:
     folder: Path
     chunk: int
     histories: bool
-    names: tuple[str, ...]
     identity: str
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what another process is given, which finds out by itself whether it sees the folder."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
+    @cached_property
+    def variables(self) -> list[Variable]:
+        """Arrays over the designs, those of the parameters first."""
+        of = (self.quantities, list(self.space.variations), self.problem.levels, len(self.problem.instants))
+        return variables_of(*of, histories=self.histories)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Arrays in which the parameters are kept."""
+        return [variable.name for variable in self.variables[: len(self.space.variations)]]
+
+    def files(self, manifest: Mapping[str, Any]) -> dict[str, bytes]:
+        """Return the files of the folder before any chunk is computed."""
+        axes = axes_of(self.quantities, self.problem.instants, self.problem.levels)
+        return files_of(manifest, self.variables, axes, count=self.space.count, chunk=self.chunk)
 
     @property
     def chunks(self) -> int:
@@ -71,16 +93,20 @@ class Plan:
         OutputError
             This process sees another folder than the one that began the sweep, or none, or rounds otherwise.
         """
+        self._check_there()
         store = Store(self.folder)
-        try:
-            same = store.manifest["identity"] == self.identity
-        except (KeyError, ValueError):
-            same = False
-        if not same:
-            message = "a worker does not see this folder; workers on other machines need one that all of them share"
-            raise OutputError(message, path=str(self.folder))
         check_same_arithmetic(store.manifest, str(self.folder))
         return store
+
+    def _check_there(self) -> None:
+        """Raise OutputError unless the folder, seen from this process, is that of this sweep."""
+        try:
+            same = Store(self.folder).manifest["identity"] == self.identity
+        except OutputError:
+            same = False
+        if not same:
+            message = "a worker does not see this sweep there; workers on other machines need a folder that all share"
+            raise OutputError(message, path=str(self.folder))
 
     def compute(self, chunk: int, threads: int | None = None) -> None:
         """Compute a chunk and write it, unless it is there.
@@ -96,6 +122,7 @@ class Plan:
         designs = self.space.values(start, start + self.size(chunk))
         with _computing:  # and another one is computed while this one is written
             arrays = self._computed(designs, start, thread_count(threads))
+        self._check_there()  # still: a client that was killed may have been followed by one with another sweep
         self.store.write(chunk, start, arrays)
 
     def _computed(self, designs: Designs, start: int, threads: int) -> dict[str, np.ndarray]:
@@ -115,9 +142,7 @@ class Plan:
 
 @lru_cache(maxsize=1)
 def _loaded(content: bytes) -> Plan:
-    import pickle
-
-    prepare, user_files, plan = pickle.loads(content)
+    prepare, user_files, plan = _unpickled(content)
     if prepare is not None:
         prepare()
     if user_files:
@@ -125,9 +150,31 @@ def _loaded(content: bytes) -> Plan:
         from jounce.kinematics.store import keep_programs
 
         keep_programs(None)  # what is compiled may be other than this package says
-        for path in user_files:
-            import_file(path)
-    return pickle.loads(plan)
+        for path, digest in user_files.items():
+            with recording() as files:
+                try:
+                    import_file(path)
+                except JounceError as error:
+                    error.message += " (seen from a worker)"
+                    raise
+            if files[os.path.realpath(path)] != digest:
+                message = "is another file where a worker is; all must have the same one, under the same path"
+                raise MechanismFileError(message, path=path)
+    return _unpickled(plan)
+
+
+def _unpickled(content: bytes) -> Any:
+    import pickle
+
+    try:
+        return pickle.loads(content)
+    except Exception as error:  # noqa: BLE001 - whatever it needs and does not find
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        message = (
+            f"a worker cannot load what is to be computed ({said}); it needs the same release of jounce as the client, "
+            "and the modules that your own classes are from"
+        )
+        raise JounceError(message) from None
 
 
 def compute_on_worker(content: bytes, chunk: int, threads: int | None) -> int:

@@ -3,14 +3,17 @@
 import logging
 import multiprocessing
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 from jounce.errors import JounceError, UnsupportedError
 from jounce.kinematics.threads import thread_count
 from jounce.sweeps.chunks import Plan, compute_on_worker
+from jounce.sweeps.manifest import versions
 
 AHEAD = 2  # chunks that wait for each thread of the cluster
 POLL = 5.0  # s
@@ -40,7 +43,8 @@ def compute_on_cluster(
     scheduler: str | None,
     workers: int | None,
     timeout: float,
-    user_files: Sequence[str] = (),
+    scratch: Path,
+    user_files: Mapping[str, str] | None = None,
     prepare: Callable[[], object] | None = None,
 ) -> None:
     """Compute chunks on the workers of a cluster; results stay where they are written.
@@ -58,8 +62,10 @@ def compute_on_cluster(
         Processes on this machine.
     timeout : float
         Of an answer, s.
-    user_files : sequence of str
-        Python files with the user's own classes.
+    scratch : Path
+        Folder for what workers on this machine keep meanwhile.
+    user_files : dict of str to str, optional
+        Digests of Python files with the user's own classes, by their paths.
     prepare : callable, optional
         What each worker calls first.
 
@@ -72,9 +78,31 @@ def compute_on_cluster(
     """
     import cloudpickle
 
-    content = cloudpickle.dumps((prepare, tuple(user_files), cloudpickle.dumps(plan)))
-    with _client(scheduler, workers, timeout) as client:
+    content = cloudpickle.dumps((prepare, user_files, cloudpickle.dumps(plan)))
+    with _client(scheduler, workers, timeout, scratch) as client:
+        if scheduler is not None:
+            _check_releases(client, timeout)
         _compute(client, content, iter(chunks), done, threads=1 if scheduler is None else None)
+
+
+def _check_releases(client: Any, timeout: float) -> None:
+    """Raise ClusterError unless all workers have the packages that compute in the releases of this process.
+
+    What a worker that joins later has, is compared with the manifest where it computes.
+    """
+    names = list(versions())
+    try:
+        found = client.sync(client._get_versions, packages=names, callback_timeout=max(timeout, PATIENCE))
+    except (OSError, TimeoutError) as error:
+        raise _lost(error) from None
+    own = {name: found["client"]["packages"].get(name) for name in names}  # told in the same way
+    for address, told in sorted(found["workers"].items()):
+        packages = told["packages"] if isinstance(told, dict) else {}
+        for name, release in own.items():
+            if packages.get(name) != release:
+                there = f"has {name} {packages[name]}" if packages.get(name) else f"has no {name}"
+                message = f"the worker {address} {there}, the client has {release}; all must have the same release"
+                raise ClusterError(message, name="scheduler")
 
 
 def _compute(
@@ -128,13 +156,13 @@ def _lost(reason: object) -> ClusterError:
 
 
 @contextmanager
-def _client(scheduler: str | None, workers: int | None, timeout: float) -> Iterator[Any]:
+def _client(scheduler: str | None, workers: int | None, timeout: float, scratch: Path) -> Iterator[Any]:
     """Give a client of a cluster, which is started on this machine unless it has an address."""
     from distributed import Client
 
     with _quiet(), ExitStack() as closing:
         if scheduler is None:
-            cluster = closing.enter_context(_local(thread_count(workers)))
+            cluster = closing.enter_context(_local(thread_count(workers), scratch))
             yield closing.enter_context(Client(cluster))
             return
         try:
@@ -151,7 +179,7 @@ def _client(scheduler: str | None, workers: int | None, timeout: float) -> Itera
         yield client
 
 
-def _local(count: int) -> Any:
+def _local(count: int, scratch: Path) -> Any:
     """Start worker processes on this machine."""
     import dask.config
     from distributed import LocalCluster
@@ -159,17 +187,37 @@ def _local(count: int) -> Any:
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise UnsupportedError(f"a worker process runs the script that starts it: {GUARD}")
     settings: dict[str, Any] = {"dashboard_address": None, "memory_limit": 0, "silence_logs": logging.CRITICAL}
+    # no page of the cluster is served, but its server is started: on any port, for this machine only
+    settings["scheduler_kwargs"] = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
     lean = {
+        "temporary-directory": str(scratch),
+        "distributed.worker.use-file-locking": False,  # nobody else has this folder
         "distributed.worker.profile.enabled": False,  # it looks at all stacks a hundred times a second
         # a worker has one core: threads of XLA would take it from the others. Dask's own MALLOC_TRIM_THRESHOLD_ is left
         # out, which gives every large array new pages
         "distributed.nanny.pre-spawn-environ": {"PJRT_NPROC": os.environ.get("PJRT_NPROC", "1")},
     }
     try:
+        _track_quietly()
         with dask.config.set(lean):
             return LocalCluster(n_workers=count, threads_per_worker=1, processes=True, **settings)
     except (OSError, RuntimeError) as error:
         raise ClusterError(f"the workers did not start ({error}); if this is a script: {GUARD}") from None
+
+
+def _track_quietly() -> None:
+    """Start the process that removes semaphores after this one, unless it runs: it shall not tell that there were any.
+
+    Where a signal ends this process at once they are left to it, as they should be.
+    """
+    from multiprocessing import resource_tracker
+
+    before = sys.warnoptions
+    sys.warnoptions = [*before, "ignore:resource_tracker:UserWarning"]
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        sys.warnoptions = before
 
 
 @contextmanager

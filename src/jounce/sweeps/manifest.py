@@ -2,6 +2,7 @@
 
 import dataclasses
 import importlib.metadata
+import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,7 +18,8 @@ from jounce.kinematics.alone import is_wanted
 from jounce.kinematics.device import on_processor
 from jounce.sweeps.fingerprints import fingerprint
 
-FORMAT = 2  # of 1, digests told nothing of the sweep and the place of a chunk
+FORMAT = 3  # of 1, digests told nothing of the sweep and the place of a chunk; of 2, coordinates were compressed
+LARGEST_CHUNK = 2**20  # that may be asked for
 COMPARED = ("vary", "options", "versions", "arithmetic")  # groups of a manifest, value by value
 LIBRARIES = ("jax", "jaxlib", "numpy")  # other versions may give other last bits
 
@@ -46,9 +48,7 @@ def manifest_of(
     options : dict
         What was chosen besides.
     """
-    from jounce import __version__
-
-    return {
+    told = {
         "format": FORMAT,
         "title": title,
         "files": _named(files),
@@ -59,10 +59,53 @@ def manifest_of(
         "time": f"{len(instants)} instants from {float(instants[0])!r} to {float(instants[-1])!r} s, "
         f"digest {fingerprint(instants)[:16]}",
         "options": dict(options),
-        "versions": {"jounce": __version__} | {name: importlib.metadata.version(name) for name in LIBRARIES},
+        "versions": versions(),
         "arithmetic": arithmetic(),
         "checksum": None,
     }
+    told = json.loads(json.dumps(told))  # as it is read again
+    return told | {"identity": _identity(told)}
+
+
+def _identity(manifest: Mapping[str, Any]) -> str:
+    """Return a digest of all that is known when a sweep begins."""
+    left_out = {"checksum": None, "identity": None}
+    return fingerprint({name: value for name, value in manifest.items() if name not in left_out} | left_out)
+
+
+def intact(manifest: Mapping[str, Any], path: str) -> dict[str, Any]:
+    """Return a manifest that was read from a file.
+
+    Raises
+    ------
+    OutputError
+        Another release wrote it, or it was changed since it was written.
+    """
+    before = manifest.get("format")
+    if isinstance(before, int) and before != FORMAT:
+        raise OutputError("was begun by another release of jounce; give another name", path=path)
+    groups = [manifest.get(name) for name in ("files", *COMPARED)]
+    if all(isinstance(group, dict) for group in groups) and manifest.get("identity") == _identity(manifest):
+        chunk = manifest["options"].get("chunk")
+        if type(chunk) is int and 1 <= chunk <= LARGEST_CHUNK:
+            return dict(manifest)
+    message = (
+        "its manifest was changed since it was written, so that nothing tells what was computed; give another name"
+    )
+    raise OutputError(message, path=path)
+
+
+def versions() -> dict[str, str]:
+    """Return the releases of this package and of those that compute in this process.
+
+    Examples
+    --------
+    >>> sorted(versions())
+    ['jax', 'jaxlib', 'jounce', 'numpy']
+    """
+    from jounce import __version__
+
+    return {"jounce": __version__} | {name: importlib.metadata.version(name) for name in LIBRARIES}
 
 
 def arithmetic() -> dict[str, str]:
@@ -82,7 +125,8 @@ def arithmetic() -> dict[str, str]:
 
 def check_same_arithmetic(there: Mapping[str, Any], folder: str) -> None:
     """Raise OutputError, with what differs, unless this process computes as the one that began a sweep."""
-    if differences := _others(there["arithmetic"], arithmetic()):
+    own = versions()
+    if differences := _others(there.get("versions", own), own) + _others(there["arithmetic"], arithmetic()):
         message = f"a worker rounds otherwise than what began the sweep: {'; '.join(differences)}"
         raise OutputError(f"{message}; install the same packages for both", path=folder)
 
@@ -97,8 +141,6 @@ def _named(files: Mapping[str, str]) -> dict[str, str]:
 
 def check_same(there: Mapping[str, Any], wanted: Mapping[str, Any], folder: str) -> None:
     """Raise OutputError, with what differs, unless a sweep that was begun is the one that is wanted."""
-    if there.get("format") != FORMAT:
-        raise OutputError("was begun by another release of jounce; give another name", path=folder)
     differences = list(_differences(there, wanted))
     if differences:
         message = (
@@ -115,12 +157,12 @@ def _differences(there: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[st
         before, now = there["files"].get(name), wanted["files"].get(name)
         if before != now:
             found.append(f"the file {name} {'was not read' if before is None else 'differs' if now else 'is not read'}")
-    others = [{name: x[name] for name in ("sample", "time")} for x in (there, wanted)]
+    others = [{name: x.get(name) for name in ("sample", "time")} for x in (there, wanted)]
     for before, now in [*((there[group], wanted[group]) for group in COMPARED), others]:
         found += _others(before, now)
     if list(there["vary"]) != list(wanted["vary"]) and not found:
         found.append(f"the order of what varies is {', '.join(there['vary'])} there")
-    if there["model"] != wanted["model"] and not found:
+    if there["identity"] != wanted["identity"] and not found:
         found.append("the model has other values")
     return found
 

@@ -3,6 +3,9 @@
 The array ``chunks/digest`` has the digest of every chunk, in a file of its own that is written last, when the arrays of
 the chunk are on the disk: what it names is whole. What a process that was killed has left half done has no digest, and
 is computed again.
+
+Nothing in the folder is taken on trust: each file is compared with what it must hold, no link is followed where
+something is written, and nothing is opened that is no regular file.
 """
 
 import hashlib
@@ -10,7 +13,8 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+import tempfile
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cached_property
 from pathlib import Path
@@ -20,17 +24,24 @@ import numpy as np
 
 from jounce.errors import OutputError
 from jounce.interrupts import undoing
-from jounce.io.files.reading import reason_of
-from jounce.io.files.writing import replacing
-from jounce.sweeps.problems import Quantity
-from jounce.sweeps.statistics import Variable
+from jounce.io.files.reading import read_file, reason_of
+from jounce.sweeps.folder_files import (
+    LARGEST_ROOT,
+    REMOVE,
+    ROOT,
+    attributes_in,
+    is_blank,
+    is_sweep,
+    parsed,
+    put,
+    sync as _sync,
+    worded,
+)
+from jounce.sweeps.layout import DIGEST
+from jounce.sweeps.manifest import intact
 
 SUFFIX = ".zarr"
-AXES = {
-    "time": {"units": "s", "long_name": "time"},
-    "derivative": {"long_name": "order of the time derivative"},
-}
-BYTES = hashlib.sha256().digest_size
+SCRATCH = ".scratch-"
 
 
 class Store:
@@ -47,14 +58,31 @@ class Store:
 
     @cached_property
     def manifest(self) -> dict[str, Any]:
-        """What the sweep is, as it was written when it began."""
-        return json.loads(_attributes(self.folder)["manifest"])
+        """What the sweep is, as it was written when it began.
+
+        Raises
+        ------
+        OutputError
+            It is not there, or was changed since.
+        """
+        return self.reread()
+
+    def reread(self) -> dict[str, Any]:
+        """Return the manifest that is there now."""
+        path = self.folder / ROOT
+        try:
+            manifest = parsed(attributes_in(path)["manifest"], path)
+        except KeyError:
+            raise OutputError("has no manifest of a sweep", path=str(path)) from None
+        return intact(manifest, str(path))
 
     @cached_property
     def _arrays(self) -> dict[str, Any]:
+        """Arrays over the designs, whose descriptions were compared before."""
         import zarr
 
-        return dict(zarr.open_group(self.folder, mode="r+", use_consolidated=True).arrays())
+        found: dict[str, Any] = dict(zarr.open_group(self.folder, mode="r+", use_consolidated=True).arrays())
+        return {name: x for name, x in found.items() if (x.metadata.dimension_names or ("",))[0] == "design"}
 
     def write(self, chunk: int, start: int, arrays: Mapping[str, np.ndarray]) -> None:
         """Write the arrays of a chunk, whose first design is `start`; it is done once all is on the disk.
@@ -65,90 +93,155 @@ class Store:
             The disk is full, or what else the system says.
         """
         written = []
-        try:
+        with worded(self.folder):
             for name, values in arrays.items():
-                target = self._arrays[name]
-                target[start : start + len(values)] = values
-                key = target.metadata.encode_chunk_key((chunk, *[0] * (values.ndim - 1)))
-                written.append(self.folder / name / key)
+                self._arrays[name][start : start + len(values)] = values
+                written.append(self._part(name, chunk))
             for path in written:
                 _sync(path)
-            mark = self._mark(chunk)
-            mark.parent.mkdir(exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"cannot be written: {reason_of(error)}", path=str(self.folder)) from error
-        with replacing(mark) as scratch:
-            scratch.write_bytes(self._digest(chunk, arrays))
+            self._mark(chunk).parent.mkdir(exist_ok=True)
+            put(self._mark(chunk), self._digest(chunk, arrays))
 
     def is_done(self, chunk: int) -> bool:
         """Tell whether a chunk is on the disk."""
-        return self._mark(chunk).exists()
+        return self._mark(chunk).is_file()
 
     def is_whole(self, chunk: int, start: int, count: int) -> bool:
         """Tell whether the arrays of a chunk that is done, of so many designs, are those that were written."""
+        parts = [self._part(name, chunk) for name in self._arrays]
         try:
-            arrays = {
-                name: array[start : start + count]
-                for name, array in self._arrays.items()
-                if (array.metadata.dimension_names or ("",))[0] == "design"
-            }
-            return self._digest(chunk, arrays) == self._mark(chunk).read_bytes()
+            if any(part.exists() and not part.is_file() for part in parts):  # what equals the fill value has no file
+                return False
+            arrays = {name: array[start : start + count] for name, array in self._arrays.items()}
+            digest = read_file(self._mark(chunk), DIGEST, is_input=False)
+            return self._digest(chunk, arrays) == digest
         except Exception:  # noqa: BLE001 - whatever is wrong with its files, it is computed again
             return False
 
-    def mended(self, axes: Mapping[str, np.ndarray]) -> list[str]:
-        """Return the names of coordinates that are not those that were written, and write them again."""
+    def mended(self, files: Mapping[str, bytes]) -> list[str]:
+        """Write files that were there before any chunk again unless they hold what they must; return whose they are.
+
+        Raises
+        ------
+        OutputError
+            Something else has the place of a file or a folder, and would have to be removed.
+        """
         found = []
-        for name, values in axes.items():
-            try:
-                same = np.array_equal(self._arrays[name][:], values)
-            except Exception:  # noqa: BLE001 - whatever is wrong with its files, it is written again
-                same = False
-            if not same:
-                self._arrays[name][:] = values
-                found.append(name)
-        return found
+        with worded(self.folder):
+            for folder in sorted({*self._folders(files)}):
+                if folder.is_symlink() or (os.path.lexists(folder) and not folder.is_dir()):
+                    raise OutputError(f"has the place of a folder of the sweep; {REMOVE}", path=str(folder))
+            for name, content in files.items():
+                path = self.folder / name
+                if (wanted := self._wanted(path, content)) is not None:
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    put(path, wanted)
+                    found.append(Path(name).parts[0])
+        return list(dict.fromkeys(found))
+
+    def _folders(self, files: Mapping[str, bytes]) -> Iterator[Path]:
+        """Yield the folders that hold the files of a sweep, now or when it is done."""
+        for name in files:
+            parents = Path(name).parents[:-1]
+            yield from (self.folder / parent for parent in parents)
+            if parents and Path(name).name == ROOT:
+                yield self.folder / parents[0] / "c"
+
+    def _wanted(self, path: Path, content: bytes) -> bytes | None:
+        """Return what a file must hold, None where it does; what others wrote about the whole sweep stays."""
+        try:
+            there = read_file(path, LARGEST_ROOT, error=OutputError, is_input=False)
+        except OutputError:
+            return content
+        if there == content:
+            return None
+        if path.name != ROOT:
+            return content
+        wanted = json.loads(content)
+        try:
+            found = parsed(there, path)
+        except OutputError:
+            return content
+        if path.parent == self.folder and isinstance(attributes := found.get("attributes"), dict):
+            own = {name: attributes.get(name) for name in ("manifest", "checksum")}
+            wanted["attributes"] = attributes | wanted["attributes"] | own
+        return None if found == wanted else json.dumps(wanted, indent=1).encode()
 
     def forget(self, chunk: int) -> None:
-        """Have a chunk computed again."""
-        self._mark(chunk).unlink(missing_ok=True)
+        """Have a chunk computed again.
+
+        Raises
+        ------
+        OutputError
+            Its digest cannot be removed.
+        """
+        with worded(self._mark(chunk)):
+            self._mark(chunk).unlink(missing_ok=True)
 
     def done(self, count: int) -> np.ndarray:
         """Tell which of the chunks were put on the disk."""
         found = np.zeros(count, bool)
-        with suppress(FileNotFoundError), os.scandir(self._mark(0).parent) as entries:
-            found[[int(entry.name) for entry in entries if entry.name.isdecimal()]] = True
+        found[[chunk for chunk in map(int, self._marked()) if chunk < count]] = True
         return found
 
     def is_empty(self) -> bool:
-        """Tell whether no chunk is on the disk."""
-        with suppress(FileNotFoundError), os.scandir(self._mark(0).parent) as entries:
-            return not any(entry.name.isdecimal() for entry in entries)
-        return True
+        """Tell whether there is nothing but what was there before any chunk."""
+        if next(self._marked(), None) is not None:
+            return False
+        with worded(self.folder):
+            entries = [entry for entry in self.folder.iterdir() if not entry.name.startswith(SCRATCH)]
+            own = {ROOT: True} | {x.name: is_blank(x) for x in entries if x.is_dir() and not x.is_symlink()}
+        return all(own.get(entry.name, False) for entry in entries)
 
     def remove(self) -> None:
         """Remove the folder, which no other process may be writing to."""
-        with self.locked():
+        with self.locked(), worded(self.folder):
             shutil.rmtree(self.folder)
 
     def finish(self, count: int) -> str:
-        """Return the digest of the digests of all chunks, and put it into the manifest, whatever stands there."""
+        """Return the digest of the digests of all chunks, and put it into the manifest, whatever stands there.
+
+        Raises
+        ------
+        OutputError
+            A digest is gone, or the manifest cannot be written.
+        """
         digest = hashlib.sha256()
         for chunk in range(count):
-            digest.update(self._mark(chunk).read_bytes())
+            digest.update(read_file(self._mark(chunk), DIGEST, error=OutputError, is_input=False))
         checksum = digest.hexdigest()
-        path = self.folder / "zarr.json"
-        content = json.loads(path.read_text(encoding="utf-8"))
+        path = self.folder / ROOT
+        content = parsed(read_file(path, LARGEST_ROOT, error=OutputError, is_input=False), path)
         manifest = {**self.manifest, "checksum": checksum}
         told = {"manifest": json.dumps(manifest, indent=1), "checksum": checksum}
         if content["attributes"] != content["attributes"] | told:
             content["attributes"] |= told
-            with replacing(path) as scratch:
-                scratch.write_text(json.dumps(content, indent=1), encoding="utf-8")
+            with worded(self.folder):
+                put(path, json.dumps(content, indent=1).encode())
         self.__dict__["manifest"] = manifest
-        for left in self.folder.glob("*/c/**/*.partial"):  # by processes that were killed
-            left.unlink(missing_ok=True)
+        with suppress(OSError):
+            for left in self.folder.rglob("*.partial"):  # by processes that were killed
+                left.unlink(missing_ok=True)
         return checksum
+
+    @contextmanager
+    def scratch(self) -> Iterator[Path]:
+        """Give a folder for what workers keep meanwhile; it goes also where a signal ends the process.
+
+        Only what kills the process at once leaves it behind, for the next one to remove.
+        """
+        with worded(self.folder):
+            path = Path(tempfile.mkdtemp(prefix=SCRATCH, dir=self.folder))
+        try:
+            with undoing(lambda: shutil.rmtree(path, ignore_errors=True)):
+                yield path
+        finally:
+            shutil.rmtree(path, ignore_errors=True)
+
+    def clear(self) -> None:
+        """Remove what processes that were killed have left for their workers."""
+        for left in self.folder.glob(f"{SCRATCH}*"):
+            shutil.rmtree(left, ignore_errors=True)
 
     @contextmanager
     def locked(self) -> Iterator[None]:
@@ -164,7 +257,8 @@ class Store:
         except ImportError:  # there is none on Windows
             yield
             return
-        descriptor = os.open(self.folder, os.O_RDONLY)
+        with worded(self.folder):
+            descriptor = os.open(self.folder, os.O_RDONLY)
         try:
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -189,8 +283,25 @@ class Store:
             digest.update((np.where(np.isnan(values), np.nan, values) if values.dtype.kind == "f" else values).data)
         return digest.digest()
 
+    def _part(self, name: str, chunk: int) -> Path:
+        """Return the file of a chunk of an array, which is whole along all other dimensions."""
+        array = self._arrays[name]
+        return self.folder / name / array.metadata.encode_chunk_key((chunk, *[0] * (array.ndim - 1)))
+
     def _mark(self, chunk: int) -> Path:
         return self.folder / "chunks" / "digest" / "c" / str(chunk)
+
+    def _marked(self) -> Iterator[str]:
+        """Yield the names of the digests that are there."""
+        folder = self._mark(0).parent
+        try:
+            with os.scandir(folder) as entries:
+                names = [entry.name for entry in entries]
+        except (FileNotFoundError, NotADirectoryError):
+            return
+        except OSError as error:
+            raise OutputError(f"cannot be read: {reason_of(error)}", path=str(folder)) from None
+        yield from (name for name in names if name.isascii() and name.isdecimal() and len(name) < 16)
 
 
 def find(folder: Path) -> Store | None:
@@ -199,115 +310,60 @@ def find(folder: Path) -> Store | None:
     Raises
     ------
     OutputError
-        The name does not end in .zarr, the folder above does not exist, or what is there is no sweep.
+        The name does not end in .zarr, the folder above does not exist or belongs to another sweep, or what is there is
+        no sweep.
     """
     if folder.suffix.lower() != SUFFIX:
         raise OutputError(f"a sweep is written to a folder whose name ends in {SUFFIX}", path=str(folder))
     try:
-        if not folder.absolute().parent.is_dir():
-            raise OutputError(f"the folder {folder.absolute().parent} does not exist", path=str(folder))
-        if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
-            if not os.access(folder.absolute().parent, os.W_OK | os.X_OK):
+        real = Path(os.path.realpath(folder))
+        if not real.parent.is_dir():
+            raise OutputError(f"the folder {real.parent} does not exist", path=str(folder))
+        for above in real.parents:
+            if is_sweep(above):
+                message = f"the folder {above} above is that of another sweep; give a name outside of it"
+                raise OutputError(message, path=str(folder))
+        if not real.exists() or (real.is_dir() and not any(real.iterdir())):
+            if not os.access(real.parent, os.W_OK | os.X_OK):
                 raise OutputError("nothing may be written in the folder above", path=str(folder))
             return None
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise OutputError(f"cannot be read: {reason_of(error)}", path=str(folder)) from None
-    if "manifest" not in _attributes(folder):
-        raise OutputError("something is there that is no sweep of jounce; give another name", path=str(folder))
-    return Store(folder)
+    try:
+        found = "manifest" in attributes_in(folder / ROOT)
+        reason = f"{ROOT} has no manifest"
+    except OutputError as error:
+        found, reason = False, f"{ROOT}: {error.message}"
+    if not found:
+        message = (
+            f"something is there that is no sweep of jounce, or one that was damaged ({reason}); give another name"
+        )
+        raise OutputError(message, path=str(folder))
+    store = Store(folder)
+    store.manifest  # noqa: B018 - it is compared with its digest
+    return store
 
 
-def create(
-    folder: Path,
-    manifest: Mapping[str, Any],
-    variables: Sequence[Variable],
-    axes: Mapping[str, np.ndarray],
-    *,
-    count: int,
-    chunk: int,
-) -> Store:
-    """Make the folder of a sweep, with all arrays and nothing in them; it appears whole or not at all.
+def create(folder: Path, files: Mapping[str, bytes]) -> Store:
+    """Make the folder of a sweep, with some files in it; it appears whole or not at all.
 
     Raises
     ------
     OutputError
         It cannot be written.
     """
-    import warnings
-
-    import zarr
-
-    scratch = folder.with_name(f".jounce-{secrets.token_hex(6)}")
-    attributes = {
-        "title": manifest["title"],
-        "source": "jounce",
-        "coordinates": " ".join(v.name for v in variables[: len(manifest["vary"])]),
-        "manifest": json.dumps(manifest, indent=1),
-        "checksum": "",
-    }
+    real = Path(os.path.realpath(folder))
+    scratch = real.with_name(f".jounce-{secrets.token_hex(6)}")
     try:
-        with undoing(lambda: shutil.rmtree(scratch, ignore_errors=True)), warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message="Consolidated metadata is currently not part")
-            root = zarr.create_group(scratch, attributes=attributes)
-            for name, values in axes.items():
-                _axis(root, name, values)
-            for variable in variables:
-                root.create_array(
-                    variable.name,
-                    shape=(count, *variable.shape),
-                    chunks=(chunk, *variable.shape),
-                    dtype=variable.dtype,
-                    fill_value=float("nan") if variable.dtype == "f8" else -1,
-                    dimension_names=("design", *variable.dims),
-                    attributes=variable.attributes,
-                )
-            root.create_group("chunks").create_array(
-                "digest", shape=(BYTES * -(-count // chunk),), chunks=(BYTES,), dtype="u1", compressors=None
-            )
-            zarr.consolidate_metadata(scratch)
+        with worded(folder), undoing(lambda: shutil.rmtree(scratch, ignore_errors=True)):
+            for name, content in files.items():
+                path = scratch / name
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(content)
             for path in scratch.rglob("*"):
                 _sync(path)
-            scratch.rename(folder)
-            _sync(folder.absolute().parent)
-    except OSError as error:
-        raise OutputError(f"cannot be written: {reason_of(error)}", path=str(folder)) from error
+            scratch.rename(real)
+            _sync(real.parent)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
     return Store(folder)
-
-
-def axes_of(quantities: Sequence[Quantity], instants: np.ndarray, levels: int) -> dict[str, np.ndarray]:
-    """Return the coordinates of the dimensions of a sweep besides the design, by name."""
-    labels = {axis: names for quantity in quantities for axis, names in quantity.axes}
-    named = {axis: np.array(names, np.dtypes.StringDType()) for axis, names in labels.items()}
-    return {"time": np.asarray(instants, float), "derivative": np.arange(levels)} | named
-
-
-def _axis(root: Any, name: str, values: np.ndarray) -> None:
-    array = root.create_array(
-        name,
-        shape=values.shape,
-        chunks=values.shape,
-        dtype=values.dtype,
-        dimension_names=(name,),
-        attributes=AXES.get(name, {}),
-    )
-    array[:] = values
-
-
-def _attributes(folder: Path) -> dict[str, Any]:
-    try:
-        found = json.loads((folder / "zarr.json").read_text(encoding="utf-8"))
-        return dict(found.get("attributes", {}))
-    except (OSError, ValueError, AttributeError):
-        return {}
-
-
-def _sync(path: Path) -> None:
-    """Bring a file, or the entries of a folder, onto the disk; what equals the fill value has no file."""
-    with suppress(FileNotFoundError, PermissionError):
-        descriptor = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)

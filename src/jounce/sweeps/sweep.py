@@ -21,17 +21,16 @@ from jounce.mechanism.time import TimeLike
 from jounce.robot.robot import Robot
 from jounce.sweeps.chunks import Plan
 from jounce.sweeps.cluster import check_installed, compute_on_cluster
-from jounce.sweeps.fingerprints import fingerprint
-from jounce.sweeps.manifest import check_same, manifest_of
+from jounce.sweeps.layout import check_room
+from jounce.sweeps.manifest import LARGEST_CHUNK, check_same, manifest_of
 from jounce.sweeps.problems import Motions, Problem, Quantity, Simulations, Torques
-from jounce.sweeps.statistics import variables_of
-from jounce.sweeps.store import Store, axes_of, create, find
+from jounce.sweeps.store import Store, create, find
 from jounce.trajectory.joint_trajectory import JointTrajectory
 
 if TYPE_CHECKING:
     import xarray
 
-LARGEST_CHUNK, SMALLEST_CHUNK = 1024, 16
+USUAL_CHUNK, SMALLEST_CHUNK = 1024, 16
 NUMBERS = 4_000_000  # of the histories of a chunk
 LEAST_CHUNKS = 8  # so that several workers have something to do
 
@@ -165,18 +164,15 @@ def prepare(
     chunk = _chunk(chunk, there, space.count, quantities, len(instants) * problem.levels)
     options = {**problem.options(), "histories": histories, "chunk": chunk}
     manifest = manifest_of(title, problem, files, space, instants, options)
-    manifest["identity"] = fingerprint(manifest)
-    variables = variables_of(quantities, list(variations), problem.levels, len(instants), histories=histories)
-    if there is not None and there.is_empty() and _differs(there, manifest, folder):
-        there.remove()  # an attempt of which nothing was computed
-        there = None
-    if there is None:
-        sizes = {"count": space.count, "chunk": chunk}
-        create(folder, manifest, variables, axes_of(quantities, instants, problem.levels), **sizes)
+    plan = Plan(problem, space, quantities, folder.absolute(), chunk, histories, manifest["identity"])
+    if there is None or (there.is_empty() and _differs(there, manifest, folder)):
+        check_room(folder, plan.variables, space.count, chunk)
+        if there is not None:
+            there.remove()  # an attempt of which nothing was computed
+        create(folder, plan.files(manifest))
     else:
         check_same(there.manifest, manifest, str(folder))
-    names = tuple(variable.name for variable in variables[: len(variations)])
-    return Plan(problem, space, quantities, folder.absolute(), chunk, histories, names, manifest["identity"])
+    return plan
 
 
 def run(
@@ -186,7 +182,7 @@ def run(
     scheduler: str | None = None,
     timeout: float = 10.0,
     progress: Callable[[int, int], None] | None = None,
-    user_files: Sequence[str] = (),
+    user_files: Mapping[str, str] | None = None,
     prepare_worker: Callable[[], object] | None = None,
 ) -> str:
     """Compute what is not on the disk yet, and return the checksum of the whole.
@@ -198,6 +194,7 @@ def run(
     """
     store = plan.store
     with store.locked():
+        store.clear()
         done = _whole(plan)
         told = _Told(plan, sum(map(plan.size, np.flatnonzero(done).tolist())), progress)
         left = (chunk for chunk in range(plan.chunks) if not done[chunk])
@@ -211,17 +208,19 @@ def run(
                     check_installed("zarr", "distributed")
                     processes = None if workers is None else whole_number("workers", workers, 1, error=JounceError)
                     where = {"scheduler": scheduler, "workers": processes, "timeout": timeout}
-                    compute_on_cluster(plan, left, told, **where, user_files=user_files, prepare=prepare_worker)
+                    with store.scratch() as scratch:
+                        where["scratch"] = scratch
+                        compute_on_cluster(plan, left, told, **where, user_files=user_files, prepare=prepare_worker)
         return store.finish(plan.chunks)
 
 
 def _whole(plan: Plan) -> Bool[np.ndarray, " chunk"]:
     """Tell which chunks are on the disk as they were written; others are forgotten, and told in a warning.
 
-    So are coordinates, which are written again.
+    So are descriptions and coordinates, which are written again.
     """
     store = plan.store
-    if changed := store.mended(axes_of(plan.quantities, plan.problem.instants, plan.problem.levels)):
+    if changed := store.mended(plan.files(store.manifest)):
         message = f"{plan.folder}: files of {', '.join(changed)} were lost or changed since, which are written again"
         warnings.warn(DamageWarning(message), stacklevel=2)
     done = store.done(plan.chunks)
@@ -321,11 +320,11 @@ def _title(mechanism: Mechanism) -> str:
 def _chunk(given: int | None, there: Store | None, count: int, quantities: Sequence[Quantity], rows: int) -> int:
     """Return how many designs are computed together: as many as before, or by how much each of them gives."""
     if given is not None:
-        return whole_number("chunk", given, 1, 2**20, error=MechanismError)
-    if there is not None and isinstance(before := there.manifest.get("options", {}).get("chunk"), int):
-        return before
+        return whole_number("chunk", given, 1, LARGEST_CHUNK, error=MechanismError)
+    if there is not None:
+        return there.manifest["options"]["chunk"]
     numbers = rows * sum(math.prod(quantity.shape) for quantity in quantities)
-    largest = min(LARGEST_CHUNK, NUMBERS // numbers, max(4 * SMALLEST_CHUNK, -(-count // LEAST_CHUNKS)))
+    largest = min(USUAL_CHUNK, NUMBERS // numbers, max(4 * SMALLEST_CHUNK, -(-count // LEAST_CHUNKS)))
     return 1 << max(SMALLEST_CHUNK, largest).bit_length() - 1
 
 

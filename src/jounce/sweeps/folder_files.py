@@ -1,0 +1,99 @@
+"""Files in the folder of a sweep: read with care, and written whole, where no link leads out of the folder."""
+
+import json
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import JounceError, OutputError
+from jounce.interrupts import undoing
+from jounce.io.files.reading import read_file, reason_of
+
+ROOT = "zarr.json"
+LARGEST_ROOT = 200_000_000  # bytes of the descriptions of all arrays
+REMOVE = "remove it, and what it held is computed again"
+
+
+def attributes_in(path: Path) -> dict[str, Any]:
+    """Return the attributes in the description of a group.
+
+    Raises
+    ------
+    OutputError
+        It cannot be read.
+    """
+    attributes = parsed(read_file(path, LARGEST_ROOT, error=OutputError, is_input=False), path).get("attributes", {})
+    if not isinstance(attributes, dict):
+        raise OutputError("is no description of a group", path=str(path))
+    return attributes
+
+
+def parsed(text: Any, path: Path) -> dict[str, Any]:
+    """Return what a text in JSON says, by name."""
+    try:
+        found = json.loads(text)
+    except (TypeError, ValueError, RecursionError):
+        raise OutputError("is no JSON", path=str(path)) from None
+    if not isinstance(found, dict):
+        raise OutputError("is no description of a group", path=str(path))
+    return found
+
+
+def is_sweep(folder: Path) -> bool:
+    """Tell whether a folder says that it is that of a sweep."""
+    try:
+        return "manifest" in attributes_in(folder / ROOT)
+    except JounceError:
+        return False
+
+
+def is_blank(folder: Path) -> bool:
+    """Tell whether the folder of an array, or of a group, has nothing but descriptions and coordinates."""
+    inside = [path.relative_to(folder) for path in folder.rglob("*") if path.is_symlink() or not path.is_dir()]
+    others = [path for path in inside if path.name != ROOT]
+    if not others:
+        return True
+    try:
+        names = parsed(read_file(folder / ROOT, LARGEST_ROOT, error=OutputError, is_input=False), folder)
+    except JounceError:
+        return False
+    return names.get("dimension_names") == [folder.name] and others == [Path("c", "0")]
+
+
+@contextmanager
+def worded(path: Path) -> Iterator[None]:
+    """Name the file in what the system says, or a folder where it names none."""
+    try:
+        yield
+    except (IsADirectoryError, NotADirectoryError) as error:
+        message = f"something else has the place of a file of the sweep; {REMOVE}"
+        raise OutputError(message, path=os.fsdecode(error.filename2 or error.filename or path)) from error
+    except OSError as error:
+        named = error.filename2 or error.filename or path
+        raise OutputError(f"cannot be written: {reason_of(error)}", path=os.fsdecode(named)) from error
+
+
+def put(path: Path, content: bytes) -> None:
+    """Put a whole file in its place, of which no link is followed; a folder there stays, and is an error."""
+    scratch = path.with_name(f"{path.name}.{secrets.token_hex(6)}.partial")
+    try:
+        with undoing(lambda: scratch.unlink(missing_ok=True)):
+            scratch.write_bytes(content)
+            sync(scratch)
+            scratch.replace(path)
+            sync(path.parent)
+    finally:
+        scratch.unlink(missing_ok=True)
+
+
+def sync(path: Path) -> None:
+    """Bring a file, or the entries of a folder, onto the disk; what equals the fill value has no file."""
+    with suppress(FileNotFoundError, PermissionError):
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)

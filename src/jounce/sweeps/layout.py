@@ -1,0 +1,130 @@
+"""What the folder of a sweep holds before anything is computed, file by file, and how large it becomes."""
+
+import json
+import math
+import os
+import shutil
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import OutputError
+from jounce.sweeps.problems import Quantity
+from jounce.sweeps.statistics import Variable
+
+AXES = {
+    "time": {"units": "s", "long_name": "time"},
+    "derivative": {"long_name": "order of the time derivative"},
+}
+DIGEST = 32  # bytes of one
+SHRINKS = 4
+"""How many times smaller than their numbers results may become: those of four-bars side by side 1.1 times, but designs
+that cannot be assembled take next to nothing."""
+
+
+def files_of(
+    manifest: Mapping[str, Any],
+    variables: Sequence[Variable],
+    axes: Mapping[str, np.ndarray],
+    *,
+    count: int,
+    chunk: int,
+) -> dict[str, bytes]:
+    """Return the files of a Zarr hierarchy that has all arrays and nothing in them, by their names in the folder.
+
+    Parameters
+    ----------
+    manifest : dict
+        What the sweep is.
+    variables : sequence of Variable
+        Arrays over the designs, those of the parameters first.
+    axes : dict of str to array
+        Coordinates of their other dimensions.
+    count : int
+        Designs.
+    chunk : int
+        Designs that are computed together.
+    """
+    import zarr
+    from zarr.storage import MemoryStore
+
+    files: dict[str, Any] = {}
+    attributes = {
+        "title": manifest["title"],
+        "source": "jounce",
+        "coordinates": " ".join(v.name for v in variables[: len(manifest["vary"])]),
+        "manifest": json.dumps(manifest, indent=1),
+        "checksum": "",
+    }
+    store = MemoryStore(files)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Consolidated metadata is currently not part")
+        root = zarr.create_group(store, attributes=attributes)
+        for name, values in axes.items():
+            _axis(root, name, values)
+        for variable in variables:
+            root.create_array(
+                variable.name,
+                shape=(count, *variable.shape),
+                chunks=(chunk, *variable.shape),
+                dtype=variable.dtype,
+                fill_value=float("nan") if variable.dtype == "f8" else -1,
+                dimension_names=("design", *variable.dims),
+                attributes=variable.attributes,
+            )
+        digests = (DIGEST * -(-count // chunk),)
+        root.create_group("chunks").create_array(
+            "digest", shape=digests, chunks=(DIGEST,), dtype="u1", compressors=None
+        )
+        zarr.consolidate_metadata(store)
+    return {name: content.to_bytes() for name, content in files.items()}
+
+
+def axes_of(quantities: Sequence[Quantity], instants: np.ndarray, levels: int) -> dict[str, np.ndarray]:
+    """Return the coordinates of the dimensions of a sweep besides the design, by name."""
+    labels = {axis: names for quantity in quantities for axis, names in quantity.axes}
+    named = {axis: np.array(names, np.dtypes.StringDType()) for axis, names in labels.items()}
+    return {"time": np.asarray(instants, float), "derivative": np.arange(levels)} | named
+
+
+def _axis(root: Any, name: str, values: np.ndarray) -> None:
+    array = root.create_array(
+        name,
+        shape=values.shape,
+        chunks=values.shape,
+        dtype=values.dtype,
+        compressors=None,  # the same bytes by every release of a compressor
+        dimension_names=(name,),
+        attributes=AXES.get(name, {}),
+    )
+    array[:] = values
+
+
+def check_room(folder: Path, variables: Sequence[Variable], count: int, chunk: int) -> None:
+    """Raise OutputError if the results of a sweep cannot have room on the disk of the folder above, however small."""
+    each = sum(math.prod(variable.shape) * np.dtype(variable.dtype).itemsize for variable in variables)
+    files = -(-count // chunk) * (len(variables) + 1)
+    above = folder.absolute().parent
+    advice = "; sweep fewer designs, or write to a larger disk"
+    free = shutil.disk_usage(above).free
+    if count * each > SHRINKS * free:
+        message = f"{count} designs of {each} bytes each are {_size(count * each)}, and {_size(free)} are free{advice}"
+        raise OutputError(message, path=str(folder))
+    if files > (most := _free_files(above)):
+        message = f"{count} designs take {files} files, and the disk has room for {most}{advice}, or in larger chunks"
+        raise OutputError(message, path=str(folder))
+
+
+def _free_files(folder: Path) -> float:
+    if not hasattr(os, "statvfs"):
+        return math.inf
+    return os.statvfs(folder).f_favail or math.inf  # some file systems have no bound, and say 0
+
+
+def _size(count: float) -> str:
+    names = ("bytes", "kB", "MB", "GB", "TB", "PB", "EB")
+    power = min(int(math.log10(max(count, 1)) // 3), len(names) - 1)
+    return f"{count / 1000**power:.3g} {names[power]}"
