@@ -130,9 +130,9 @@ def _precision() -> AbstractContextManager[Any]:
     """Return the context for a command in the process of another program; one of its own has it from the start."""
     if is_command():
         return nullcontext()
-    from jounce.precision import in_double
+    from jounce.settings import own_settings
 
-    return in_double()
+    return own_settings()
 
 
 def _end_at_once(status: int) -> None:

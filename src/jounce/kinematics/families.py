@@ -33,7 +33,7 @@ from jounce.mechanism.law_breaks import breaks_of_laws, laws_may_break, laws_of
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory.breaks import both_sides
 from jounce.trajectory.motion import SplineMotion
@@ -155,7 +155,7 @@ def _family(
     return _Family(mechanism, names, rows, instants, order, float(tolerance), progress), values
 
 
-@double_precision
+@under_own_settings
 def solve_with_sides(
     mechanism: Mechanism,
     parameters: Mapping[str, ArrayLike],
@@ -200,7 +200,7 @@ class Sides:
         return dataclasses.replace(self, values=named)
 
 
-@double_precision
+@under_own_settings
 def sides_of_designs(
     mechanism: Mechanism, parameters: Mapping[str, np.ndarray], first: float, last: float, order: int
 ) -> tuple[Float[np.ndarray, "design side"], Float[np.ndarray, "design side"]]:

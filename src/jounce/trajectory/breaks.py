@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 from jounce.trajectory.composed import FollowingMotion
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 from jounce.trajectory.profiles import AbstractProfile
@@ -23,7 +23,7 @@ MOST = 1000  # breaks of the derivative above those asked for; of more, as of a 
 Times = Float[np.ndarray, " time"]
 
 
-@double_precision
+@under_own_settings
 def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order: int) -> Times:
     """Return the instants at which a derivative up to an order jumps or bends, in the sequence of time, s.
 
