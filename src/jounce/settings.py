@@ -19,7 +19,7 @@ from typing import Any, ParamSpec, TypeVar
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax._src import config, core, xla_bridge  # what is private to JAX has no public name
+from jax._src import config, core  # what is private to JAX has no public name
 
 from jounce.errors import UnsupportedError
 from jounce.jax_options import OPTIONS
@@ -96,7 +96,7 @@ def _check_device(error: BaseException) -> None:
     except (AssertionError, RuntimeError):
         option, value = ("jax_default_device", chosen) if chosen else ("JAX_PLATFORMS", told)
         raise UnsupportedError(
-            "JAX is told to compute on a device that it does not find here; leave it the choice (None), have it "
+            "JAX is told to compute on a device that it does not find here; leave it the choice, have it "
             'compute on the processor ("cpu"), or install the release of JAX for that device',
             name=option,
             value=value,

@@ -60,7 +60,7 @@ def test_an_operation_in_single_precision_is_found(monkeypatch, single_precision
     from jax._src import core
 
     monkeypatch.setattr(core.Primitive, "bind", watched(core.Primitive.bind))
-    with pytest.raises(AssertionError, match=r"in single precision: .*precision.py"):
+    with pytest.raises(AssertionError, match=r"in single precision: .*settings.py"):
         inspect.unwrap(jn.Jet.variable.__func__)(jn.Jet, 0.1, 3)
     assert jn.Jet.variable(0.1, 3).dtype == np.float64
 
