@@ -13,7 +13,7 @@ import sys
 import threading
 import types
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, ParamSpec, TypeVar
 
 import jax
@@ -67,19 +67,21 @@ class _OwnSettings:
                 'jax.vmap) with double precision switched off; call jax.config.update("jax_enable_x64", True) at the '
                 "start of the program, or put `with jax.enable_x64(True):` around the call of the transformed function"
             )
-        self._outer = _thread.computing
-        self._others = ExitStack()
-        for state, value in _states:
-            if state.value is not None and state.value != value:
-                self._others.enter_context(state(value))
-        told = np.geterr()
-        if strict := {kind: does for kind, does in FLOATING_POINT.items() if told[kind] not in ("ignore", does)}:
-            self._others.enter_context(np.errstate(**strict))
+        others: list[AbstractContextManager[Any]] = [
+            state(value) for state, value in _states if (found := state.value) is not None and found != value
+        ]
+        if (told := np.geterr()) != FLOATING_POINT:
+            quiet: Any = {kind: "ignore" if told[kind] == "ignore" else does for kind, does in FLOATING_POINT.items()}
+            others.append(np.errstate(**quiet))
+        for other in others:
+            other.__enter__()
+        self._before = others, _thread.computing
         _thread.computing = True
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, place: object) -> None:
-        _thread.computing = self._outer
-        self._others.close()
+    def __exit__(self, kind: Any, error: BaseException | None, place: Any) -> None:
+        others, _thread.computing = self._before
+        for other in others[::-1]:
+            other.__exit__(kind, error, place)
         if isinstance(error, AssertionError | RuntimeError):
             _check_device(error)
 
@@ -138,7 +140,7 @@ def under_own_settings(function: Callable[P, R]) -> Callable[P, R]:
                         return end.value
                 yield value
 
-        steps.own_settings = True  # pyright: ignore[reportFunctionMemberAccess]
+        steps.own_settings = True  # pyright: ignore[reportAttributeAccessIssue]
         return steps  # pyright: ignore[reportReturnType]
 
     @functools.wraps(function)
@@ -148,7 +150,7 @@ def under_own_settings(function: Callable[P, R]) -> Callable[P, R]:
         with _OwnSettings():
             return function(*arguments, **keywords)
 
-    door.own_settings = True  # pyright: ignore[reportFunctionMemberAccess]
+    door.own_settings = True  # pyright: ignore[reportAttributeAccessIssue]
     return door
 
 
