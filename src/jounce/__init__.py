@@ -1,7 +1,7 @@
 """Exact time derivatives of any order of mechanisms and robots: jerk, jounce and beyond, torques and their rates.
 
 Importing this package has no side effect but a mark that a process gets when it is forked, see `jounce.interrupts`.
-The settings of JAX are left alone; everything is computed in double precision all the same, see `jounce.precision`.
+The settings of JAX are left alone; everything is computed in double precision all the same, see `jounce.settings`.
 What the package offers stands in the stub beside this file, ``__init__.pyi``, and is imported when a name of it is
 first used: importing the package alone takes no time, and a command that computes nothing, such as ``jounce --help``,
 does not wait for JAX either.
@@ -16,12 +16,14 @@ from typing import Any
 
 from jounce import errors as errors
 from jounce.interrupts import end_on_signals as _end_on_signals, is_command as _is_command, mark_forks as _mark_forks
+from jounce.jax_options import OPTIONS as _OPTIONS
 
 __version__ = "0.4.0"
 
 if _is_command():
     _end_on_signals()  # before the libraries, which take a second
-    os.environ["JAX_ENABLE_X64"] = "1"  # the process is the command's own; JAX reads it when it is imported
+    # The process is the command's own; JAX reads its options there when it is imported.
+    os.environ.update({name.upper(): str(value) for name, value in _OPTIONS.items() if value is not None})
 _mark_forks()
 
 _lock = threading.RLock()  # threads that import several rooms at once may get each other's half imported

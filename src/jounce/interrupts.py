@@ -37,7 +37,9 @@ def is_command() -> bool:
         given = sys.orig_argv
         after = given[given.index("-m") + 1 :] if "-m" in given else []
         return "-mjounce" in given or after[:1] == ["jounce"]
-    name = os.path.basename(sys.argv[0]) if sys.argv else ""  # noqa: PTH119 - pathlib takes a while to import
+    folder, name = os.path.split(sys.argv[0] if sys.argv else "")  # pathlib takes a while to import
+    if name == "__main__.py":
+        return os.path.basename(folder) == "jounce"  # noqa: PTH119
     return name.removesuffix(".exe").removesuffix("-script.py") == "jounce"
 
 

@@ -53,14 +53,14 @@ def offered():
 def test_all_that_is_public_has_a_door():
     found = [(name, door) for name, value in offered() for door in doors(value)]
     assert len(found) > 450
-    assert [name for name, door in found if not hasattr(door, "in_double")] == []
+    assert [name for name, door in found if not hasattr(door, "own_settings")] == []
 
 
 def test_an_operation_in_single_precision_is_found(monkeypatch, single_precision):
     from jax._src import core
 
     monkeypatch.setattr(core.Primitive, "bind", watched(core.Primitive.bind))
-    with pytest.raises(AssertionError, match=r"in single precision: .*precision.py"):
+    with pytest.raises(AssertionError, match=r"in single precision: .*settings.py"):
         inspect.unwrap(jn.Jet.variable.__func__)(jn.Jet, 0.1, 3)
     assert jn.Jet.variable(0.1, 3).dtype == np.float64
 
@@ -156,7 +156,7 @@ def test_a_transformation_in_single_precision_is_refused(name, single_precision)
 
 def test_what_is_compiled_calls_the_host_in_double_precision(single_precision):
     """JAX calls it in a thread of its own, for which the setting of the process holds, not that of the caller."""
-    from jounce.precision import called_back
+    from jounce.settings import called_back
 
     seen = []
 

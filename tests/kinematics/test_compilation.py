@@ -96,8 +96,6 @@ def test_what_cannot_be_read_is_made_again(shelf, damage):
 def test_functions_of_users_go_the_ordinary_way(shelf):
     own = Compiled(example, ("times",))  # a function of a test is a user's
     assert float(own(np.ones(2))["sum"]) == 2.0
-    with jax.disable_jit():
-        assert float(anew()(np.ones(2))["sum"]) == 2.0
     assert not shelf
 
 

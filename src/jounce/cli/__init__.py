@@ -113,7 +113,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not re.fullmatch("[1-9][0-9]{0,3}", os.environ.get(name, "1")):  # 0 is "unknown" to some, nothing to others
             del os.environ[name]
     as_json = "--json" in given
-    with failsafe_streams() as output, cautions(json=as_json), _precision():
+    with failsafe_streams() as output, cautions(json=as_json):
         status = _status(given, as_json)
         output.flush()
         if output.failure is None:
@@ -126,13 +126,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status or 1
 
 
-def _precision() -> AbstractContextManager[Any]:
+def _settings() -> AbstractContextManager[Any]:
     """Return the context for a command in the process of another program; one of its own has it from the start."""
     if is_command():
         return nullcontext()
-    from jounce.precision import in_double
+    from jounce.settings import own_settings
 
-    return in_double()
+    return own_settings()
 
 
 def _end_at_once(status: int) -> None:
@@ -150,7 +150,8 @@ def _end_at_once(status: int) -> None:
 def _status(given: list[str], as_json: bool) -> int:
     """Return the exit status of a command, whose errors are told."""
     try:
-        return _dispatch(given)
+        with _settings():
+            return _dispatch(given)
     except KeyboardInterrupt:
         return 130
     except SolveError as error:

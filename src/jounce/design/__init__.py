@@ -3,6 +3,6 @@
 from jounce.design.optimise import optimise as optimise
 from jounce.design.result import OptimisedDesign as OptimisedDesign
 from jounce.design.tolerance import tolerance as tolerance
-from jounce.precision import compute_in_double as _compute_in_double
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

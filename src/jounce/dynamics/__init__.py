@@ -59,6 +59,6 @@ from jounce.dynamics.reactions import (
 from jounce.dynamics.small_motions import linearise as linearise
 from jounce.dynamics.static_equilibrium import Equilibrium as Equilibrium, equilibrium as equilibrium
 from jounce.dynamics.trajectories import trajectory_torques as trajectory_torques
-from jounce.precision import compute_in_double as _compute_in_double
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

@@ -31,6 +31,6 @@ from jounce.forces.springs import (
     Spring as Spring,
     TorsionalSpring as TorsionalSpring,
 )
-from jounce.precision import compute_in_double as _compute_in_double
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

@@ -9,6 +9,6 @@ from jounce.integrate.obreshkov import Obreshkov as Obreshkov
 from jounce.integrate.robot_simulation import RobotSimulation as RobotSimulation
 from jounce.integrate.simulate import simulate as simulate
 from jounce.integrate.simulation import Simulation as Simulation
-from jounce.precision import compute_in_double as _compute_in_double
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.precision import called_back
+from jounce.settings import called_back
 from jounce.shapes import Numbers
 
 Values = tuple[Any, ...]

@@ -19,7 +19,7 @@ from jounce.io.files.reading import is_result, known_name, read_file, reason_of,
 from jounce.io.files.writing import check_target, replacing
 from jounce.io.hdf5_check import check_readable
 from jounce.io.result_columns import AXES, column_units, columns, dataset_of
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 
 if TYPE_CHECKING:
     import xarray
@@ -53,7 +53,7 @@ def check_writable(path: str | PathLike[str], *, overwrite: bool = False) -> Non
     check_target(path, SUFFIXES, "an output", overwrite=overwrite)
 
 
-@double_precision
+@under_own_settings
 def write(
     dataset: xarray.Dataset,
     path: str | PathLike[str],
@@ -107,7 +107,7 @@ def write(
             _write_netcdf(dataset, scratch)
 
 
-@double_precision
+@under_own_settings
 def write_parts(
     parts: Iterable[xarray.Dataset],
     path: str | PathLike[str],

@@ -43,6 +43,6 @@ from jounce.jet.vectors import (
     stack as stack,
     transpose as transpose,
 )
-from jounce.precision import compute_in_double as _compute_in_double
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

@@ -26,7 +26,7 @@ from jounce.jet.coefficients import (
     square_root,
     total,
 )
-from jounce.precision import in_full
+from jounce.settings import in_full
 from jounce.shapes import ArrayLike, Numbers, Real, real_derivatives
 
 

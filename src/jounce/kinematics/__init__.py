@@ -28,6 +28,6 @@ from jounce.kinematics.solve import (
 )
 from jounce.kinematics.status import Status as Status
 from jounce.kinematics.stretches import Stretches as Stretches, takes_stretches as takes_stretches
-from jounce.precision import compute_in_double as _compute_in_double
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

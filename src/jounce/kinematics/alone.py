@@ -17,7 +17,7 @@ import numpy as np
 
 from jounce.kinematics.device import on_processor
 from jounce.kinematics.store import current_store, is_wanted_soon, made_or_kept
-from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
+from jounce.kinematics.structure import UndescribedError, program_key, settings
 from jounce.native import machine
 from jounce.native.modules import object_file
 from jounce.native.programs import Single
@@ -30,7 +30,7 @@ _thread = threading.local()
 
 def is_wanted() -> bool:
     """Tell whether there is to be machine code: there is a compiler, and nothing forbids it."""
-    return os.environ.get(VARIABLE, "") != "0" and machine.is_usable() and on_processor() and not being_debugged()
+    return os.environ.get(VARIABLE, "") != "0" and machine.is_usable() and on_processor()
 
 
 def is_traced_alone() -> bool:

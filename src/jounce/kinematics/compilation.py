@@ -23,7 +23,7 @@ from jax.experimental import serialize_executable
 from jounce.kinematics.alone import Alone
 from jounce.kinematics.device import on_processor
 from jounce.kinematics.store import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
-from jounce.kinematics.structure import UndescribedError, being_debugged, program_key, settings
+from jounce.kinematics.structure import UndescribedError, program_key, settings
 from jounce.mechanism.preconditions import check_process
 
 _thread = threading.local()
@@ -191,7 +191,7 @@ class Compiled:
         if (store := current_store()) is None:
             return self.jitted(*arguments, **keywords, **static)
         kinds = tuple(map(_kind, leaves))
-        if None in kinds or being_debugged():
+        if None in kinds:
             return self.jitted(*arguments, **keywords, **static)
         told = tuple((name, type(value), value) for name, value in static.items())
         key = tree, kinds, told, self._level(), settings()

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from jounce.errors import JounceError
 from jounce.mechanism import Mechanism
 from jounce.mechanism.law_breaks import breaks_of_laws, laws_may_break
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 from jounce.trajectory.breaks import both_sides
 
 
@@ -33,7 +33,7 @@ class Sides:
         return dataclasses.replace(self, values=named)
 
 
-@double_precision
+@under_own_settings
 def sides_of_designs(
     mechanism: Mechanism, parameters: Mapping[str, np.ndarray], first: float, last: float, order: int
 ) -> tuple[Float[np.ndarray, "design side"], Float[np.ndarray, "design side"]]:

@@ -4,9 +4,12 @@ from typing import TypeVar
 
 import jax
 
+from jounce.settings import under_own_settings
+
 T = TypeVar("T")
 
 
+@under_own_settings
 def on_processor() -> bool:
     """Tell whether JAX computes on the processor: its default device where one is chosen, else its first backend.
 

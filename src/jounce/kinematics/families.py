@@ -33,7 +33,7 @@ from jounce.mechanism.law_breaks import laws_may_break, laws_of
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory.motion import SplineMotion
 from jounce.trajectory.shown_units import derivatives_of, time_axes
@@ -154,7 +154,7 @@ def _family(
     return _Family(mechanism, names, rows, instants, order, float(tolerance), progress), values
 
 
-@double_precision
+@under_own_settings
 def solve_with_sides(
     mechanism: Mechanism,
     parameters: Mapping[str, ArrayLike],

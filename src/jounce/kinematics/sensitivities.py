@@ -35,9 +35,9 @@ from jounce.mechanism.system import System, movable
 from jounce.mechanism.traced import Angles, Part, angles_of, template, traced_model, traced_values
 from jounce.mechanism.user_code import holds_users_code, users_code
 from jounce.modules import with_fields
-from jounce.precision import called_back
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
+from jounce.settings import called_back
 from jounce.shapes import Numbers
 from jounce.trajectory import Expression
 

@@ -134,11 +134,6 @@ def settings() -> tuple[Any, ...]:
     return config.trace_context()
 
 
-def being_debugged() -> bool:
-    """Tell whether JAX is to run operation after operation, or to look for numbers that are not finite."""
-    return config.disable_jit.value or config.debug_nans.value or config.debug_infs.value
-
-
 def _described_settings() -> str:
     told = [repr(x) for x in settings() if type(x).__name__ != "AxisEnv"]  # of arrays that JAX traces: there are none
     if any(" at 0x" in x for x in told):

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import jax
 
 from jounce.errors import MechanismError
-from jounce.precision import in_double
+from jounce.settings import own_settings
 from jounce.shapes import Refused
 
 Item = TypeVar("Item")
@@ -44,7 +44,7 @@ def callers_context() -> Callable[[], AbstractContextManager[Any]]:
 
     @contextmanager
     def context() -> Iterator[None]:
-        with in_double(), nullcontext() if device is None else jax.default_device(device):
+        with own_settings(), nullcontext() if device is None else jax.default_device(device):
             yield
 
     return context

@@ -27,6 +27,6 @@ from jounce.mechanism.outputs import (
     RelativeAngleOutput as RelativeAngleOutput,
 )
 from jounce.mechanism.time import TimeGrid as TimeGrid, time_grid as time_grid
-from jounce.precision import compute_in_double as _compute_in_double
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

@@ -6,12 +6,12 @@ from jaxtyping import Float
 from jounce.mechanism.held_outputs import with_outputs_held
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.resolve import resolve_motion
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 from jounce.trajectory.breaks import law_breaks, may_break
 from jounce.trajectory.motion import AbstractMotion
 
 
-@double_precision
+@under_own_settings
 def breaks_of_laws(mechanism: Mechanism, first: float, last: float, order: int) -> Float[np.ndarray, " time"]:
     """Return the instants at which laws of drivers, or of outputs they follow from, jump or bend, s.
 
@@ -34,7 +34,7 @@ def breaks_of_laws(mechanism: Mechanism, first: float, last: float, order: int) 
     return law_breaks(laws_of(mechanism), first, last, order)
 
 
-@double_precision
+@under_own_settings
 def laws_may_break(mechanism: Mechanism) -> bool:
     """Tell whether a law of a mechanism may jump or bend anywhere, whatever the values of its parameters."""
     return any(map(may_break, laws_of(mechanism)))

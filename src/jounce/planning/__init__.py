@@ -19,6 +19,6 @@ from jounce.planning.tool_paths.inverse_kinematics import inverse_kinematics as 
 from jounce.planning.tool_paths.joint_poses import JointPoses as JointPoses
 from jounce.planning.tool_paths.tool_path import ToolPath as ToolPath
 from jounce.planning.tool_paths.tool_path_motion import ToolPathMotion as ToolPathMotion
-from jounce.precision import compute_in_double as _compute_in_double
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

@@ -15,6 +15,6 @@ from jounce.plot.limits import draw_limits as draw_limits
 from jounce.plot.portraits import hodograph as hodograph, phase_portrait as phase_portrait
 from jounce.plot.report import check_report as check_report, report as report
 from jounce.plot.sketch import sketch as sketch
-from jounce.precision import compute_in_double as _compute_in_double
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

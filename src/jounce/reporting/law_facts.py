@@ -13,8 +13,8 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.held_outputs import led_outputs, with_outputs_held
 from jounce.mechanism.resolve import resolve_motion
-from jounce.precision import double_precision
 from jounce.reporting.peaks import derivative_name
+from jounce.settings import under_own_settings
 from jounce.trajectory import (
     AbstractMotion,
     Continuity,
@@ -49,7 +49,7 @@ class LawFacts(TypedDict):
     remark: str
 
 
-@double_precision
+@under_own_settings
 def law_facts(mechanism: Mechanism, first: float, last: float) -> list[dict[str, Any]]:
     """Return to which derivative each law of a driver is continuous, from a first to a last instant: LawFacts.
 

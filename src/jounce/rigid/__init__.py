@@ -1,6 +1,5 @@
 """Rigid bodies on jets: poses, points, rotations, screws and angular velocity of any order."""
 
-from jounce.precision import compute_in_double as _compute_in_double
 from jounce.rigid.attitude_samples import AttitudeSamples as AttitudeSamples
 from jounce.rigid.orientation import (
     angle_rates as angle_rates,
@@ -31,5 +30,6 @@ from jounce.rigid.spatial import (
     to_body as to_body,
     to_global as to_global,
 )
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

@@ -1,6 +1,5 @@
 """Serial and tree robots in joint coordinates: kinematics, Jacobians, torques, reactions, with rates of any order."""
 
-from jounce.precision import compute_in_double as _compute_in_double
 from jounce.rigid.inertia import Inertia as Inertia
 from jounce.robot.base_motion import BaseMotion as BaseMotion
 from jounce.robot.closed_loop import body_point as body_point
@@ -28,5 +27,6 @@ from jounce.robot.kinematics import (
 from jounce.robot.model import Closure as Closure, Joint as Joint, Limits as Limits, Link as Link, Mimic as Mimic
 from jounce.robot.robot import Robot as Robot
 from jounce.robot.wrenches import Wrench as Wrench
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

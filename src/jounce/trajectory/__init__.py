@@ -1,6 +1,6 @@
 """Motion laws: expressions, Python functions, splines, profiles; and trajectories, one law for each joint."""
 
-from jounce.precision import compute_in_double as _compute_in_double
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 from jounce.trajectory.composed import (
     FollowingMotion as FollowingMotion,
     OutputMotion as OutputMotion,
@@ -32,4 +32,4 @@ from jounce.trajectory.smoothness import (
 )
 from jounce.trajectory.trapezoid import TrapezoidalMotion as TrapezoidalMotion
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

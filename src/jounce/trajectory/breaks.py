@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 from jounce.trajectory.composed import FollowingMotion
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 from jounce.trajectory.profiles import AbstractProfile
@@ -24,7 +24,7 @@ Times = Float[np.ndarray, " time"]
 Breaks = Float[np.ndarray, " break"]
 
 
-@double_precision
+@under_own_settings
 def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order: int) -> Breaks:
     """Return the instants at which a derivative up to an order jumps or bends, in the sequence of time, s.
 

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 
 __all__ = ["Player"]
 
@@ -29,7 +29,7 @@ class Player:
         self.now, self.speed, self.loop = start, 1.0, True
         self.playing = False
         self._ended = threading.Event()
-        self._thread = threading.Thread(target=double_precision(self._run), name="jounce-view-player", daemon=True)
+        self._thread = threading.Thread(target=under_own_settings(self._run), name="jounce-view-player", daemon=True)
 
     def begin(self) -> None:
         """Start the thread."""

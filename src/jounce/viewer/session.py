@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Protocol, runtime_checkable
 
 from jounce.errors import JounceError
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 from jounce.viewer.recording import Parameter, Recording
 
 __all__ = ["Session", "Subject"]
@@ -90,7 +90,7 @@ class Session:
         self._jobs: list[Callable[[], object]] = []
         self._closed = self._working = False
         self._news = threading.Condition()
-        self._worker = threading.Thread(target=double_precision(self._work), name="jounce-view-solver", daemon=True)
+        self._worker = threading.Thread(target=under_own_settings(self._work), name="jounce-view-solver", daemon=True)
         self._worker.start()
 
     def request(self, values: Mapping[str, float] | None = None, order: int | None = None) -> None:

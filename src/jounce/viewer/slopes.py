@@ -12,8 +12,8 @@ import numpy as np
 
 from jounce.errors import JounceError, check_name
 from jounce.kinematics import Motion, solve
-from jounce.precision import double_precision
 from jounce.reporting.peaks import derivative_name, peaks, scalar_outputs
+from jounce.settings import under_own_settings
 from jounce.trajectory import Expression
 from jounce.trajectory.dimensions import ANGLE, LENGTH
 from jounce.viewer.mechanisms import MechanismSubject
@@ -47,7 +47,7 @@ class PeakSlopes:
     slopes: dict[str, float]
 
 
-@double_precision
+@under_own_settings
 def peak_slopes(motion: Motion, name: str, order: int) -> PeakSlopes:
     """Return the peak of a derivative of an output, between the instants too, and its slopes.
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 from jounce.trajectory.shown_units import ShownUnits, unit_size
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\[\]]*)\]\s*")
 
 
-@double_precision
+@under_own_settings
 def in_units(dataset: xarray.Dataset, units: Mapping[str, str] | ShownUnits) -> xarray.Dataset:
     """Return a dataset of SI values in other units, which its attributes name.
 

@@ -19,7 +19,7 @@ from jounce.io.mechanisms.motion_values import Samples, motion
 from jounce.kinematics import OscillatingFollower, PlateCam, TranslatingFollower, plate_cam
 from jounce.kinematics.cams.plate_cam import SENSES
 from jounce.mechanism.resolve import resolve_motion
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 from jounce.trajectory import AbstractMotion, Expression, SplineMotion
 from jounce.trajectory.dimensions import Dimension
 from jounce.trajectory.expression import check_parameter_name
@@ -32,7 +32,7 @@ FOLLOWERS = {
 }
 
 
-@double_precision
+@under_own_settings
 def load_cam(
     path: str | PathLike[str],
     *,

@@ -12,15 +12,15 @@ from jounce.io.files.located_data import Location
 from jounce.io.files.source import read_source
 from jounce.mechanism import Mechanism
 from jounce.mechanism.driver_outputs import is_turning
-from jounce.precision import double_precision
 from jounce.robot.model import Limits
+from jounce.settings import under_own_settings
 from jounce.trajectory.dimensions import describe_dimension, dimension_of
 
 RATES = {"velocity": 1, "acceleration": 2, "jerk": 3}
 EFFORTS = {"effort": 2, "effort_rate": 3}
 
 
-@double_precision
+@under_own_settings
 def load_drive_limits(path: str | PathLike[str], mechanism: Mechanism) -> dict[str, Limits]:
     """Read limits of the drivers and outputs of a mechanism from a file, as `retime` keeps them.
 

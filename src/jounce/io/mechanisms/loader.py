@@ -21,8 +21,8 @@ from jounce.mechanism.masses import body_mass
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.resolve import resolve, resolve_element
 from jounce.mechanism.system import POSITION_COMPONENTS
-from jounce.precision import double_precision
 from jounce.rigid.euler_parameters import euler_parameters
+from jounce.settings import under_own_settings
 from jounce.trajectory import Expression
 from jounce.trajectory.units import parse_value
 
@@ -30,7 +30,7 @@ _Places = dict[str, tuple[Location, tuple[FileKey, ...]]]
 """Where in the file the elements of a mechanism stand, by dotted name, and the keys of each."""
 
 
-@double_precision
+@under_own_settings
 def load(path: str | PathLike[str], *, allow: Iterable[str | PathLike[str]] = ()) -> Mechanism:
     """Read a mechanism from a YAML, TOML or JSON file.
 

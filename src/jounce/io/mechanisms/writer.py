@@ -18,11 +18,11 @@ from jounce.io.mechanisms.keys import OUTPUTS, ROLES, file_keys, output_holder
 from jounce.io.mechanisms.written_laws import WrittenLaws
 from jounce.io.mechanisms.written_values import plain, plain_number
 from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 from jounce.shapes import seconds
 
 
-@double_precision
+@under_own_settings
 def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a mechanism to a YAML, TOML or JSON file that `load` reads.
 

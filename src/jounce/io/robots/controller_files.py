@@ -14,8 +14,8 @@ from jounce.io.files.located_data import Source
 from jounce.io.files.samples import column_names, read_chosen
 from jounce.io.files.writing import check_target, replacing
 from jounce.io.robots.controller_formats import FORMATS, ControllerFormat, checked_format, format_of, joint_count
-from jounce.precision import double_precision
 from jounce.robot import Robot, inverse_dynamics
+from jounce.settings import under_own_settings
 from jounce.trajectory import HermiteMotion, JointTrajectory
 
 UNITS = ("", "/s", "/s^2")
@@ -25,7 +25,7 @@ NANO = 1_000_000_000
 LEVELS = ("positions", "velocities", "accelerations")
 
 
-@double_precision
+@under_own_settings
 def export_trajectory(
     robot: Robot,
     trajectory: JointTrajectory,

@@ -14,8 +14,8 @@ from jounce.io.files.source import read_source
 from jounce.mechanism import Mechanism
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.planning.elastic.drives import Drive
-from jounce.precision import double_precision
 from jounce.robot.robot import Robot
+from jounce.settings import under_own_settings
 from jounce.trajectory.dimensions import Dimension, describe_dimension, dimension_of
 
 KEYS = tuple(field.name for field in dataclasses.fields(Drive))
@@ -33,7 +33,7 @@ UNITS = {
 OF_MOTOR = ("rotor_inertia", "torque_limit", "velocity_limit")
 
 
-@double_precision
+@under_own_settings
 def load_drives(path: str | PathLike[str], system: Robot | Mechanism) -> dict[str, Drive]:
     """Read the drives of a robot's joints, or of a mechanism's drivers, from a file.
 

@@ -16,9 +16,9 @@ from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.jet import Jet
 from jounce.planning.retiming.limits import VARYING, MotionLimits, PointLimits, PositionLaw
-from jounce.precision import double_precision
 from jounce.robot.model import Joint, Limits
 from jounce.robot.robot import Robot
+from jounce.settings import under_own_settings
 from jounce.trajectory import Expression
 from jounce.trajectory.dimensions import Dimension, describe_dimension
 
@@ -34,7 +34,7 @@ EXAMPLES = {
 """Units of the keys for a joint that turns, and for one that slides."""
 
 
-@double_precision
+@under_own_settings
 def load_limits(path: str | PathLike[str], robot: Robot) -> dict[str, Limits]:
     """Read limits of the joints of a robot from a file, in addition to those that it has or in their place.
 
@@ -79,7 +79,7 @@ def load_limits(path: str | PathLike[str], robot: Robot) -> dict[str, Limits]:
     return limits
 
 
-@double_precision
+@under_own_settings
 def load_motion_limits(path: str | PathLike[str], robot: Robot) -> MotionLimits:
     """Read limits of all kinds that `retime` and ``jounce check`` keep from a file.
 

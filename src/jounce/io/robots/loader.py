@@ -15,14 +15,14 @@ from jounce.io.robots.mjcf import read_mjcf
 from jounce.io.robots.sdf import read_sdf
 from jounce.io.robots.urdf import read_urdf
 from jounce.io.robots.xml_elements import Element, read_markup
-from jounce.precision import double_precision
 from jounce.robot.robot import Robot
+from jounce.settings import under_own_settings
 
 SHAPES = ("visual", "collision")
 XACRO = "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE.urdf"
 
 
-@double_precision
+@under_own_settings
 def load_robot(
     path: str | PathLike[str],
     *,

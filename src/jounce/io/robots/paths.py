@@ -13,11 +13,11 @@ from jounce.io.files.samples import has_column, read_table
 from jounce.io.files.source import read_source
 from jounce.io.robots.trajectories import load_trajectory
 from jounce.planning.retiming.paths import Path, path_of
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 from jounce.trajectory import JointTrajectory
 
 
-@double_precision
+@under_own_settings
 def load_path(
     path: str | PathLike[str], degree: int = 5, allow: Iterable[str | PathLike[str]] = ()
 ) -> Path | JointTrajectory:

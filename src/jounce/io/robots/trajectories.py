@@ -18,7 +18,7 @@ from jounce.io.files.samples import rates, read_columns, read_samples, sampled_d
 from jounce.io.files.source import read_source
 from jounce.io.robots.controller_files import is_message, read_message, read_table
 from jounce.mechanism import TimeGrid, time_grid
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 from jounce.shapes import ArrayLike
 from jounce.trajectory import (
     AbstractMotion,
@@ -40,7 +40,7 @@ _ORDERS = (("degree", 5), ("derivative", 0))
 _MOTION_KEYS = ("profile", "duration", "start_time", "from", "to", "limits")
 
 
-@double_precision
+@under_own_settings
 def load_trajectory(
     path: str | PathLike[str],
     degree: int = 5,

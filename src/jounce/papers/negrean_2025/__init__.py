@@ -15,6 +15,6 @@ from jounce.papers.negrean_2025.closed_forms import energies as energies, torque
 from jounce.papers.negrean_2025.history import History as History, history as history
 from jounce.papers.negrean_2025.reproduce import reproduce as reproduce
 from jounce.papers.negrean_2025.segment import POLYNOMIALS as POLYNOMIALS, Check as Check, check as check
-from jounce.precision import compute_in_double as _compute_in_double
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

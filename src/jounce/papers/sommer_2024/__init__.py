@@ -18,6 +18,6 @@ from jounce.papers.sommer_2024.differences import (
 from jounce.papers.sommer_2024.measure import Results as Results, measure as measure
 from jounce.papers.sommer_2024.phase_lag import Lag as Lag, lags as lags
 from jounce.papers.sommer_2024.reproduce import reproduce as reproduce
-from jounce.precision import compute_in_double as _compute_in_double
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
-_compute_in_double(__name__)
+_compute_under_own_settings(__name__)

@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 import jounce.jet as jet
 from jounce.jet import Jet
-from jounce.precision import double_precision
+from jounce.settings import under_own_settings
 
 THETA_START, THETA_DELTA = math.radians(30), math.radians(60)
 LANES = 1024  # instants evaluated together; one width, so that each form compiles once
@@ -94,7 +94,7 @@ def rspu(time: Jet, p: Mapping[str, Any]) -> Jet:
     return opening_angle(distance, nearest, farthest)
 
 
-@double_precision
+@under_own_settings
 def evaluate(
     form: Form, time: Float[np.ndarray, " time"], parameters: Mapping[str, float], order: int = 4
 ) -> Float[np.ndarray, "time {order}+1"]:

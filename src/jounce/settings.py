@@ -1,14 +1,16 @@
-"""Double precision wherever this package computes, however JAX is set up around it.
+"""The settings of JAX and NumPy under which this package computes, however they are set up around it.
 
-JAX computes in single precision unless it is told otherwise, and what it is told holds for a thread or for the whole
-process, which belongs to whoever imports this package. So the setting of the process is left alone: what a room offers,
-and all that its objects can do, computes in a context of its own, entered at the first of nested calls. Threads, which
+JAX computes in single precision unless it is told otherwise, stops at numbers that are not finite where it is told to
+look for them, and takes hours where it is not to compile. What it is told holds for a thread or for the whole process,
+which belongs to whoever imports this package. So the settings of the process are left alone: what a room offers, and
+all that its objects can do, computes in a context of its own, entered at the first of nested calls. Threads, which
 inherit no context, enter it for themselves.
 """
 
 import functools
 import inspect
 import sys
+import threading
 import types
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
@@ -20,6 +22,7 @@ import numpy as np
 from jax._src import config, core  # what is private to JAX has no public name
 
 from jounce.errors import UnsupportedError
+from jounce.jax_options import OPTIONS
 
 _rooms: list[str] = []  # of which all that they offer computes in double precision
 _modules: set[str] = set()  # of them, whose classes do
@@ -40,34 +43,89 @@ LEFT_ALONE = frozenset({"tree_flatten", "tree_unflatten", "mro"})
 """Methods that JAX calls within transformations of any precision; they compute nothing."""
 
 
-def in_double() -> AbstractContextManager[Any]:
+FLOATING_POINT = {"divide": "warn", "over": "warn", "invalid": "warn", "under": "ignore"}
+"""What NumPy does by default where numbers are not finite; it is told to ignore it where that is no error."""
+
+
+class _Thread(threading.local):
+    """What a thread is at."""
+
+    computing = False  # within a context of this package
+
+
+_states = [(getattr(config, name.removeprefix("jax_")), value) for name, value in OPTIONS.items()]
+_thread = _Thread()
+
+
+class _OwnSettings:
+    """The context in which this package computes: what is set up as usual is left as it is."""
+
+    def __enter__(self) -> None:
+        if not config.enable_x64.value and not core.trace_state_clean():
+            raise UnsupportedError(
+                "this would be computed in single precision: JAX transforms a function here (jax.grad, jax.jit, "
+                'jax.vmap) with double precision switched off; call jax.config.update("jax_enable_x64", True) at the '
+                "start of the program, or put `with jax.enable_x64(True):` around the call of the transformed function"
+            )
+        others: list[AbstractContextManager[Any]] = [
+            state(value) for state, value in _states if (found := state.value) is not None and found != value
+        ]
+        if (told := np.geterr()) != FLOATING_POINT:
+            quiet: Any = {kind: "ignore" if told[kind] == "ignore" else does for kind, does in FLOATING_POINT.items()}
+            others.append(np.errstate(**quiet))
+        for other in others:
+            other.__enter__()
+        self._before = others, _thread.computing
+        _thread.computing = True
+
+    def __exit__(self, kind: Any, error: BaseException | None, place: Any) -> None:
+        others, _thread.computing = self._before
+        for other in others[::-1]:
+            other.__exit__(kind, error, place)
+        if isinstance(error, AssertionError | RuntimeError):
+            _check_device(error)
+
+
+def _check_device(error: BaseException) -> None:
+    """Raise UnsupportedError if that is why JAX failed: it is told to compute on what this machine does not have.
+
+    Looking beforehand would start the device, and JAX's threads with it, where nothing computes, as on import.
+    """
+    chosen, told = config.default_device.value, config.jax_platforms.value
+    chosen = chosen if isinstance(chosen, str) else None
+    try:
+        jax.devices(chosen)
+    except (AssertionError, RuntimeError):
+        option, value = ("jax_default_device", chosen) if chosen else ("JAX_PLATFORMS", told)
+        raise UnsupportedError(
+            "JAX is told to compute on a device that it does not find here; leave it the choice, have it "
+            'compute on the processor ("cpu"), or install the release of JAX for that device',
+            name=option,
+            value=value,
+        ) from error
+
+
+def own_settings() -> AbstractContextManager[Any]:
     """Return the context in which this package computes, in this thread; nothing to do where it is in force.
 
     Raises
     ------
     UnsupportedError
         Within a transformation of JAX in single precision: its values are rounded already, and so would results be.
+        Where JAX is told to compute on a device that this machine does not have.
 
     Examples
     --------
     >>> import jax, jax.numpy as jnp
-    >>> from jounce.precision import in_double
-    >>> with jax.enable_x64(False), in_double():
+    >>> from jounce.settings import own_settings
+    >>> with jax.enable_x64(False), own_settings():
     ...     print(jnp.asarray(0.1).dtype)
     float64
     """
-    if config.enable_x64.value:
-        return nullcontext()
-    if not core.trace_state_clean():
-        raise UnsupportedError(
-            "this would be computed in single precision: JAX transforms a function here (jax.grad, jax.jit, jax.vmap) "
-            'with double precision switched off; call jax.config.update("jax_enable_x64", True) at the start of the '
-            "program, or put `with jax.enable_x64(True):` around the call of the transformed function"
-        )
-    return jax.enable_x64(True)
+    return nullcontext() if _thread.computing and config.enable_x64.value else _OwnSettings()
 
 
-def double_precision(function: Callable[P, R]) -> Callable[P, R]:
+def under_own_settings(function: Callable[P, R]) -> Callable[P, R]:
     """Have a function compute in double precision, a generator at each of its steps."""
     if inspect.isgeneratorfunction(function):
 
@@ -75,24 +133,24 @@ def double_precision(function: Callable[P, R]) -> Callable[P, R]:
         def steps(*arguments: Any, **keywords: Any) -> Iterator[Any]:
             running = function(*arguments, **keywords)
             while True:
-                with in_double():
+                with own_settings():
                     try:
                         value = next(running)
                     except StopIteration as end:
                         return end.value
                 yield value
 
-        steps.in_double = True  # pyright: ignore[reportFunctionMemberAccess]
+        steps.own_settings = True  # pyright: ignore[reportAttributeAccessIssue]
         return steps  # pyright: ignore[reportReturnType]
 
     @functools.wraps(function)
     def door(*arguments: P.args, **keywords: P.kwargs) -> R:
-        if config.enable_x64.value:
+        if _thread.computing and config.enable_x64.value:
             return function(*arguments, **keywords)
-        with in_double():
+        with _OwnSettings():
             return function(*arguments, **keywords)
 
-    door.in_double = True  # pyright: ignore[reportFunctionMemberAccess]
+    door.own_settings = True  # pyright: ignore[reportAttributeAccessIssue]
     return door
 
 
@@ -102,8 +160,8 @@ def in_full(value: Any) -> jax.Array:
     Examples
     --------
     >>> import jax.numpy as jnp
-    >>> from jounce.precision import in_double, in_full
-    >>> with in_double():
+    >>> from jounce.settings import own_settings, in_full
+    >>> with own_settings():
     ...     print(in_full(jnp.float32(0.5)).dtype, in_full(2).dtype)
     float64 int64
     """
@@ -130,7 +188,7 @@ def called_back(function: Callable[[Any], Any], shapes: Any, values: Any, *, vma
         See `jax.pure_callback`.
     """
 
-    @double_precision
+    @under_own_settings
     def of_words(words: Any) -> Any:
         return function(jax.tree.map(lambda x: np.ascontiguousarray(x).view(np.float64)[..., 0], words))
 
@@ -138,7 +196,7 @@ def called_back(function: Callable[[Any], Any], shapes: Any, values: Any, *, vma
     return jax.pure_callback(of_words, shapes, words, vmap_method=vmap_method)
 
 
-def compute_in_double(room: str) -> None:
+def compute_under_own_settings(room: str) -> None:
     """Have all that a room offers compute in double precision: its functions, and the classes of all its modules.
 
     Classes that it does not offer count too, since its results are objects of them, and so do those of modules of the
@@ -150,7 +208,7 @@ def compute_in_double(room: str) -> None:
     for name, value in list(offered.items()):
         if _is_open(value, room) and not name.startswith("_"):
             home = vars(sys.modules[value.__module__])
-            offered[name] = door = double_precision(value)
+            offered[name] = door = under_own_settings(value)
             if home.get(value.__name__) is value:
                 home[value.__name__] = door  # by which pickle finds it
     for name, module in list(sys.modules.items()):
@@ -159,16 +217,16 @@ def compute_in_double(room: str) -> None:
         _modules.add(name)
         for value in list(vars(module).values()):
             if inspect.isclass(value) and value.__module__ == name:
-                _compute_in_double(value)
+                _compute_under_own_settings(value)
 
 
 def _is_open(value: Any, room: str) -> bool:
     """Tell whether a value is a function of a room that has no door yet."""
     inside = inspect.isfunction(value) and f"{value.__module__}.".startswith(f"{room}.")
-    return inside and not hasattr(value, "in_double")
+    return inside and not hasattr(value, "own_settings")
 
 
-def _compute_in_double(kind: type[Any]) -> None:
+def _compute_under_own_settings(kind: type[Any]) -> None:
     """Have the methods and properties that a class defines compute in double precision."""
     for name, member in list(vars(kind).items()):
         if name in LEFT_ALONE or (name.startswith("_") and name not in OPERATORS and not name.startswith("_repr_")):
@@ -181,7 +239,7 @@ def _with_door(member: Any) -> Any:
     """Return a method or property that computes in double precision; None for what is none, or has a door."""
     if isinstance(member, types.FunctionType):
         generated = member.__code__.co_filename == "<string>"  # by dataclasses: it stores values, or shows them
-        return None if generated or hasattr(member, "in_double") else double_precision(member)
+        return None if generated or hasattr(member, "own_settings") else under_own_settings(member)
     if isinstance(member, staticmethod | classmethod):
         inner = _with_door(member.__func__)
         return None if inner is None else type(member)(inner)
