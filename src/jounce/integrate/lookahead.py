@@ -174,15 +174,15 @@ def look_ahead(
 
 
 def finest(span: Lanes, time: Lanes, crossing: Indices) -> Lanes:
-    """Return how long a step over a jump may be, s, after so many that have not led over it: `crossings`."""
+    """Return how long a step over a jump may be, s, after so many that have not led over it: `steps_counted`."""
     longer = jnp.minimum(FINEST * COARSER ** crossing.astype(float), SHORTEST)
     return longer * jnp.maximum(span, jnp.abs(time))
 
 
-def crossings(before: Indices, step: Lanes, kink: Indices, span: Lanes) -> Indices:
-    """Return how many steps over jumps there are one after the other, with one more step."""
-    over = (kink >= 0) & (jnp.abs(step) <= SHORTEST * span)
-    return jnp.where(over, before + 1, jnp.where(jnp.abs(step) > AWAY * span, 0, before))
+def steps_counted(before: Indices, step: Lanes, span: Lanes, count: Flags | bool = True) -> Indices:
+    """Return how many steps that hardly move on there are one after the other, with one more; it counts if told."""
+    short = jnp.abs(step) <= SHORTEST * span
+    return jnp.where(short & count, before + 1, jnp.where(jnp.abs(step) > AWAY * span, 0, before))
 
 
 class _Signals:

@@ -349,8 +349,8 @@ class _Run:
         if current.outcome.item() == Outcome.UNBALANCED:
             names = hiding_names(self.start.model, here.equations, series.map(lambda x: x[0]), np.array([[time]]))
             return Status.UNBALANCED, f"{', '.join(names) or 'all joints'} at t = {time:g} s"
-        if current.crossing.item() >= STUCK:
-            kink = int(self.parts[-1].kink[-1])
+        kink = int(self.parts[-1].kink[-1]) if self.parts else -1
+        if current.short.item() >= STUCK and kink >= 0:
             words = "switches without end, as dry friction does at rest: smooth it, as by tanh(v/v0)"
             return Status.COLLAPSED, f"{watched_names(self.start.model)[kink]} at t = {time:g} s {words}"
         if (blocked := current.blocked.item()) >= 0:
