@@ -211,6 +211,11 @@ class _Signals:
         first, plain = np.cumsum([0, *counts]), len(forces) + len(drivers)
         seen = [*range(plain), *(plain + k for k in watched)]
         self.numbers = np.concatenate([np.arange(first[k], first[k + 1]) for k in seen] + [np.zeros(0, int)])
+        length = equations.system.column_scale[0]
+        steady = [jnp.full(group.instances, 1.0 if is_turning(group.element) else length) for group in drivers]
+        rest = jnp.ones(sum(group.instances for group in joints))
+        free = jnp.full(sum(counts[: len(forces)]), jnp.inf)
+        self._noisiest = jnp.concatenate([free, *(JUMP * part for part in (*steady, rest))])
         self._split = sum(counts[: len(forces)]), sum(counts[:plain])
 
     def allowed(self, bound: Lanes, short: Flags) -> Signals:
@@ -232,13 +237,14 @@ class _Signals:
         knots, shaken = found[: len(NODES)], found[len(NODES) :]
         coefficients = _combined(INTERPOLATION, knots)
         if self._joints:
-            coefficients = coefficients * (np.arange(len(self.numbers)) < self._split[1])[:, None]
+            coefficients = coefficients * (np.arange(len(self.numbers)) < self._split[1])[None, None, :, None]
         least = ROUNDS_OF_JOINTS if self._joints else 1
         wanted = jnp.max(jnp.where(span > 0, jnp.abs(step) / span, 0.0)) * (SPAN_POINTS / POINTS)
         rounds = jnp.clip(jnp.ceil(wanted), least, SPAN_POINTS // POINTS)
         count = rounds * POINTS
         size = jnp.max(jnp.abs(knots), axis=0)
         noise = NOISE * jnp.max(jnp.abs(shaken - knots[::SPARSE]), axis=0) + FAINT * size
+        noise = jnp.minimum(noise, self._noisiest[None, :, None])  # what jumps where it is looked at is no rounding
 
         def look(k: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
             share = (k * POINTS + jnp.arange(POINTS)).astype(float) / (count - 1.0)  # both ends too

@@ -242,7 +242,6 @@ def march(
         opened = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
         outcome = jnp.where(opening, opened, outcome)
         drift = jnp.where(opening, current.drift, jnp.maximum(current.drift, distance))
-        none = jnp.full(step.shape, -1)
         known = mobility_of(equations, inverse), near_singular(equations, inverse)
         fresh, reached = jnp.zeros_like(current.refused), measured(there, state)
         farthest = jnp.where(reach > longest, jnp.minimum(jnp.minimum(reach, longest / SHORT), span), jnp.abs(step))
@@ -251,7 +250,9 @@ def march(
         short = steps_counted(current.short, step, span)
         balance = balance._replace(broken=balance.broken & (short > 0))
         reaching = time, rest, expansion, fresh, outcome, drift, current.begun
-        onwards = IntegratorState(*reaching, *known, none, reached, farthest, crossing, short, balance)
+        ahead = jnp.where(look.limiting >= 0, look.limiting, current.blocked)
+        ahead = jnp.where(short > 0, ahead, -1)
+        onwards = IntegratorState(*reaching, *known, ahead, reached, farthest, crossing, short, balance)
         blocked = jnp.where(look.resolved, current.blocked, look.limiting)
         refused = current._replace(refused=current.refused + 1, outcome=outcome, blocked=blocked)
         refused = refused._replace(balance=current.balance._replace(broken=broken))

@@ -339,7 +339,7 @@ class _Run:
         series, time = current.expansion.state, current.time.item()
         here = dataclasses.replace(self.start, equations=self.start.equations.near(current.angles))
         onwards = self.sense * AHEAD * max(abs(time), abs(time - current.begun.item()))
-        ahead = evaluated(series, np.array([onwards]))
+        ahead = evaluated(series.map(lambda part: part[:2]), np.array([onwards]))
         for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + onwards)):
             finite = all(np.isfinite(part).all() for part in state)
             if finite and (names := _unfit(here, state, instant)):
