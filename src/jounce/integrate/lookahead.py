@@ -237,7 +237,8 @@ class _Signals:
         knots, shaken = found[: len(NODES)], found[len(NODES) :]
         coefficients = _combined(INTERPOLATION, knots)
         if self._joints:
-            coefficients = coefficients * (np.arange(len(self.numbers)) < self._split[1])[None, None, :, None]
+            followed = (np.arange(len(self.numbers)) < self._split[1])[None, None, :, None]
+            coefficients = jnp.where(followed, coefficients, 0.0)
         least = ROUNDS_OF_JOINTS if self._joints else 1
         wanted = jnp.max(jnp.where(span > 0, jnp.abs(step) / span, 0.0)) * (SPAN_POINTS / POINTS)
         rounds = jnp.clip(jnp.ceil(wanted), least, SPAN_POINTS // POINTS)
