@@ -33,8 +33,8 @@ ROUNDS_OF_JOINTS = 4  # times as many where joints are looked at
 SPAN_POINTS = 8192  # in the whole run, at least, where steps are few
 HARMLESS = 1e-15  # rad or sizes of the mechanism: what is overlooked may move a body by this
 SHAKE = 2.0**-51  # relative change of state and time by which the rounding of a force is measured
-SPARSE = 5  # of so many nodes, one is used for that
-_SHAKEN = (NODES[::SPARSE], np.full(len(NODES[::SPARSE]), SHAKE))
+SPARSE = 7  # of so many nodes, one is used for that, both ways: a jump beside it shows one way only
+_SHAKEN = (np.tile(NODES[::SPARSE], 2), np.repeat([SHAKE, -SHAKE], len(NODES[::SPARSE])))
 NOISE = 16.0  # times what it changes by is rounding still
 FAINT = 1e-13  # of a force: rounding of the polynomial through it
 SHORTEST = 1e-12  # of the run: a step over a jump of a force is not longer,
@@ -174,7 +174,7 @@ def look_ahead(
 
 
 def finest(span: Lanes, time: Lanes, crossing: Indices) -> Lanes:
-    """Return how long a step over a jump may be, s, after so many that have not led over it: `steps_counted`."""
+    """Return how long a step over a jump may be, s, after so many that have not led over it."""
     longer = jnp.minimum(FINEST * COARSER ** crossing.astype(float), SHORTEST)
     return longer * jnp.maximum(span, jnp.abs(time))
 
@@ -244,7 +244,8 @@ class _Signals:
         rounds = jnp.clip(jnp.ceil(wanted), least, SPAN_POINTS // POINTS)
         count = rounds * POINTS
         size = jnp.max(jnp.abs(knots), axis=0)
-        noise = NOISE * jnp.max(jnp.abs(shaken - knots[::SPARSE]), axis=0) + FAINT * size
+        shaken = jnp.abs(shaken.reshape(2, -1, *shaken.shape[1:]) - knots[None, ::SPARSE])
+        noise = NOISE * jnp.max(jnp.min(shaken, axis=0), axis=0) + FAINT * size
         noise = jnp.minimum(noise, self._noisiest[None, :, None])  # what jumps where it is looked at is no rounding
 
         def look(k: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
@@ -279,7 +280,8 @@ class _Signals:
         """
         lanes = since.shape[-1]
         clock = Jet.variable(((self._time + since) * (1.0 + shake))[None], 1)
-        parts, pose = [], None
+        parts: list[Any] = []
+        pose: Any = None
         if self._forces or self._joints:
             state = evaluated(self._path, since).map(lambda part: part * (1.0 + shake * _signs(part.shape[:2])))
             pose = self._equations.pose(state)

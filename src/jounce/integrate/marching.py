@@ -201,7 +201,7 @@ def march(
         angles = followed(equations, current.angles, start.state, look.step)
         span = jnp.abs(stop - current.begun)
         if method.controlled:
-            limits = span, allowed, finest(span, current.time, current.crossing)
+            limits = span, allowed, finest(span, current.time, current.crossing + current.refused)
             look = look_ahead(equations, start.state, angles, current.mobility, current.time, look.step, *limits)
         suspect = (look.kink >= 0) & (jnp.abs(look.step) < step) | (current.refused >= STUBBORN)
         step = jnp.abs(look.step)

@@ -127,8 +127,8 @@ class RobotSimulation(Displayed):
         length, kink = np.abs(self.steps.length), self.steps.kink
         ends = self.steps.start + self.steps.length
         found = [k for k in np.flatnonzero(kink) if k == 0 or length[: k + 1].max() > MUCH_LONGER * length[k]]
-        apart = [abs(ends[b] - ends[a]) > CLOSE * length.max() for a, b in itertools.pairwise(found)] + [True]
-        return [float(ends[k]) for k, last in zip(found, apart, strict=True) if last]
+        close = [a for a, b in itertools.pairwise(found) if abs(ends[b] - ends[a]) <= CLOSE * length.max()]
+        return [float(ends[k]) for k in found if k not in close]
 
     @cached_property
     def torque(self) -> Float[np.ndarray, "time level n"]:
