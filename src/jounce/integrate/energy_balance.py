@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jounce.dynamics.energies import body_energy
 from jounce.dynamics.forward import Equations, Flags, Instants, Lanes, State
@@ -57,12 +58,15 @@ class Balance(NamedTuple):
         By how much it may have changed by the errors that steps are allowed, J.
     open : array of bool
         Whether something has taken or given energy.
+    broken : array of bool
+        Whether a step from near here was refused because the energy would have changed.
     """
 
     start: Energies
     exchanged: Lanes
     leeway: Lanes
     open: Flags
+    broken: Flags
 
 
 def is_balanced(equations: Equations, state: State, time: Instants) -> bool:
@@ -107,12 +111,13 @@ def energies(equations: Equations, state: State, time: Instants) -> Energies:
 def begun(found: Energies) -> Balance:
     """Return what is known of the energy where runs begin."""
     nothing = jnp.zeros_like(found.kinetic)
-    return Balance(found, found.kinetic, nothing, found.exchanging)
+    return Balance(found, found.kinetic, nothing, found.exchanging, nothing > 0)
 
 
 def unknown(nothing: Lanes) -> Balance:
     """Return a placeholder, of zeros, for the energy of runs of which the start is not known yet."""
-    return Balance(Energies(nothing, nothing, nothing, nothing > 0), nothing, nothing, nothing > 0)
+    none = np.zeros(nothing.shape, bool)
+    return Balance(Energies(nothing, nothing, nothing, none), nothing, nothing, none, none)
 
 
 def followed(balance: Balance, found: Energies, leeway: Lanes) -> tuple[Balance, Flags]:
@@ -133,4 +138,4 @@ def followed(balance: Balance, found: Energies, leeway: Lanes) -> tuple[Balance,
     opened = balance.open | found.exchanging
     gap = jnp.abs(change + found.kinetic - balance.start.kinetic)
     kept = gap <= KEPT * exchanged + OFFSET * jnp.maximum(found.size, balance.start.size) + allowed
-    return Balance(balance.start, exchanged, allowed, opened), kept | opened
+    return Balance(balance.start, exchanged, allowed, opened, balance.broken), kept | opened

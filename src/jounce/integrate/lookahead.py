@@ -33,8 +33,8 @@ ROUNDS_OF_JOINTS = 4  # times as many where joints are looked at
 SPAN_POINTS = 8192  # in the whole run, at least, where steps are few
 HARMLESS = 1e-15  # rad or sizes of the mechanism: what is overlooked may move a body by this
 SHAKE = 2.0**-51  # relative change of state and time by which the rounding of a force is measured
-SPARSE = 5  # of so many nodes, one is used for that
-_SHAKEN = (NODES[::SPARSE], np.full(len(NODES[::SPARSE]), SHAKE))
+SPARSE = 7  # of so many nodes, one is used for that, both ways: a jump beside it shows one way only
+_SHAKEN = (np.tile(NODES[::SPARSE], 2), np.repeat([SHAKE, -SHAKE], len(NODES[::SPARSE])))
 NOISE = 16.0  # times what it changes by is rounding still
 FAINT = 1e-13  # of a force: rounding of the polynomial through it
 SHORTEST = 1e-12  # of the run: a step over a jump of a force is not longer,
@@ -174,15 +174,15 @@ def look_ahead(
 
 
 def finest(span: Lanes, time: Lanes, crossing: Indices) -> Lanes:
-    """Return how long a step over a jump may be, s, after so many that have not led over it: `crossings`."""
+    """Return how long a step over a jump may be, s, after so many that have not led over it."""
     longer = jnp.minimum(FINEST * COARSER ** crossing.astype(float), SHORTEST)
     return longer * jnp.maximum(span, jnp.abs(time))
 
 
-def crossings(before: Indices, step: Lanes, kink: Indices, span: Lanes) -> Indices:
-    """Return how many steps over jumps there are one after the other, with one more step."""
-    over = (kink >= 0) & (jnp.abs(step) <= SHORTEST * span)
-    return jnp.where(over, before + 1, jnp.where(jnp.abs(step) > AWAY * span, 0, before))
+def steps_counted(before: Indices, step: Lanes, span: Lanes, count: Flags | bool = True) -> Indices:
+    """Return how many steps that hardly move on there are one after the other, with one more; it counts if told."""
+    short = jnp.abs(step) <= SHORTEST * span
+    return jnp.where(short & count, before + 1, jnp.where(jnp.abs(step) > AWAY * span, 0, before))
 
 
 class _Signals:
@@ -211,6 +211,11 @@ class _Signals:
         first, plain = np.cumsum([0, *counts]), len(forces) + len(drivers)
         seen = [*range(plain), *(plain + k for k in watched)]
         self.numbers = np.concatenate([np.arange(first[k], first[k + 1]) for k in seen] + [np.zeros(0, int)])
+        length = equations.system.column_scale[0]
+        steady = [jnp.full(group.instances, 1.0 if is_turning(group.element) else length) for group in drivers]
+        rest = jnp.ones(sum(group.instances for group in joints))
+        free = jnp.full(sum(counts[: len(forces)]), jnp.inf)
+        self._noisiest = jnp.concatenate([free, *(JUMP * part for part in (*steady, rest))])
         self._split = sum(counts[: len(forces)]), sum(counts[:plain])
 
     def allowed(self, bound: Lanes, short: Flags) -> Signals:
@@ -232,13 +237,16 @@ class _Signals:
         knots, shaken = found[: len(NODES)], found[len(NODES) :]
         coefficients = _combined(INTERPOLATION, knots)
         if self._joints:
-            coefficients = coefficients * (np.arange(len(self.numbers)) < self._split[1])[:, None]
+            followed = (np.arange(len(self.numbers)) < self._split[1])[None, None, :, None]
+            coefficients = jnp.where(followed, coefficients, 0.0)
         least = ROUNDS_OF_JOINTS if self._joints else 1
         wanted = jnp.max(jnp.where(span > 0, jnp.abs(step) / span, 0.0)) * (SPAN_POINTS / POINTS)
         rounds = jnp.clip(jnp.ceil(wanted), least, SPAN_POINTS // POINTS)
         count = rounds * POINTS
         size = jnp.max(jnp.abs(knots), axis=0)
-        noise = NOISE * jnp.max(jnp.abs(shaken - knots[::SPARSE]), axis=0) + FAINT * size
+        shaken = jnp.abs(shaken.reshape(2, -1, *shaken.shape[1:]) - knots[None, ::SPARSE])
+        noise = NOISE * jnp.max(jnp.min(shaken, axis=0), axis=0) + FAINT * size
+        noise = jnp.minimum(noise, self._noisiest[None, :, None])  # what jumps where it is looked at is no rounding
 
         def look(k: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
             share = (k * POINTS + jnp.arange(POINTS)).astype(float) / (count - 1.0)  # both ends too
@@ -272,7 +280,8 @@ class _Signals:
         """
         lanes = since.shape[-1]
         clock = Jet.variable(((self._time + since) * (1.0 + shake))[None], 1)
-        parts, pose = [], None
+        parts: list[Any] = []
+        pose: Any = None
         if self._forces or self._joints:
             state = evaluated(self._path, since).map(lambda part: part * (1.0 + shake * _signs(part.shape[:2])))
             pose = self._equations.pose(state)

@@ -10,7 +10,16 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, expand, inverted
 from jounce.integrate.energy_balance import Balance, begun, energies, followed as follow_balance, is_balanced, unknown
-from jounce.integrate.lookahead import FINEST, HARMLESS, SHORTEST, Lookahead, crossings, finest, look_ahead, mobility_of
+from jounce.integrate.lookahead import (
+    FINEST,
+    HARMLESS,
+    SHORTEST,
+    Lookahead,
+    finest,
+    look_ahead,
+    mobility_of,
+    steps_counted,
+)
 from jounce.integrate.methods import MARGIN, NEEDED, AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import AnglesOfForces, followed, measured
@@ -22,7 +31,7 @@ from jounce.shapes import Numbers
 SMALLEST_STEP = FINEST / 8.0  # of the span, or of the time itself
 REFUSED = 0.45  # of a step that was refused is tried next: no power of two, or it would end where others have ended
 SHORT = 1.0 / 4.0  # of the longest step so far: shorter ones leave out as much less
-STUCK = 64  # steps over a jump one after the other: a force that switches without end
+STUCK = 64  # steps that hardly move on, one after the other: a force that switches without end
 STUBBORN = 3  # steps refused one after the other: no series that is only too short for its step needs so many
 
 
@@ -56,6 +65,7 @@ class IntegratorState(NamedTuple):
     angles: AnglesOfForces  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
     longest: Lanes  # step so far, s
     crossing: Indices  # number of steps, one after the other, too short to matter, over what is not known
+    short: Indices  # number of steps one after the other that hardly move on, whatever they lead over
     balance: Balance  # of the energy, where that is to be kept
 
 
@@ -100,7 +110,8 @@ def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -
     known = np.zeros((bodies + 1, lanes)), np.zeros(time.shape, bool)
     angles = _measured(equations, state) if any(map(measures_angle, equations.system.forces)) else ()
     expansion, refused = Expansion(series, *rates), np.zeros(time.shape, int)
-    counts = nothing, np.zeros(time.shape, int), unknown(nothing)
+    count = np.zeros(time.shape, int)
+    counts = nothing, count, count, unknown(nothing)
     return IntegratorState(time, nothing, expansion, refused, opening, nothing, time, *known, none, angles, *counts)
 
 
@@ -126,7 +137,7 @@ def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) 
     began = time, nothing, expansion, count, outcome, nothing, time
     balanced = is_balanced(equations, state, time[None])
     balance = begun(energies(equations, state, time[None])) if balanced else unknown(nothing)
-    return IntegratorState(*began, *known, none, angles, nothing, count, balance)
+    return IntegratorState(*began, *known, none, angles, nothing, count, count, balance)
 
 
 def _is_one(_: Equations, current: IntegratorState, *__: Any, **___: Any) -> bool:
@@ -177,23 +188,21 @@ def march(
     """
     length = equations.system.column_scale[0]
     order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
-    begin = current.expansion.state.map(lambda part: part[0])
-    keeps = method.controlled and is_balanced(equations, begin, current.time[None])
+    here = current.expansion.state.map(lambda part: part[0])
+    keeps = method.controlled and is_balanced(equations, here, current.time[None])
 
     def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
         left = stop - current.time - current.rest
         usual = SHORT * current.longest
         start, reach, allowed = method.prepared(current.expansion, length, tolerance, current.singular, usual)
-        step = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left))) * REFUSED ** current.refused.astype(float)
+        wished = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left)))
+        step = wished * REFUSED ** current.refused.astype(float)
         look = Lookahead(jnp.sign(left) * step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), current.blocked)
         angles = followed(equations, current.angles, start.state, look.step)
         span = jnp.abs(stop - current.begun)
         if method.controlled:
-            bound = allowed
-            shortest = finest(span, current.time, current.crossing)
-            look = look_ahead(
-                equations, start.state, angles, current.mobility, current.time, look.step, span, bound, shortest
-            )
+            limits = span, allowed, finest(span, current.time, current.crossing + current.refused)
+            look = look_ahead(equations, start.state, angles, current.mobility, current.time, look.step, *limits)
         suspect = (look.kink >= 0) & (jnp.abs(look.step) < step) | (current.refused >= STUBBORN)
         step = jnp.abs(look.step)
         last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
@@ -203,7 +212,7 @@ def march(
         rest = jnp.where(last, 0.0, since - (time - current.time))
         running, opening = (current.outcome == int(x) for x in (Outcome.RUNNING, Outcome.UNEXPANDED))
         step = jnp.where(running, step, 0.0)
-        time = jnp.where(running, time, current.time)
+        time, rest = (jnp.where(running, x, y) for x, y in ((time, current.time), (rest, current.rest)))
 
         there = equations.near(angles.at(step))
         arrived = method.arrive(there, start, current.time, step)
@@ -218,7 +227,7 @@ def march(
         balanced, balance = jnp.ones(step.shape, bool), current.balance
         if keeps:
             found = energies(there, state, time[None])
-            kick = MARGIN * allowed * order / jnp.maximum(jnp.abs(step), 1e-300)
+            kick = MARGIN * allowed * order / jnp.maximum(wished, 1e-300)
             leeway = kick * length * jnp.sqrt(equations.scale * bodies)
             balance, balanced = follow_balance(current.balance, found, leeway)
             balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), begun(found), balance)
@@ -227,34 +236,26 @@ def march(
         polynomial = method.polynomial(start, expansion, step)
         steps = DenseOutput(current.time, step, polynomial, look.kink, current.angles), good
         outcome = jnp.where(good & last, int(Outcome.ARRIVED), current.outcome)
-        stopped = jnp.where(balanced, int(Outcome.COLLAPSED), int(Outcome.UNBALANCED))
-        outcome = jnp.where(running & ((~good & tiny) | (current.crossing >= STUCK)), stopped, outcome)
+        broken = current.balance.broken | (running & ~balanced)
+        stopped = jnp.where(~broken, int(Outcome.COLLAPSED), int(Outcome.UNBALANCED))
+        outcome = jnp.where(running & ((~good & tiny) | (current.short >= STUCK)), stopped, outcome)
         opened = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
         outcome = jnp.where(opening, opened, outcome)
         drift = jnp.where(opening, current.drift, jnp.maximum(current.drift, distance))
-        none = jnp.full(step.shape, -1)
         known = mobility_of(equations, inverse), near_singular(equations, inverse)
         fresh, reached = jnp.zeros_like(current.refused), measured(there, state)
         farthest = jnp.where(reach > longest, jnp.minimum(jnp.minimum(reach, longest / SHORT), span), jnp.abs(step))
         farthest = jnp.maximum(current.longest, farthest)
-        crossing = crossings(current.crossing, step, look.kink, span)
-        onwards = IntegratorState(
-            time,
-            rest,
-            expansion,
-            fresh,
-            outcome,
-            drift,
-            current.begun,
-            *known,
-            none,
-            reached,
-            farthest,
-            crossing,
-            balance,
-        )
+        crossing = steps_counted(current.crossing, step, span, look.kink >= 0)
+        short = steps_counted(current.short, step, span)
+        balance = balance._replace(broken=balance.broken & (short > 0))
+        reaching = time, rest, expansion, fresh, outcome, drift, current.begun
+        ahead = jnp.where(look.limiting >= 0, look.limiting, current.blocked)
+        ahead = jnp.where(short > 0, ahead, -1)
+        onwards = IntegratorState(*reaching, *known, ahead, reached, farthest, crossing, short, balance)
         blocked = jnp.where(look.resolved, current.blocked, look.limiting)
         refused = current._replace(refused=current.refused + 1, outcome=outcome, blocked=blocked)
+        refused = refused._replace(balance=current.balance._replace(broken=broken))
         return jax.tree.map(lambda a, b: jnp.where(good | opening, a, b), onwards, refused), steps
 
     def unfinished(carry: Any) -> Any:

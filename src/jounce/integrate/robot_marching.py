@@ -10,9 +10,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float, Int
 
-from jounce.integrate.lookahead import HARMLESS, POINTS, SHORTEST, SPAN_POINTS
-from jounce.integrate.marching import Outcome
-from jounce.integrate.methods import MARGIN, ROUNDING, Lanes, furthest
+from jounce.integrate.lookahead import HARMLESS, NEAR, POINTS, SHORTEST, SPAN_POINTS, finest, steps_counted
+from jounce.integrate.marching import SHORT as UNUSUAL, Outcome
+from jounce.integrate.methods import MARGIN, NEEDED, ROUNDING, Lanes, furthest
 from jounce.jet.series import Recursion
 from jounce.kinematics.compilation import compiled
 from jounce.modules import Module
@@ -22,8 +22,13 @@ from jounce.robot.tree_equations import TreeEquations, TreeState, Unknowns, free
 from jounce.robot.wrench_laws import WrenchLaws
 from jounce.shapes import Numbers
 
-STUCK = 100  # steps cut so short one after the other: a force that switches without end; a jump needs some thirty
+STUCK = 64  # steps that hardly move on, one after the other: a force that switches without end
+AGAIN = 10  # such steps over a jump that end where there is no number: others are tried
 SHORT = 1e-5  # of the step that the series alone would allow
+STEEP = 1e-3  # of that step: a force that cuts it shorter may jump
+UNSEEN = (
+    1e-12  # rad or sizes of the robot: what is overlooked on a step may move a joint by this; beside a jump by less
+)
 NOISE = 32.0  # times what the equations miss where the series begins is rounding on the way too
 
 
@@ -169,6 +174,9 @@ class Progress(NamedTuple):
     state: RobotState
     outcome: Int[Numbers, ""]
     stuck: Int[Numbers, ""]  # steps of no length one after the other
+    crossing: Int[Numbers, ""]  # steps over a jump one after the other
+    rest: Lanes  # what the time is greater by than that number, which is rounded, s
+    longest: Lanes  # step so far, s
 
 
 def polynomial_of(series: MotionSeries) -> RobotState:
@@ -264,7 +272,7 @@ def march_robot(
     """
     span = jnp.abs(stop - begun)
 
-    def look(polynomial: RobotState, time: Any, step: Any, first: Any) -> tuple[Any, Any]:
+    def look(polynomial: RobotState, time: Any, step: Any, first: Any, usual: Any) -> tuple[Any, Any]:
         """Return the error that a part of the places on a step shows, as part of what is allowed, and if it is finite.
 
         A velocity that is wrong goes on to the end of the run, so that jumps count by what they move until then. What
@@ -278,18 +286,22 @@ def march_robot(
         rounding = NOISE * jnp.max(jnp.abs(gap[:, 0])) + ROUNDING * jnp.max(jnp.abs(size))
         largest = jnp.maximum(jnp.max(jnp.abs(gap[:, 1:])) - rounding, 0.0)
         local = largest * step**2 / (order * (order + 1.0)) / (MARGIN * tolerance)
-        lasting = largest * jnp.abs(step) * span / jnp.maximum(MARGIN * tolerance, HARMLESS)
+        harmless = jnp.clip(UNSEEN * jnp.abs(step) / (STEEP * usual), HARMLESS, UNSEEN)
+        lasting = largest * jnp.abs(step) * span / jnp.maximum(tolerance, harmless)
         return jnp.maximum(local, lasting), jnp.all(jnp.isfinite(gap))
 
     def _places(step: Any) -> Any:
         return float(POINTS) if problem.blind else jnp.maximum(SPAN_POINTS * jnp.abs(step) / span, POINTS)
 
-    def fits(polynomial: RobotState, time: Any, step: Any) -> tuple[Any, Any]:
-        """Tell whether a step keeps to the equations all along, and whether it is finite."""
+    def fits(polynomial: RobotState, time: Any, step: Any, usual: Any) -> tuple[Any, Any, Any]:
+        """Tell whether a step keeps to the equations all along, whether it is finite, and whether it leads over a jump.
+
+        Nothing else shows on a step that hardly moves on.
+        """
 
         def further(carry: Any) -> Any:
             first, error, finite = carry
-            found, fine = look(polynomial, time, step, first)
+            found, fine = look(polynomial, time, step, first, usual)
             return first + POINTS, jnp.maximum(error, found), finite & fine
 
         def open_(carry: Any) -> Any:
@@ -297,40 +309,55 @@ def march_robot(
             return (first < _places(step)) & finite & (error <= 1.0)
 
         _, error, finite = jax.lax.while_loop(open_, further, (jnp.zeros(()), jnp.zeros(()), jnp.ones((), bool)))
-        return finite & (error <= 1.0), finite
+        return finite & (error <= 1.0), finite, (error > 0.0) & (jnp.abs(step) <= SHORTEST * span)
 
     def attempt(current: Progress) -> tuple[Progress, Any, Any]:
-        time, left = current.time, stop - current.time[0]
+        time, left = current.time, stop - current.time[0] - current.rest[0]
         whole = polynomial_of(problem.series(current.state, time[None], order))
         sizes = _sizes(problem, whole)
-        known = jnp.all(jnp.isfinite(sizes))
-        kept, reach = furthest(sizes, jnp.full(time.shape, tolerance))
+        known = jnp.all(jnp.isfinite(sizes[:NEEDED]))
+        sizes = jnp.where(jnp.isfinite(sizes), sizes, jnp.inf)
+        kept, reach = furthest(sizes, jnp.full(time.shape, tolerance), UNUSUAL * current.longest)
         polynomial = jax.tree.map(lambda c: jnp.where(kept[: len(c), None], c, 0.0), whole)
         step = jnp.minimum(jnp.minimum(reach[0], longest), jnp.abs(left))
         step = jnp.where(step >= 0.999 * jnp.abs(left), jnp.abs(left), step)
-        shortest, wished = SHORTEST * jnp.maximum(span, jnp.abs(time[0])), step
-        sense = jnp.sign(left)
+        shortest, wished = finest(span, time, current.crossing)[0], step
+        sense, usual = jnp.sign(left), jnp.maximum(current.longest[0], step)
 
-        def halved(carry: Any) -> Any:
-            step = 0.5 * carry[0]
-            return (step, *fits(polynomial, time[0], sense * step))
+        def narrowed(carry: Any) -> Any:
+            low, high, over = carry
+            step = jnp.where(low > 0, 0.5 * (low + high), 0.5 * high)
+            good, finite, jump = fits(polynomial, time[0], sense * step, usual)
+            taken = good | ((step <= shortest) & finite)
+            return jnp.where(taken, step, low), jnp.where(taken, high, step), jnp.where(taken, jump, over)
 
         def open_(carry: Any) -> Any:
-            step, good, _ = carry
-            return ~good & (step > shortest)
+            low, high, _ = carry
+            nearer = (high - low > NEAR * low) & (low < STEEP * usual)  # to a jump; what is only steep is seen better
+            return jnp.where(low > 0, (low < high) & nearer, high > 0.25 * shortest)
 
-        step, good, finite = jax.lax.while_loop(open_, halved, (step, *fits(polynomial, time[0], sense * step)))
+        good, _, over = fits(polynomial, time[0], sense * step, usual)
+        low, _, over = jax.lax.while_loop(open_, narrowed, (jnp.where(good, step, 0.0), step, over))
+        step = jnp.where(low > 0, low, shortest)
         last = step >= jnp.abs(left)
         arrived = at(polynomial, sense * step[None])
-        onwards = jnp.where(last, stop, time[0] + sense * step)
+        since = sense * step + current.rest[0]
+        onwards = jnp.where(last, stop, time[0] + since)
+        rest = jnp.where(last, 0.0, since - (onwards - time[0]))
         short = (step < SHORT * wished) & ~last
-        stuck = jnp.where(short, current.stuck + 1, 0)
-        moves = known & finite & (step > 0) & (onwards != time[0]) & (stuck < STUCK)
+        stuck = steps_counted(current.stuck, step, span)
+        moves = known & (low > 0) & (stuck < STUCK)
+        again = (
+            known & (low == 0.0) & (stuck < STUCK) & (current.crossing < AGAIN)
+        )  # no number at the very end of a step over a jump
         outcome = jnp.where(last, int(Outcome.ARRIVED), int(Outcome.RUNNING))
-        outcome = jnp.where(moves, outcome, jnp.where(known, int(Outcome.COLLAPSED), int(Outcome.LOST)))
-        after = Progress(onwards[None], arrived, outcome, stuck)
-        steps = RobotSteps(time[0], sense * step, jax.tree.map(lambda c: c[..., 0], polynomial), ~good | short)
-        stay = current._replace(outcome=outcome)
+        failed = jnp.where(again, int(Outcome.RUNNING), jnp.where(known, int(Outcome.COLLAPSED), int(Outcome.LOST)))
+        outcome = jnp.where(moves, outcome, failed)
+        crossing = steps_counted(current.crossing, step, span, over | (low == 0.0))
+        longest_so_far = jnp.maximum(current.longest, step)
+        after = Progress(onwards[None], arrived, outcome, stuck, crossing, rest[None], longest_so_far)
+        steps = RobotSteps(time[0], sense * step, jax.tree.map(lambda c: c[..., 0], polynomial), short | over)
+        stay = current._replace(outcome=outcome, crossing=crossing)
         return jax.tree.map(lambda a, b: jnp.where(moves, a, b), after, stay), steps, moves
 
     def iterate(carry: Any) -> Any:

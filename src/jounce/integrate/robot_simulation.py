@@ -1,6 +1,7 @@
 """The result of a simulation of a robot: coordinates with derivatives of any order, torques, energy and events."""
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Sequence
 from functools import cached_property, partial
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 
 WIDTHS = (64,)  # instants that are computed together: one program for few and for many
 MUCH_LONGER = 1e3  # than the step over a jump are those beside it
+CLOSE = 1e-5  # of the longest step: steps that come so near to a jump are of that
 
 
 class RobotSimulation(Displayed):
@@ -124,11 +126,9 @@ class RobotSimulation(Displayed):
         """Times at which a force had a jump or a kink, s: derivatives do not exist there."""
         length, kink = np.abs(self.steps.length), self.steps.kink
         ends = self.steps.start + self.steps.length
-        return [
-            float(ends[k])
-            for k in np.flatnonzero(kink)
-            if not (k + 1 < len(kink) and kink[k + 1]) and (k == 0 or length[: k + 1].max() > MUCH_LONGER * length[k])
-        ]
+        found = [k for k in np.flatnonzero(kink) if k == 0 or length[: k + 1].max() > MUCH_LONGER * length[k]]
+        close = [a for a, b in itertools.pairwise(found) if abs(ends[b] - ends[a]) <= CLOSE * length.max()]
+        return [float(ends[k]) for k in found if k not in close]
 
     @cached_property
     def torque(self) -> Float[np.ndarray, "time level n"]:

@@ -339,7 +339,7 @@ class _Run:
         series, time = current.expansion.state, current.time.item()
         here = dataclasses.replace(self.start, equations=self.start.equations.near(current.angles))
         onwards = self.sense * AHEAD * max(abs(time), abs(time - current.begun.item()))
-        ahead = evaluated(series, np.array([onwards]))
+        ahead = evaluated(series.map(lambda part: part[:2]), np.array([onwards]))
         for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + onwards)):
             finite = all(np.isfinite(part).all() for part in state)
             if finite and (names := _unfit(here, state, instant)):
@@ -349,8 +349,8 @@ class _Run:
         if current.outcome.item() == Outcome.UNBALANCED:
             names = hiding_names(self.start.model, here.equations, series.map(lambda x: x[0]), np.array([[time]]))
             return Status.UNBALANCED, f"{', '.join(names) or 'all joints'} at t = {time:g} s"
-        if current.crossing.item() >= STUCK:
-            kink = int(self.parts[-1].kink[-1])
+        kink = int(self.parts[-1].kink[-1]) if self.parts else -1
+        if current.short.item() >= STUCK and kink >= 0:
             words = "switches without end, as dry friction does at rest: smooth it, as by tanh(v/v0)"
             return Status.COLLAPSED, f"{watched_names(self.start.model)[kink]} at t = {time:g} s {words}"
         if (blocked := current.blocked.item()) >= 0:

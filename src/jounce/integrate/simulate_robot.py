@@ -162,7 +162,8 @@ class _Run:
         begun, stop = float(instants[0]), float(instants[-1])
         sense = 1.0 if stop >= begun else -1.0
         running, none = (np.asarray(value) for value in (int(Outcome.RUNNING), 0))
-        current, total = Progress(np.array([begun]), start, running, none), 0
+        nothing = np.zeros(1)
+        current, total = Progress(np.array([begun]), start, running, none, none, nothing, nothing), 0
         while int(current.outcome) == Outcome.RUNNING and self.events.stopped_at is None:
             current, steps, taken = self._marched(current, begun, stop)
             count = int(taken)
