@@ -173,8 +173,9 @@ def in_full(value: Any) -> jax.Array:
 def called_back(function: Callable[[Any], Any], shapes: Any, values: Any, *, vmap_method: str) -> Any:
     """Have a compiled program call a function on the host, as `jax.pure_callback` does, in double precision.
 
-    JAX calls it in a thread of its own, where only the setting of the process holds, and rounds what it hands over to
-    single precision there. So numbers are handed over as words of 32 bits.
+    Where a program waits for its operands, JAX calls it in a thread of its own, where only the setting of the process
+    holds: it rounds what it hands over to single precision there, and refuses what it gets back. So numbers go both
+    ways as words of 32 bits.
 
     Parameters
     ----------
@@ -190,10 +191,26 @@ def called_back(function: Callable[[Any], Any], shapes: Any, values: Any, *, vma
 
     @under_own_settings
     def of_words(words: Any) -> Any:
-        return function(jax.tree.map(lambda x: np.ascontiguousarray(x).view(np.float64)[..., 0], words))
+        found = function(jax.tree.map(lambda x: np.ascontiguousarray(x).view(np.float64)[..., 0], words))
+        return jax.tree.map(lambda x, shape: _words(np.asarray(x, shape.dtype)), found, shapes)
+
+    def as_words(shape: Any) -> jax.ShapeDtypeStruct:
+        return jax.ShapeDtypeStruct((*shape.shape, 2), np.uint32) if _is_wide(shape) else shape
 
     words = jax.tree.map(lambda x: jax.lax.bitcast_convert_type(jnp.asarray(x, float), np.uint32), values)
-    return jax.pure_callback(of_words, shapes, words, vmap_method=vmap_method)
+    found = jax.pure_callback(of_words, jax.tree.map(as_words, shapes), words, vmap_method=vmap_method)
+    return jax.tree.map(
+        lambda x, shape: jax.lax.bitcast_convert_type(x, shape.dtype) if _is_wide(shape) else x, found, shapes
+    )
+
+
+def _is_wide(array: Any) -> bool:
+    return array.dtype.itemsize == 8
+
+
+def _words(array: np.ndarray) -> np.ndarray:
+    """Return an array whose numbers of 64 bits are two words each, along a new last axis; others as they are."""
+    return np.array(array[..., None], order="C").view(np.uint32) if _is_wide(array) else array
 
 
 def compute_under_own_settings(room: str) -> None:

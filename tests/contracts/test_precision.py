@@ -9,6 +9,7 @@ import json
 import pkgutil
 import subprocess
 import sys
+import threading
 
 import jax
 import jax.numpy as jnp
@@ -155,20 +156,25 @@ def test_a_transformation_in_single_precision_is_refused(name, single_precision)
 
 
 def test_what_is_compiled_calls_the_host_in_double_precision(single_precision):
-    """JAX calls it in a thread of its own, for which the setting of the process holds, not that of the caller."""
+    """Where a program waits for its operands, in a thread of its own: the setting of the process holds there."""
     from jounce.settings import called_back
 
-    seen = []
+    threads = []
 
     def on_the_host(x):
-        seen.append(x)
+        threads.append(threading.get_ident())
         return 3.0 * x
 
     with jax.enable_x64(True):
         x = jnp.asarray(np.linspace(0.1, 0.7, 5))
         shape = jax.ShapeDtypeStruct(x.shape, x.dtype)
-        found = jax.jit(lambda x: called_back(on_the_host, shape, x, vmap_method="sequential"))(x)
+        program = jax.jit(lambda x: called_back(on_the_host, shape, x, vmap_method="sequential"))
+        program(x).block_until_ready()  # compiles
+        threads.clear()
+        waited_for = jax.jit(lambda x: x @ x)(jnp.zeros((1000, 1000)))
+        found = program(x + waited_for[0, :5])
         found.block_until_ready()
+    assert threads
+    assert threads[0] != threading.get_ident()
     assert found.dtype == np.float64
-    assert np.array_equal(seen[0], np.linspace(0.1, 0.7, 5))
     assert np.array_equal(np.asarray(found), 3.0 * np.linspace(0.1, 0.7, 5))
