@@ -8,7 +8,7 @@ from jounce.integrate.plain_programs import is_plain, uses
 
 
 @pytest.mark.parametrize(
-    ("function", "plain"),
+    "function, plain",
     [
         (lambda x, y: x * x * y - jnp.cos(3.0 * x) / 7.0 + 2.0, True),
         (lambda x, y: jnp.stack([x, y]) @ jnp.array([[1.0, 2.0], [3.0, 4.0]]), True),
