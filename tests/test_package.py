@@ -9,6 +9,7 @@ import jaxtyping
 import pytest
 
 import jounce
+from jounce.interrupts import is_command
 
 HOME = pathlib.Path(jounce.__file__).parent
 HEAVY = ("equinox", "jax", "numpy", "pandas", "pint", "pydantic", "rich.progress", "ruamel", "scipy", "xarray")
@@ -97,3 +98,12 @@ def test_annotations_are_checked_while_quick_tests_run():
         pytest.skip("JAXTYPING_DISABLE is set, as for the slow tests")
     with pytest.raises(TypeError, match="order"):
         jounce.Jet.variable(0.0, order="two")
+
+
+@pytest.mark.parametrize(
+    "program, own",
+    [("/usr/bin/jounce", True), ("/lib/jounce/__main__.py", True), ("/lib/other/__main__.py", False), ("a.py", False)],
+)
+def test_a_process_knows_whether_it_is_the_command(program, own, monkeypatch):
+    monkeypatch.setattr(sys, "argv", [program, "run"])
+    assert is_command() is own
