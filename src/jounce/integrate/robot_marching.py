@@ -375,33 +375,3 @@ def march_robot(
 
     # one piece of machine code, as of mechanisms, has been seen to abort XLA here, and gains nothing at this size
     return jax.lax.while_loop(unfinished, iterate, (current, kept, jnp.zeros((), int)))
-
-
-@compiled("order")
-def derivatives_at(
-    problem: RobotProblem, state: RobotState, time: Lanes, *, order: int
-) -> tuple[Float[Numbers, "level n batch"], Any]:
-    """Return Taylor coefficients of coordinates in states, to the order + 2, and those of the twist, to the order + 1.
-
-    They follow from the equations of motion there.
-    """
-    series = problem.series(state, time[None], order)
-    last = series.accelerations.joints[order:] / ((order + 1) * (order + 2))
-    q = jnp.concatenate([series.motion.coordinates[: order + 2], last])
-    if series.motion.base is None:
-        return q, None
-    rate = series.accelerations.base
-    assert rate is not None
-    return q, jnp.concatenate([series.motion.base.twist[: order + 1], rate[order:] / (order + 1)])
-
-
-@compiled()
-def energy_at(problem: RobotProblem, state: RobotState) -> tuple[Lanes, Lanes]:
-    """Return kinetic and potential energy in states, J."""
-    return problem.equations.energy(problem.motion(state))
-
-
-@compiled()
-def forces_at(problem: RobotProblem, state: RobotState, time: Lanes) -> Float[Numbers, "n batch"]:
-    """Return the forces of the laws of the joints in states."""
-    return problem.forces(time[None], state.coordinates, state.rates)

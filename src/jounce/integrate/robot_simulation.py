@@ -14,24 +14,18 @@ from jaxtyping import Float, Int
 
 from jounce.display import Displayed
 from jounce.errors import RobotError
-from jounce.integrate.robot_marching import (
-    RobotProblem,
-    RobotState,
-    RobotSteps,
-    at,
-    derivatives_at,
-    energy_at,
-    forces_at,
-)
+from jounce.integrate.methods import Lanes
+from jounce.integrate.robot_marching import RobotProblem, RobotState, RobotSteps, at
 from jounce.jet import Jet, compose
 from jounce.kinematics import Status
 from jounce.kinematics.chunks import in_chunks
+from jounce.kinematics.compilation import compiled
 from jounce.robot.base_motion import BaseMotion
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.robot import Robot
 from jounce.robot.wrench_laws import WrenchPart
 from jounce.robot.wrenches import Wrench
-from jounce.shapes import ArrayLike, seconds
+from jounce.shapes import ArrayLike, Numbers, seconds
 from jounce.trajectory.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
@@ -257,3 +251,33 @@ def _derivatives(coefficients: np.ndarray) -> np.ndarray:
     """Return plain derivatives, the batch first, from Taylor coefficients, the batch last."""
     factorials = np.array([math.factorial(k) for k in range(len(coefficients))], float)
     return np.moveaxis(np.asarray(coefficients) * factorials[:, None, None], -1, 0)
+
+
+@compiled("order")
+def derivatives_at(
+    problem: RobotProblem, state: RobotState, time: Lanes, *, order: int
+) -> tuple[Float[Numbers, "level n batch"], Any]:
+    """Return Taylor coefficients of coordinates in states, to the order + 2, and those of the twist, to the order + 1.
+
+    They follow from the equations of motion there.
+    """
+    series = problem.series(state, time[None], order)
+    last = series.accelerations.joints[order:] / ((order + 1) * (order + 2))
+    q = jnp.concatenate([series.motion.coordinates[: order + 2], last])
+    if series.motion.base is None:
+        return q, None
+    rate = series.accelerations.base
+    assert rate is not None
+    return q, jnp.concatenate([series.motion.base.twist[: order + 1], rate[order:] / (order + 1)])
+
+
+@compiled()
+def energy_at(problem: RobotProblem, state: RobotState) -> tuple[Lanes, Lanes]:
+    """Return kinetic and potential energy in states, J."""
+    return problem.equations.energy(problem.motion(state))
+
+
+@compiled()
+def forces_at(problem: RobotProblem, state: RobotState, time: Lanes) -> Float[Numbers, "n batch"]:
+    """Return the forces of the laws of the joints in states."""
+    return problem.forces(time[None], state.coordinates, state.rates)
