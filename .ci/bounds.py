@@ -27,3 +27,4 @@ def lowest(requirements: Iterable[str]) -> list[str]:
 if __name__ == "__main__":
     project = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
     extras = [entry for name in sys.argv[1:] for entry in project["optional-dependencies"][name]]
+    print("\n".join(lowest(project["dependencies"] + extras)))

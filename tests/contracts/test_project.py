@@ -2,6 +2,8 @@
 
 import pathlib
 import re
+import subprocess
+import sys
 import tomllib
 
 import pytest
@@ -76,3 +78,19 @@ def test_links_between_pages_lead_somewhere():
         if "://" not in target and not (page.parent / target).exists()
     ]
     assert not missing
+
+
+def test_lowest_releases_are_those_of_the_bounds():
+    words = [sys.executable, ROOT / ".ci" / "bounds.py", "sweep"]
+    printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout.splitlines()
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert len(printed) == len(project["dependencies"]) + len(project["optional-dependencies"]["sweep"])
+    for entry in [*project["dependencies"], *project["optional-dependencies"]["sweep"]]:
+        name, _, bound = re.sub(r"\[.*?\]", "", entry).partition(">=")
+        assert f"{name}=={bound.partition(',')[0]}" in printed
+
+
+def test_every_requirement_says_what_it_needs_at_least():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    every = project["dependencies"] + [x for extra in project["optional-dependencies"].values() for x in extra]
+    assert [entry for entry in every if ">=" not in entry] == []

@@ -75,7 +75,7 @@ def both_sides(breaks: Breaks, first: float, last: float) -> tuple[Times, Int[np
     return instants[inside], which[inside]
 
 
-def with_sides(instants: Times, breaks: Breaks) -> Times:
+def with_sides(instants: Float[np.ndarray, " instant"], breaks: Breaks) -> Times:
     """Return a grid with the instants just before and just after breaks."""
     return np.union1d(instants, both_sides(breaks, float(instants[0]), float(instants[-1]))[0])
 
@@ -100,7 +100,7 @@ def _beside(first: float, last: float) -> float:
     return max(BESIDE * (last - first), 8 * float(np.spacing(max(abs(first), abs(last)))))
 
 
-def _apart(instants: Times, first: float, last: float) -> Times:
+def _apart(instants: Float[np.ndarray, " instant"], first: float, last: float) -> Times:
     """Return instants without those that are others but for rounding."""
     instants = np.unique(instants)
     return instants[np.diff(instants, prepend=-np.inf) > 2 * _beside(first, last)]
