@@ -8,25 +8,27 @@ import pytest
 
 import jounce as jn
 from jounce import drivers, jet, planar
+from tests.problems.own_types import taken_back
 
+with taken_back():
 
-class Track(jn.AbstractConstraint, type="test_track", space="planar"):
-    """A bead on y = height f((x - at) / width)."""
+    class Track(jn.AbstractConstraint, type="test_track", space="planar"):
+        """A bead on y = height f((x - at) / width)."""
 
-    shape: str = eqx.field(static=True)
-    height: jn.Scalar
-    at: jn.Scalar
-    width: jn.Scalar
+        shape: str = eqx.field(static=True)
+        height: jn.Scalar
+        at: jn.Scalar
+        width: jn.Scalar
 
-    def residual(self, body_i, body_j, time):
-        u = (body_j.position[0] - self.at) / self.width
-        heights = {
-            "bell": lambda: jet.exp(-(u * u)),
-            "step": lambda: 0.5 + 0.5 * jet.tanh(u),
-            "bend": lambda: jet.abs(u),
-            "wave": lambda: jet.sin(u),
-        }
-        return body_j.position[1] - self.height * heights[self.shape]()
+        def residual(self, body_i, body_j, time):
+            u = (body_j.position[0] - self.at) / self.width
+            heights = {
+                "bell": lambda: jet.exp(-(u * u)),
+                "step": lambda: 0.5 + 0.5 * jet.tanh(u),
+                "bend": lambda: jet.abs(u),
+                "wave": lambda: jet.sin(u),
+            }
+            return body_j.position[1] - self.height * heights[self.shape]()
 
 
 def bead(shape, height, at, width, speed=2.0):

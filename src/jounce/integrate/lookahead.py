@@ -173,13 +173,13 @@ def look_ahead(
     return Lookahead(step * jnp.where(low > 0, low, high), low > 0, kink, best.limiting)
 
 
-def finest(span: Lanes, time: Lanes, crossing: Indices) -> Lanes:
+def finest(span: Numbers, time: Numbers, crossing: Numbers) -> Numbers:
     """Return how long a step over a jump may be, s, after so many that have not led over it."""
     longer = jnp.minimum(FINEST * COARSER ** crossing.astype(float), SHORTEST)
     return longer * jnp.maximum(span, jnp.abs(time))
 
 
-def steps_counted(before: Indices, step: Lanes, span: Lanes, count: Flags | bool = True) -> Indices:
+def steps_counted(before: Numbers, step: Numbers, span: Numbers, count: Numbers | bool = True) -> Numbers:
     """Return how many steps that hardly move on there are one after the other, with one more; it counts if told."""
     short = jnp.abs(step) <= SHORTEST * span
     return jnp.where(short & count, before + 1, jnp.where(jnp.abs(step) > AWAY * span, 0, before))

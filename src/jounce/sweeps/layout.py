@@ -121,7 +121,7 @@ def check_room(folder: Path, variables: Sequence[Variable], count: int, chunk: i
 def _free_files(folder: Path) -> float:
     if not hasattr(os, "statvfs"):
         return math.inf
-    return os.statvfs(folder).f_favail or math.inf  # some file systems have no bound, and say 0
+    return float(os.statvfs(folder).f_favail) or math.inf  # some file systems have no bound, and say 0
 
 
 def _size(count: float) -> str:

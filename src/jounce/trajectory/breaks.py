@@ -59,7 +59,9 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
     return _apart(np.concatenate(found), first, last)
 
 
-def both_sides(breaks: Breaks, first: float, last: float) -> tuple[Times, Int[np.ndarray, " time"]]:
+def both_sides(
+    breaks: Breaks, first: float, last: float
+) -> tuple[Float[np.ndarray, " side"], Int[np.ndarray, " side"]]:
     """Return the instants just before and just after breaks, within a first and a last instant, and of which they are.
 
     Examples
@@ -75,7 +77,7 @@ def both_sides(breaks: Breaks, first: float, last: float) -> tuple[Times, Int[np
     return instants[inside], which[inside]
 
 
-def with_sides(instants: Float[np.ndarray, " instant"], breaks: Breaks) -> Times:
+def with_sides(instants: Times, breaks: Breaks) -> Float[np.ndarray, " all"]:
     """Return a grid with the instants just before and just after breaks."""
     return np.union1d(instants, both_sides(breaks, float(instants[0]), float(instants[-1]))[0])
 

@@ -63,7 +63,9 @@ def spline_through(
     return ((times, values), *found)
 
 
-def local_powers(spline: Any, beginnings: Float[np.ndarray, " pieces"], degree: int) -> _Pieces:
+def local_powers(
+    spline: Any, beginnings: Float[np.ndarray, " pieces"], degree: int
+) -> Float[np.ndarray, "powers pieces *columns"]:
     """Return the coefficients of a spline of SciPy on the pieces that begin at some instants, lowest power first.
 
     The derivatives come from the B-splines themselves (de Boor's recursion). SciPy's ``PPoly.from_spline`` calls
