@@ -9,7 +9,7 @@ import numpy as np
 
 from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia, finite_numbers, unchanging
-from jounce.shapes import ArrayLike, Refused, real_numbers
+from jounce.shapes import ArrayLike, real_numbers
 
 MOVING = ("revolute", "continuous", "prismatic")
 TYPES = (*MOVING, "fixed")
@@ -34,14 +34,14 @@ class Limits:
         velocity; `acceleration` holds there too unless this is given.
     """
 
-    lower: float | Refused | None = None
-    upper: float | Refused | None = None
-    velocity: float | Refused | None = None
-    acceleration: float | Refused | None = None
-    jerk: float | Refused | None = None
-    effort: float | Refused | None = None
-    effort_rate: float | Refused | None = None
-    deceleration: float | Refused | None = None
+    lower: float | None = None
+    upper: float | None = None
+    velocity: float | None = None
+    acceleration: float | None = None
+    jerk: float | None = None
+    effort: float | None = None
+    effort_rate: float | None = None
+    deceleration: float | None = None
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):

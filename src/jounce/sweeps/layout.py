@@ -124,7 +124,7 @@ def _free_files(folder: Path) -> float:
     return float(os.statvfs(folder).f_favail) or math.inf  # some file systems have no bound, and say 0
 
 
-def _size(count: float) -> str:
+def _size(count: int | float) -> str:
     names = ("bytes", "kB", "MB", "GB", "TB", "PB", "EB")
     power = min(int(math.log10(max(count, 1)) // 3), len(names) - 1)
     return f"{count / 1000**power:.3g} {names[power]}"
