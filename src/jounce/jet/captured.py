@@ -7,6 +7,7 @@ in as arguments, so that a changed gain neither goes unseen nor is compiled anew
 are part of the program, and so are numbers within loops and branches.
 """
 
+import abc
 import dataclasses
 import hashlib
 import itertools
@@ -193,24 +194,24 @@ def _is_of_libraries(jaxpr: Jaxpr) -> bool:
     return origin is not None and Path(origin).as_posix().startswith(_LIBRARIES)
 
 
-class Pass:
+class Pass(abc.ABC):
     """Goes through a program, operation by operation, and through those of the functions that it calls."""
 
     def of(self, closed: ClosedJaxpr, arguments: Sequence[Any]) -> list[Any]:
         """Return what stands for the results of a program."""
         return self._read(closed.jaxpr, closed.consts, arguments)
 
+    @abc.abstractmethod
     def captured(self, value: Any, dtype: np.dtype) -> Any:
         """Return what stands for a number that the function holds."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def fixed(self, value: Any, dtype: np.dtype) -> Any:
         """Return what stands for a number that is part of the program."""
-        raise NotImplementedError
 
+    @abc.abstractmethod
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> Sequence[Any]:
         """Return what stands for the results of an operation."""
-        raise NotImplementedError
 
     def _read(self, jaxpr: Jaxpr, constants: Sequence[Any], arguments: Sequence[Any]) -> list[Any]:
         found = {v: self._number(c, v.aval) for v, c in zip(jaxpr.constvars, constants, strict=True)}
