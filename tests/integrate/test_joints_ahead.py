@@ -93,16 +93,18 @@ def test_a_bend_in_a_batch_has_the_same_status():
     assert names == [["OK", "OK", "OK"], ["OK", "OK", "UNBALANCED"]]
 
 
-class Bump(jn.AbstractConstraint, type="test_bump", space="spatial"):
-    """A ball on z = height exp(-((x - 1.5) / width)^2), y = 0."""
+with taken_back():
 
-    height: jn.Scalar
-    width: jn.Scalar
+    class Bump(jn.AbstractConstraint, type="test_bump", space="spatial"):
+        """A ball on z = height exp(-((x - 1.5) / width)^2), y = 0."""
 
-    def residual(self, body_i, body_j, time):
-        p = body_j.position
-        u = (p[0] - 1.5) / self.width
-        return jn.rows(p[2] - self.height * jet.exp(-(u * u)), p[1])
+        height: jn.Scalar
+        width: jn.Scalar
+
+        def residual(self, body_i, body_j, time):
+            p = body_j.position
+            u = (p[0] - 1.5) / self.width
+            return jn.rows(p[2] - self.height * jet.exp(-(u * u)), p[1])
 
 
 @pytest.mark.slow

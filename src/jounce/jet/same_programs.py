@@ -13,12 +13,16 @@ _SPREADING = frozenset("add add_any sub mul div max min pow atan2 select_n".spli
 
 
 def is_same(first: ClosedJaxpr, second: ClosedJaxpr, captured: Sequence[Any]) -> bool:
-    """Tell whether a program is the same as another one that gets captured values as its first arguments."""
+    """Tell whether a program is the same as another one that gets captured values as its first arguments.
+
+    The first may have more arguments at its end; where it looks at them, the two are not the same.
+    """
     nodes: dict[Any, Any] = {}
     one, two = _Nodes(nodes), _Nodes(nodes)
     arguments = [("argument", k) for k in range(len(first.jaxpr.invars))]
     values = [one.fixed(value, np.asarray(value).dtype) for value in captured]
-    return one.of(first, arguments) == two.of(second, [*values, *arguments])
+    common = arguments[: len(second.jaxpr.invars) - len(values)]
+    return one.of(first, arguments) == two.of(second, [*values, *common])
 
 
 class _Nodes(Pass):

@@ -363,8 +363,8 @@ def _keep_best(
     times: Float[np.ndarray, " curves"],
     sizes: Float[np.ndarray, " curves"],
     rounding: Float[np.ndarray, " curves"],
-    around: _Around,
-    own: _Around,
+    around: Float[np.ndarray, "..."],
+    own: Float[np.ndarray, "..."],
 ) -> None:
     """Take over what is larger than what was found before, by more than rounding: instants asked for are round."""
     flat = own.reshape(-1, own.shape[-1])
