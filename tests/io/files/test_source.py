@@ -243,7 +243,7 @@ def test_paths_that_are_no_files(tmp_path):
         (tmp_path, "is a directory, a file is needed"),
         (tmp_path / "four_bar.txt", "valid: .yaml, .yml, .toml, .json"),
         (tmp_path / "four_bar.yaml" / "a.yaml", "cannot be read: Not a directory"),
-        (f"{tmp_path}/a\0.yaml", "cannot be read: embedded null byte"),
+        (f"{tmp_path}/a\0.yaml", "embedded null"),
         ("", "the name of a file is needed"),
     ]:
         with pytest.raises(MechanismFileError) as caught:
