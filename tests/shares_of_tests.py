@@ -1,10 +1,15 @@
 """Which of the collected tests run: dear examples of docstrings are slow tests, of which a run may take a share.
 
 The slow tests take half an hour, nine tenths of it in JAX and XLA, which compile each mechanism anew. A check before
-each submission has not that long: it runs one share of them, by turns, and whoever changes what they test runs all.
+each submission has not that long: it runs the share of the day, and the tests of what changed as far as another share
+goes. Whoever changes what slow tests cover runs all.
 """
 
 import argparse
+import math
+import pathlib
+import subprocess
+from collections import Counter
 
 import pytest
 
@@ -47,8 +52,13 @@ def share(text):
 
 
 def pytest_addoption(parser):
-    """Add the option of a share."""
+    """Add the options of a share and of what changed."""
     parser.addoption("--share", type=share, default=(1, 1), metavar="K/N", help="the K-th of N shares of the tests")
+    parser.addoption(
+        "--changed-since",
+        metavar="COMMIT",
+        help="also the slow tests of the files that changed most since a commit, as many files as a share has",
+    )
 
 
 @pytest.hookimpl(tryfirst=True)  # before pytest selects by marks
@@ -58,7 +68,12 @@ def pytest_collection_modifyitems(config, items):
         if item.name in SLOW_EXAMPLES:
             item.add_marker(pytest.mark.slow)
     slow = {item for item in items if item.get_closest_marker("slow")}
-    left_out = slow & elsewhere(slow, *config.getoption("share"))
+    which, count = config.getoption("share")
+    left_out = slow & elsewhere(slow, which, count)
+    if left_out and (commit := config.getoption("changed_since")):
+        files = {item.path for item in slow}
+        wanted = most_changed(changed_lines(config.rootpath, commit), files, config.rootpath, count)
+        left_out = {item for item in left_out if item.path not in wanted}
     if left_out:
         config.hook.pytest_deselected(items=list(left_out))
         items[:] = [item for item in items if item not in left_out]
@@ -68,3 +83,31 @@ def elsewhere(items, which, count):
     """Return the tests of other shares: the files are dealt out in the order of their names."""
     files = sorted({item.path for item in items})
     return {item for item in items if files.index(item.path) % count != which - 1}
+
+
+def most_changed(lines, files, root, count):
+    """Return the test files of what changed, those of most changed lines first, at most one in so many of all files.
+
+    A test file is that of itself, and of the module that it mirrors: ``tests/a/test_b.py`` of ``src/jounce/a/b.py``.
+    """
+    sizes = Counter({file: sum(lines[name] for name in covered(file.relative_to(root))) for file in files})
+    return {file for file, size in sizes.most_common(math.ceil(len(files) / count)) if size}
+
+
+def covered(file):
+    """Return the paths of which a test file is the test: its own, and that of the module that it mirrors."""
+    module = pathlib.Path("src/jounce", *file.parts[1:-1], file.name.removeprefix("test_"))
+    return {file.as_posix(), module.as_posix()}
+
+
+def changed_lines(root, commit):
+    """Return how many lines of each file changed since a commit."""
+    told = subprocess.run(
+        ["git", "diff", "--numstat", "--no-renames", commit, "--", "src", "tests"],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    rows = (line.split("\t") for line in told.stdout.splitlines())
+    return Counter({name: int(added) + int(removed) for added, removed, name in rows if added != "-"})

@@ -3,10 +3,12 @@
 import argparse
 import importlib
 import pathlib
+import subprocess
+from collections import Counter
 
 import pytest
 
-from tests.shares_of_tests import SLOW_EXAMPLES, elsewhere, share
+from tests.shares_of_tests import SLOW_EXAMPLES, changed_lines, elsewhere, most_changed, share
 
 
 class Item:
@@ -32,6 +34,31 @@ def test_what_is_no_share_is_refused(text):
 
 def test_shares():
     assert share("2/3") == (2, 3)
+
+
+def test_the_tests_of_what_changed_most_are_added():
+    root = pathlib.Path("/r")
+    files = {root / "tests" / name for name in ("a/test_b.py", "a/test_c.py", "test_d.py", "e/test_f.py")}
+    lines = Counter({"src/jounce/a/b.py": 3, "tests/test_d.py": 5, "src/jounce/e/f.py": 1, "docs/x.md": 99})
+    assert most_changed(lines, files, root, 1) == files - {root / "tests/a/test_c.py"}
+    assert most_changed(lines, files, root, 2) == {root / "tests/test_d.py", root / "tests/a/test_b.py"}
+    assert most_changed(lines, files, root, 4) == {root / "tests/test_d.py"}
+    assert most_changed(Counter(), files, root, 1) == set()
+
+
+def test_lines_are_counted_since_a_commit(tmp_path):
+    def git(*words):
+        who = ["-c", "user.name=a", "-c", "user.email=a@b.c", "-c", "core.hooksPath=/dev/null"]
+        subprocess.run(["git", *who, *words], cwd=tmp_path, check=True, capture_output=True)
+
+    (tmp_path / "src").mkdir()
+    file = tmp_path / "src" / "a.py"
+    git("init", "-q")
+    file.write_text("1\n2\n")
+    git("add", ".")
+    git("commit", "-qm", "first")
+    file.write_text("1\n3\n4\n")
+    assert changed_lines(tmp_path, "HEAD") == {"src/a.py": 3}
 
 
 @pytest.mark.parametrize("name", sorted(SLOW_EXAMPLES))
