@@ -29,7 +29,7 @@ from jounce.plot.style import BODY_COLOURS
 from jounce.reporting.motion_facts import motion_facts
 from jounce.reporting.peaks import Peak, derivative_name, peaks, shown_peaks
 from jounce.reporting.summaries import motion_summary
-from jounce.trajectory.shown_units import ShownUnits, derivative_unit
+from jounce.units.shown_units import ShownUnits, derivative_unit
 
 __all__ = ["check_report", "report"]
 

@@ -25,8 +25,8 @@ from jounce.reporting.freedom_facts import AssemblyFacts, FreedomFacts, Mobility
 from jounce.reporting.law_facts import LawFacts, law_facts
 from jounce.reporting.range_facts import RangeFacts
 from jounce.trajectory import OutputMotion, SegmentedMotion
-from jounce.trajectory.dimensions import Dimension
-from jounce.trajectory.units import parse_value
+from jounce.units.dimensions import Dimension
+from jounce.units.values import parse_value
 
 KINDS = ("joints", "drivers", "forces", "initial")
 BASES = {"mass": "kg", "length": "m", "angle": "rad", "time": "s", "ampere": "A", "kelvin": "K"}

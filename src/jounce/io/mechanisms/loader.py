@@ -24,7 +24,7 @@ from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.settings import under_own_settings
 from jounce.trajectory import Expression
-from jounce.trajectory.units import parse_value
+from jounce.units.values import parse_value
 
 _Places = dict[str, tuple[Location, tuple[FileKey, ...]]]
 """Where in the file the elements of a mechanism stand, by dotted name, and the keys of each."""

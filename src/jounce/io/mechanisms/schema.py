@@ -33,8 +33,8 @@ from jounce.mechanism.mechanism import NEAREST, SIDES, check_body_name, check_ou
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.orientation import FRAMES
 from jounce.rigid.rotations import SEQUENCES
-from jounce.trajectory.dimensions import variables_of
-from jounce.trajectory.expression import PARAMETER_NAME, check_parameter_name
+from jounce.units.dimensions import variables_of
+from jounce.units.expression import PARAMETER_NAME, check_parameter_name
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,99}")
 _CHOICES = {"coordinate": COORDINATES, "frame": FRAMES, "sequence": SEQUENCES}

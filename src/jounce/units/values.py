@@ -17,7 +17,7 @@ from functools import lru_cache
 
 from jounce.errors import ExpressionError, UnitError, did_you_mean, show_value
 from jounce.jet.turns import WHOLE_TURN
-from jounce.trajectory.dimensions import (
+from jounce.units.dimensions import (
     ANGLE,
     FORCE,
     LENGTH,
@@ -31,7 +31,7 @@ from jounce.trajectory.dimensions import (
     inferred,
     times,
 )
-from jounce.trajectory.expression import CONSTANTS, FUNCTIONS, MAX_CHARACTERS, Expression
+from jounce.units.expression import CONSTANTS, FUNCTIONS, MAX_CHARACTERS, Expression
 
 Size = Decimal | float
 
@@ -159,7 +159,7 @@ def _product(size: Size, factor: Size, power: int) -> Size:
 
 def _looked_up(name: str) -> tuple[Size, Dimension]:
     """Return what a library of units knows; the room that asks it is above this one, so is imported by its name."""
-    if found := importlib.import_module("jounce.io.files.units").ask_pint(name):
+    if found := importlib.import_module("jounce.units.pint_units").ask_pint(name):
         return found
     raise UnitError(f"unknown unit '{_ascii(name)}'; {nearest_unit(name)}".rstrip("; "))
 
