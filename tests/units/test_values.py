@@ -13,7 +13,8 @@ import jounce as jn
 from jounce.errors import ExpressionError, JounceError, UnitError
 from jounce.trajectory import Expression
 from jounce.units.dimensions import KINDS, check_dimension, describe_dimension
-from jounce.units.values import COMMON, parse_unit, parse_value
+from jounce.units.table import COMMON
+from jounce.units.values import parse_unit, parse_value
 
 REGISTRY = pint.UnitRegistry()
 LENGTH, ANGLE, TIME = (((name, 1),) for name in ("length", "angle", "time"))

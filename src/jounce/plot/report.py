@@ -112,7 +112,7 @@ def _part(name: str) -> str:
 
 def _data(motion: Motion, view: View, source: str) -> dict[str, Any]:
     """Return all that the page shows."""
-    from jounce import __version__
+    from jounce.version import __version__
 
     mechanism = motion.mechanism
     rising = np.argsort(motion.time, kind="stable")

@@ -14,7 +14,7 @@ from jounce.constraints.base import by_ratio_alone, value_fields
 from jounce.dynamics.outputs import ratio_words
 from jounce.errors import JounceError
 from jounce.io.files.source import read_source
-from jounce.io.mechanisms.keys import OUTPUTS, output_holder
+from jounce.io.mechanisms.output_types import OUTPUTS, output_holder
 from jounce.kinematics.curves.choice import chosen
 from jounce.mechanism import Mechanism, Model, build, time_grid, with_outputs_held
 from jounce.mechanism.masses import body_mass

@@ -8,7 +8,7 @@ from typing import Any
 
 from jounce.errors import UnitError
 from jounce.units.dimensions import NUMBER, Dimension, dimension_of
-from jounce.units.values import nearest_unit
+from jounce.units.table import nearest_unit
 
 _BASES = {"meter": "length", "radian": "angle", "second": "time", "kilogram": "mass"}
 

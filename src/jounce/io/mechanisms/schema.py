@@ -17,8 +17,9 @@ from jounce.constraints import catalogue
 from jounce.constraints.planar import COORDINATES
 from jounce.errors import JounceError, MechanismFileError, no_such
 from jounce.io.mechanisms.inertia_forms import inertia
-from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
+from jounce.io.mechanisms.keys import FileKey, file_keys
 from jounce.io.mechanisms.motion_values import laws, motion
+from jounce.io.mechanisms.output_types import HOLDERS, output_holder, output_tag, output_types
 from jounce.io.mechanisms.values import (
     Checked,
     orientation,
