@@ -31,8 +31,8 @@ def test_all_that_the_stub_lists_is_there_and_comes_from_where_it_says():
             assert f"{line.module}.{alias.name}" in sys.modules or getattr(jounce, alias.name) is getattr(
                 sys.modules[line.module], alias.name
             )
-    assert {*names, "__version__"} == {*jounce.__all__}
-    assert {*names} <= {*dir(jounce)}
+    assert [*names, "__version__"] == jounce.__all__
+    assert {*names, "__version__"} <= {*dir(jounce)}
     with pytest.raises(AttributeError, match="module 'jounce' has no attribute 'sovle'"):
         jounce.sovle  # noqa: B018 - what is looked for is the error
 
@@ -43,6 +43,34 @@ def test_the_package_is_imported_when_it_is_used():
         "print(jounce.solve.__module__, jounce.io.load is jounce.load, 'scipy' in sys.modules, 'xarray' in sys.modules)"
     )
     assert found.split() == "False False jounce.kinematics.solve True False False".split()
+
+
+def test_each_name_is_imported_for_itself():
+    code = """
+import sys, jounce
+rooms = "trajectory mechanism kinematics dynamics robot integrate planning reporting".split()
+for name in "JounceError Jet load load_trajectory".split():
+    getattr(jounce, name)
+    print([room for room in rooms if f"jounce.{room}" in sys.modules])"""
+    found = [ast.literal_eval(line) for line in printed(code).splitlines()]
+    assert found == [[], [], ["trajectory", "mechanism"], ["trajectory", "mechanism", "kinematics", "robot"]]
+
+
+def test_rooms_are_there_without_an_import():
+    code = "import jounce as jn; print(jn.trajectory.AbstractMotion.__name__, jn.kinematics.__name__, jn.plot.__name__)"
+    assert printed(code).split() == "AbstractMotion jounce.kinematics jounce.plot".split()
+
+
+def test_classes_compute_in_double_precision_whatever_is_imported_first():
+    code = """
+import sys
+import jounce as jn
+mechanism = jn.load("examples/four_bar.yaml")
+jn.solve(mechanism, [0.0], order=1)
+jn.load_trajectory
+print([*{name for name in sys.modules if name.startswith(tuple(f"{room}." for room in jn.settings._rooms))}
+    - jn.settings._modules])"""
+    assert printed(code) == "[]\n"
 
 
 def test_everything_can_be_imported_by_a_star():
@@ -90,7 +118,7 @@ def test_rooms_do_not_import_one_another_through_the_package():
     for file in HOME.rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and node.module == "jounce":
-                assert {alias.name for alias in node.names} <= {"__version__", "errors"}, file
+                assert {alias.name for alias in node.names} <= {"errors", "importing"}, file
 
 
 def test_annotations_are_checked_while_quick_tests_run():

@@ -228,11 +228,18 @@ def compute_under_own_settings(room: str) -> None:
             offered[name] = door = under_own_settings(value)
             if home.get(value.__name__) is value:
                 home[value.__name__] = door  # by which pickle finds it
-    for name, module in list(sys.modules.items()):
-        if name in _modules or not name.startswith(tuple(f"{done}." for done in _rooms)):
-            continue
+    cover_new_modules()
+
+
+def cover_new_modules() -> None:
+    """Have the classes of those modules of the rooms named so far compute in double precision that came since.
+
+    A room above may be the first to import a module of one below.
+    """
+    rooms = tuple(f"{room}." for room in _rooms)
+    for name in [name for name in list(sys.modules) if name.startswith(rooms) and name not in _modules]:
         _modules.add(name)
-        for value in list(vars(module).values()):
+        for value in list(vars(sys.modules[name]).values()):
             if inspect.isclass(value) and value.__module__ == name:
                 _compute_under_own_settings(value)
 

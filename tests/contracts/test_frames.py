@@ -10,7 +10,7 @@ import jounce as jn
 from jounce import drivers, forces, planar, spatial
 from jounce.constraints.base import ROLES, catalogue, field_kind, value_fields
 from jounce.dynamics import DriverTorqueOutput, GroundTorqueOutput, JointTorqueOutput
-from jounce.io.mechanisms.keys import output_types
+from jounce.io.mechanisms.output_types import output_types
 from jounce.mechanism import build
 from jounce.mechanism.axis_angles import with_datums
 from jounce.mechanism.builder import pose_at

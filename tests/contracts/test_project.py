@@ -57,7 +57,7 @@ def normal(name):
 def test_version_is_one():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"version: {version}" in (ROOT / "CITATION.cff").read_text()
-    assert f'__version__ = "{version}"' in (ROOT / "src" / "jounce" / "__init__.py").read_text()
+    assert f'__version__ = "{version}"' in (ROOT / "src" / "jounce" / "version.py").read_text()
     assert f"\n## {version} - " in (ROOT / "CHANGELOG.md").read_text()
 
 

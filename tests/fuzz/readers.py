@@ -16,7 +16,7 @@ from jounce.io.mechanisms.overrides import override
 from jounce.io.robots.limits import load_limits
 from jounce.io.robots.payloads import with_payloads
 from jounce.trajectory import Expression
-from jounce.trajectory.units import parse_value
+from jounce.units.values import parse_value
 
 __all__ = ["READERS", "Reader"]
 

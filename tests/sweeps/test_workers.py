@@ -54,7 +54,7 @@ def test_a_worker_whose_client_was_followed_by_another_writes_nothing(plan):
 
 def test_a_worker_of_another_release_computes_nothing(plan, monkeypatch):
     sent = chunks._loaded(content(plan))
-    monkeypatch.setattr(jn, "__version__", "0.3.9")
+    monkeypatch.setattr("jounce.version.__version__", "0.3.9")
     with pytest.raises(OutputError, match=r"a worker rounds otherwise .* jounce is .* there, and 0\.3\.9 here"):
         sent.compute(0)
 

@@ -183,7 +183,7 @@ def application() -> Any:
     """Return the command line as a `cyclopts.App`."""
     import cyclopts
 
-    from jounce import __version__
+    from jounce.version import __version__
 
     app = cyclopts.App(
         name="jounce",

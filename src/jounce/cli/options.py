@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from jounce.mechanism import Mechanism
     from jounce.robot import Robot
     from jounce.trajectory import JointTrajectory
-    from jounce.trajectory.dimensions import Dimension
-    from jounce.trajectory.shown_units import ShownUnits
+    from jounce.units.dimensions import Dimension
+    from jounce.units.shown_units import ShownUnits
 
 Overwrite = Annotated[bool, Parameter(alias="--force")]
 """The option of commands that replace no file unasked; --force is what it was called first."""
@@ -213,7 +213,7 @@ class Heading:
 
 def units_chosen(known: ShownUnits, texts: Sequence[str] | None) -> ShownUnits:
     """Return the units of a file with those of the option --units in their place."""
-    from jounce.trajectory.shown_units import units_given
+    from jounce.units.shown_units import units_given
 
     given = units_given(texts or ())
     try:
@@ -289,7 +289,7 @@ def errors_about(file: Path, robot: Path | None = None) -> Iterator[None]:
 
 def positive_quantity(option: str, text: str, dimensions: Collection[Dimension], words: str) -> float:
     """Return a number greater than zero in SI units, of a text that may have a unit of one of some dimensions."""
-    from jounce.trajectory.units import parse_value
+    from jounce.units.values import parse_value
 
     try:
         number: Any = float(text)

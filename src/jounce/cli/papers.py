@@ -7,7 +7,7 @@ from pathlib import Path
 from jounce.errors import JounceError, check_name
 from jounce.reporting.terminal import Bar, say
 
-PAPERS = {"sommer-2024": "jounce.papers.sommer_2024", "negrean-2025": "jounce.papers.negrean_2025"}
+PAPERS = ("sommer-2024", "negrean-2025")
 
 
 def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: Path | None = None) -> int:
@@ -31,8 +31,6 @@ def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: 
       jounce reproduce negrean-2025 --out out
       jounce reproduce negrean-2025 --out out --samples a.csv --masses link.yaml
     """
-    import importlib
-
     from jounce.reporting.summaries import count
 
     check_name("paper", paper, PAPERS, JounceError)
@@ -40,9 +38,12 @@ def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: 
     if given and paper != "negrean-2025":
         message = f"{paper} needs no data of yours; negrean-2025 takes samples and masses"
         raise JounceError(message, name=f"--{next(iter(given))}", value=str(next(iter(given.values()))))
-    make = importlib.import_module(PAPERS[paper]).reproduce
+    if paper == "negrean-2025":
+        from jounce.papers import negrean_2025 as home
+    else:
+        from jounce.papers import sommer_2024 as home
     with Bar("reproducing") as bar:
-        paths = make(out, progress=bar, **given)
+        paths = home.reproduce(out, progress=bar, **given)
     say(paths[0].read_text(encoding="utf-8"))
     say(f"Written to {out}: {count(len(paths), 'file')}")
     return 0

@@ -117,7 +117,7 @@ def retime(
 
 def deviation_of(text: str) -> float:
     """Return an angle or a length, rad or m."""
-    from jounce.trajectory.dimensions import ANGLE, LENGTH
+    from jounce.units.dimensions import ANGLE, LENGTH
 
     return positive_quantity("--deviation", text, (ANGLE, LENGTH), "an angle or a length, such as 0.1deg or 1mm")
 
@@ -207,7 +207,7 @@ def sampled(found: RetimedTrajectory) -> Any:
     """Return the positions of the joints, and their derivatives to jerk, at the instants of a trajectory."""
     import xarray
 
-    from jounce.trajectory.shown_units import time_axes
+    from jounce.units.shown_units import time_axes
 
     values = found.derivatives(found.times, ROWS)
     variables = {name: (("time", "derivative"), values[:, :, k]) for k, name in enumerate(found.names)}

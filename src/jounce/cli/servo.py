@@ -23,7 +23,7 @@ from jounce.reporting.terminal import Bar, say, show_peaks
 if TYPE_CHECKING:
     from jounce.kinematics import Motion
     from jounce.mechanism import Mechanism
-    from jounce.trajectory.shown_units import ShownUnits
+    from jounce.units.shown_units import ShownUnits
 
 PER_TIME = (("time", -1),)
 
@@ -140,7 +140,7 @@ def _driven(motion: Motion, names: list[str]) -> Any:
 def _units_of(mechanism: Mechanism, names: list[str]) -> ShownUnits:
     """Return the units of a file for its drivers: by their kind, or by the name of an output that a driver shares."""
     from jounce.mechanism.driver_outputs import is_turning
-    from jounce.trajectory.shown_units import QUANTITIES, ShownUnits
+    from jounce.units.shown_units import QUANTITIES, ShownUnits
 
     known = {name: "rad" if is_turning(mechanism.drivers[name]) else "m" for name in names}
     chosen = {name: unit for name, unit in mechanism.units.items() if name in QUANTITIES or name in known}

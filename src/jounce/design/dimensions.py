@@ -3,8 +3,8 @@
 from jounce.design.language import EXERTED, MEASURES, OVER_TIME, Node, Relation
 from jounce.design.quantities import Quantities
 from jounce.errors import UnitError
-from jounce.trajectory.dimensions import LENGTH, TIME, Dimension, times
-from jounce.trajectory.units import parse_unit
+from jounce.units.dimensions import LENGTH, TIME, Dimension, times
+from jounce.units.values import parse_unit
 
 
 def check_dimensions(relation: Relation, quantities: Quantities) -> None:

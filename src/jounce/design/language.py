@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from jounce.errors import ExpressionError, JounceError, MechanismError, did_you_mean, show_value
-from jounce.trajectory.dimensions import Dimension
-from jounce.trajectory.expression import FUNCTIONS, Expression
-from jounce.trajectory.units import parse_value
+from jounce.units.dimensions import Dimension
+from jounce.units.expression import FUNCTIONS, Expression
+from jounce.units.values import parse_value
 
 OVER_TIME: dict[str, tuple[int, ...]] = dict.fromkeys(
     ("peak", "maximum", "minimum", "span", "mean", "rms"),

@@ -33,7 +33,7 @@ from jounce.mechanism.system import System
 from jounce.modules import Module
 from jounce.rigid.pose import Pose
 from jounce.shapes import ArrayLike, Numbers
-from jounce.trajectory.shown_units import derivative_unit
+from jounce.units.shown_units import derivative_unit
 
 if TYPE_CHECKING:
     import xarray

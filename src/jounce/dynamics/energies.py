@@ -33,7 +33,7 @@ from jounce.robot.robot import Robot
 from jounce.robot.tree import Tree
 from jounce.robot.tree_scan import Series
 from jounce.shapes import ArrayLike, Numbers
-from jounce.trajectory.shown_units import derivative_unit
+from jounce.units.shown_units import derivative_unit
 
 if TYPE_CHECKING:
     import xarray

@@ -16,7 +16,7 @@ from jounce.kinematics.chunks import in_chunks
 from jounce.kinematics.device import on_processor
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
-from jounce.trajectory.shown_units import time_axes
+from jounce.units.shown_units import time_axes
 
 if TYPE_CHECKING:
     import xarray

@@ -15,8 +15,8 @@ from jounce.robot.model import Limits
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.joint_trajectory import JointTrajectory
-from jounce.trajectory.shown_units import derivatives_of, time_axes
 from jounce.trajectory.unit_doubts import trajectory_doubt
+from jounce.units.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray

@@ -26,7 +26,7 @@ from jounce.robot.robot import Robot
 from jounce.robot.wrench_laws import WrenchPart
 from jounce.robot.wrenches import Wrench
 from jounce.shapes import ArrayLike, Numbers, seconds
-from jounce.trajectory.shown_units import derivatives_of, time_axes
+from jounce.units.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -24,30 +25,59 @@ if TYPE_CHECKING:
     from jounce.io.robots.paths import load_path as load_path
     from jounce.io.robots.trajectories import load_trajectory as load_trajectory
 
-_HOMES = {
-    "in_units": "files.column_units",
-    "load": "mechanisms.loader",
-    "json_schema": "mechanisms.json_schema",
-    "load_cam": "mechanisms.cam_files",
-    "check_writable": "results",
-    "read": "results",
-    "write": "results",
-    "load_drives": "robots.drives",
-    "export_trajectory": "robots.controller_files",
-    "load_drive_limits": "mechanisms.drive_limits",
-    "load_limits": "robots.limits",
-    "load_motion_limits": "robots.limits",
-    "load_path": "robots.paths",
-    "load_robot": "robots.loader",
-    "load_trajectory": "robots.trajectories",
-    "write_mechanism": "mechanisms.writer",
-    "write_parts": "results",
-}
-
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    home = _of_mechanisms(name) or _of_robots(name) or _of_results(name)
+    if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    import importlib
+    return getattr(home, name)
 
-    return getattr(importlib.import_module(f"jounce.io.{_HOMES[name]}"), name)
+
+def _of_mechanisms(name: str) -> ModuleType | None:
+    """Return the file that a name of mechanisms is from."""
+    match name:
+        case "load":
+            from jounce.io.mechanisms import loader as home
+        case "load_cam":
+            from jounce.io.mechanisms import cam_files as home
+        case "load_drive_limits":
+            from jounce.io.mechanisms import drive_limits as home
+        case "json_schema":
+            from jounce.io.mechanisms import json_schema as home
+        case "write_mechanism":
+            from jounce.io.mechanisms import writer as home
+        case _:
+            return None
+    return home
+
+
+def _of_robots(name: str) -> ModuleType | None:
+    """Return the file that a name of robots is from."""
+    match name:
+        case "load_robot":
+            from jounce.io.robots import loader as home
+        case "load_trajectory":
+            from jounce.io.robots import trajectories as home
+        case "load_path":
+            from jounce.io.robots import paths as home
+        case "load_limits" | "load_motion_limits":
+            from jounce.io.robots import limits as home
+        case "load_drives":
+            from jounce.io.robots import drives as home
+        case "export_trajectory":
+            from jounce.io.robots import controller_files as home
+        case _:
+            return None
+    return home
+
+
+def _of_results(name: str) -> ModuleType | None:
+    """Return the file that a name of results is from."""
+    match name:
+        case "check_writable" | "read" | "write" | "write_parts":
+            from jounce.io import results as home
+        case "in_units":
+            from jounce.io.files import column_units as home
+        case _:
+            return None
+    return home

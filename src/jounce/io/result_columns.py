@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from jounce.errors import OutputError
 from jounce.mechanism import EulerAnglesOutput, EulerParametersOutput, RotationMatrixOutput
-from jounce.trajectory.shown_units import derivative_unit, time_axes
+from jounce.units.shown_units import derivative_unit, time_axes
 
 if TYPE_CHECKING:
     import xarray

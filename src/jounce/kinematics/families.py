@@ -36,7 +36,7 @@ from jounce.mechanism.time import TimeLike
 from jounce.settings import under_own_settings
 from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory.motion import SplineMotion
-from jounce.trajectory.shown_units import derivatives_of, time_axes
+from jounce.units.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray

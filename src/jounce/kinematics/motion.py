@@ -40,7 +40,7 @@ from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
 from jounce.modules import with_fields
 from jounce.shapes import ArrayLike, Numbers
 from jounce.trajectory import HermiteMotion
-from jounce.trajectory.shown_units import derivatives_of, time_axes
+from jounce.units.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray

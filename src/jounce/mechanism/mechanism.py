@@ -15,10 +15,10 @@ from jounce.mechanism.redundant_reactions import RedundantReactions, check_redun
 from jounce.mechanism.resolve import parameter_value
 from jounce.rigid.inertia import Inertia
 from jounce.trajectory import Expression
-from jounce.trajectory.dimensions import Dimension, check_one_of
-from jounce.trajectory.expression import check_parameter_name
-from jounce.trajectory.shown_units import ShownUnits
-from jounce.trajectory.units import parse_value
+from jounce.units.dimensions import Dimension, check_one_of
+from jounce.units.expression import check_parameter_name
+from jounce.units.shown_units import ShownUnits
+from jounce.units.values import parse_value
 
 GROUND = "ground"
 CLASSES = {"outputs": AbstractQuantity, "forces": AbstractForce}  # constraints otherwise

@@ -13,7 +13,7 @@ from jax.core import Tracer, eval_context
 from jounce.errors import UnsupportedError
 from jounce.interrupts import left_behind
 from jounce.trajectory import Expression
-from jounce.trajectory.dimensions import Dimension
+from jounce.units.dimensions import Dimension
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -13,7 +13,7 @@ from jounce.kinematics import OscillatingFollower, PlateCam
 from jounce.kinematics.cams.plate_cam import SENSES
 from jounce.plot.labels import axis_range
 from jounce.plot.style import BLUE, GREY, ORANGE, PALE_GREY, VERMILION, blank_figure, set_ticks, shown_name, style
-from jounce.trajectory.shown_units import ShownUnits
+from jounce.units.shown_units import ShownUnits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from jounce.mechanism.outputs import AbstractQuantity
 from jounce.reporting.peaks import rate_name
-from jounce.trajectory.shown_units import derivative_unit
+from jounce.units.shown_units import derivative_unit
 
 __all__ = ["axis_range", "quantity_word", "rounded_down", "scale_of", "symbol", "unit_label"]
 

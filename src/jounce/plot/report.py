@@ -29,7 +29,7 @@ from jounce.plot.style import BODY_COLOURS
 from jounce.reporting.motion_facts import motion_facts
 from jounce.reporting.peaks import Peak, derivative_name, peaks, shown_peaks
 from jounce.reporting.summaries import motion_summary
-from jounce.trajectory.shown_units import ShownUnits, derivative_unit
+from jounce.units.shown_units import ShownUnits, derivative_unit
 
 __all__ = ["check_report", "report"]
 
@@ -112,7 +112,7 @@ def _part(name: str) -> str:
 
 def _data(motion: Motion, view: View, source: str) -> dict[str, Any]:
     """Return all that the page shows."""
-    from jounce import __version__
+    from jounce.version import __version__
 
     mechanism = motion.mechanism
     rising = np.argsort(motion.time, kind="stable")

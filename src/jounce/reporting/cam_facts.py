@@ -8,7 +8,7 @@ from typing_extensions import TypedDict
 
 from jounce.kinematics import Extreme, PlateCam
 from jounce.reporting.law_facts import JumpFacts, jump_facts, law_words
-from jounce.trajectory.shown_units import ShownUnits
+from jounce.units.shown_units import ShownUnits
 
 ROUNDING = 1e-12  # rad
 

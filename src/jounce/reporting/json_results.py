@@ -51,7 +51,7 @@ def plain(value: Any) -> Any:
 
 def result_json(command: str, data: Mapping[str, Any]) -> str:
     """Return the JSON text of the result of a command."""
-    from jounce import __version__
+    from jounce.version import __version__
 
     whole = {"jounce": __version__, "record": VERSION, "command": command, **plain(data)}
     return json.dumps(whole, indent=1, allow_nan=False)

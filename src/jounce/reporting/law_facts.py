@@ -23,7 +23,7 @@ from jounce.trajectory import (
     SplineMotion,
     continuity,
 )
-from jounce.trajectory.shown_units import derivative_unit
+from jounce.units.shown_units import derivative_unit
 
 TURN = 2 * math.pi
 WHOLE = 1e-6  # of turns

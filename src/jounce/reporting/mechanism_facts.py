@@ -14,7 +14,7 @@ from jounce.constraints.base import by_ratio_alone, value_fields
 from jounce.dynamics.outputs import ratio_words
 from jounce.errors import JounceError
 from jounce.io.files.source import read_source
-from jounce.io.mechanisms.keys import OUTPUTS, output_holder
+from jounce.io.mechanisms.output_types import OUTPUTS, output_holder
 from jounce.kinematics.curves.choice import chosen
 from jounce.mechanism import Mechanism, Model, build, time_grid, with_outputs_held
 from jounce.mechanism.masses import body_mass
@@ -25,8 +25,8 @@ from jounce.reporting.freedom_facts import AssemblyFacts, FreedomFacts, Mobility
 from jounce.reporting.law_facts import LawFacts, law_facts
 from jounce.reporting.range_facts import RangeFacts
 from jounce.trajectory import OutputMotion, SegmentedMotion
-from jounce.trajectory.dimensions import Dimension
-from jounce.trajectory.units import parse_value
+from jounce.units.dimensions import Dimension
+from jounce.units.values import parse_value
 
 KINDS = ("joints", "drivers", "forces", "initial")
 BASES = {"mass": "kg", "length": "m", "angle": "rad", "time": "s", "ampere": "A", "kelvin": "K"}

@@ -17,7 +17,7 @@ from jounce.mechanism import AbstractQuantity
 from jounce.mechanism.law_breaks import breaks_of_laws
 from jounce.reporting.maxima import Curves, Highest, Peaks, Times
 from jounce.trajectory.breaks import both_sides
-from jounce.trajectory.shown_units import ShownUnits, derivative_unit
+from jounce.units.shown_units import ShownUnits, derivative_unit
 
 if TYPE_CHECKING:
     import xarray
@@ -200,7 +200,7 @@ def shown_peaks(found: Sequence[Peak], units: ShownUnits) -> list[Peak]:
     Examples
     --------
     >>> import jounce as jn
-    >>> units = jn.trajectory.shown_units.ShownUnits({"length": "mm"})
+    >>> units = jn.units.shown_units.ShownUnits({"length": "mm"})
     >>> shown_peaks([Peak("C_x", "velocity", "m/s", -0.5, 0.0, 2.0, 1.0, 2.0)], units)[0].minimum
     -500.0
     """

@@ -15,10 +15,10 @@ from jounce.jet.compose import OfSample
 from jounce.modules import Module
 from jounce.robot.arguments import floats
 from jounce.shapes import ArrayLike, Numbers
-from jounce.trajectory.expression import Expression
 from jounce.trajectory.joint_trajectory import JointTrajectory
 from jounce.trajectory.motion import AbstractMotion
 from jounce.trajectory.user_laws import read_laws
+from jounce.units.expression import Expression
 
 RATE = "_d1"  # as columns of files name rates
 

@@ -103,7 +103,7 @@ def versions() -> dict[str, str]:
     >>> sorted(versions())
     ['jax', 'jaxlib', 'jounce', 'numpy']
     """
-    from jounce import __version__
+    from jounce.version import __version__
 
     return {"jounce": __version__} | {name: importlib.metadata.version(name) for name in LIBRARIES}
 

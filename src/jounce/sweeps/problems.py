@@ -37,7 +37,7 @@ from jounce.robot.robot import Robot
 from jounce.shapes import seconds
 from jounce.trajectory.breaks import both_sides, law_breaks
 from jounce.trajectory.joint_trajectory import JointTrajectory
-from jounce.trajectory.units import parse_value
+from jounce.units.values import parse_value
 
 Designs = Mapping[str, Float[np.ndarray, " design"]]
 

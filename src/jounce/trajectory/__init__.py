@@ -6,7 +6,6 @@ from jounce.trajectory.composed import (
     OutputMotion as OutputMotion,
     PiecewiseMotion as PiecewiseMotion,
 )
-from jounce.trajectory.expression import Expression as Expression
 from jounce.trajectory.hermite import HermiteMotion as HermiteMotion
 from jounce.trajectory.joint_trajectory import JointTrajectory as JointTrajectory
 from jounce.trajectory.measured import MeasuredMotion as MeasuredMotion
@@ -31,5 +30,6 @@ from jounce.trajectory.smoothness import (
     continuity as continuity,
 )
 from jounce.trajectory.trapezoid import TrapezoidalMotion as TrapezoidalMotion
+from jounce.units.expression import Expression as Expression
 
 _compute_under_own_settings(__name__)

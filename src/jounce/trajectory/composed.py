@@ -12,9 +12,9 @@ from jaxtyping import Float
 from jounce.errors import MechanismError, TrajectoryError
 from jounce.jet import Jet
 from jounce.trajectory.checks import finite
-from jounce.trajectory.expression import Expression
 from jounce.trajectory.knots import SMOOTH, derivative_sizes
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, Untraced
+from jounce.units.expression import Expression
 
 Law = AbstractMotion | Expression | str
 """A law, or an expression of ``t`` and of parameters."""

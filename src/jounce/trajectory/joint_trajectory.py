@@ -14,13 +14,13 @@ from jounce.errors import JounceError, MechanismError, SampleWarning, Trajectory
 from jounce.jet import Jet
 from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.checks import check_samples, finite, finite_numbers, finite_row, positive, whole_number
-from jounce.trajectory.expression import Expression
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 from jounce.trajectory.profiles import motion_profile
 from jounce.trajectory.sample_errors import TOLERANCE, unsupported_derivative, unsupported_words
 from jounce.trajectory.splines import HIGHEST_DEGREE
 from jounce.trajectory.stacking import evaluate_laws, law_derivatives
 from jounce.trajectory.trapezoid import LIMITS
+from jounce.units.expression import Expression
 
 MAX_ORDER = 30
 

@@ -15,10 +15,10 @@ from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet
 from jounce.shapes import ArrayLike
 from jounce.trajectory.checks import whole_number
-from jounce.trajectory.expression import Expression
 from jounce.trajectory.motion import SplineMotion, Untraced
 from jounce.trajectory.sample_errors import derivative_errors
 from jounce.trajectory.splines import integrated, spline_through
+from jounce.units.expression import Expression
 
 HIGHEST = 4  # derivative that can be measured: jounce
 BEYOND = ("refuse", "hold", "continue")

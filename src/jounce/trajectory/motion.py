@@ -15,9 +15,9 @@ from jounce.jet import Jet, compose
 from jounce.jet.pieces import last_begun
 from jounce.modules import Module, Untraced
 from jounce.shapes import ArrayLike, Numbers, Real, is_traced
-from jounce.trajectory.expression import Expression
 from jounce.trajectory.sample_errors import derivative_errors
 from jounce.trajectory.splines import spline_through
+from jounce.units.expression import Expression
 
 
 class AbstractMotion(Module):

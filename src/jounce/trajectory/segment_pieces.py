@@ -15,9 +15,9 @@ from jax.core import Tracer
 
 from jounce.errors import TrajectoryError
 from jounce.trajectory.checks import finite, positive
-from jounce.trajectory.expression import Expression
 from jounce.trajectory.profiles import RESTS, rest_to_rest_powers
 from jounce.trajectory.trapezoid import LIMITS, TrapezoidalMotion
+from jounce.units.expression import Expression
 
 Value = Any
 """A number, an expression of parameters, or what JAX traces."""

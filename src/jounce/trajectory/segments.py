@@ -11,7 +11,6 @@ from jaxtyping import Float
 from jounce.errors import TrajectoryError, check_choice, check_name
 from jounce.jet import Jet, sin
 from jounce.shapes import Numbers, is_traced
-from jounce.trajectory.expression import Expression
 from jounce.trajectory.knots import knot_jumps
 from jounce.trajectory.motion import SplineMotion, Untraced
 from jounce.trajectory.segment_pieces import (
@@ -24,6 +23,7 @@ from jounce.trajectory.segment_pieces import (
     parsed_value,
 )
 from jounce.trajectory.trapezoid import LIMITS
+from jounce.units.expression import Expression
 
 BEYOND = ("hold", "repeat", "advance")
 CLOSED = 1e-9  # of the range of a law: so near to where it began it ends there

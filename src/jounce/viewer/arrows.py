@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from jounce.plot.labels import rounded_down
-from jounce.trajectory.shown_units import derivative_unit
+from jounce.units.shown_units import derivative_unit
 from jounce.viewer.appearance import BodyPoint, Colour
 from jounce.viewer.recording import Load, Recording, Vectors
 

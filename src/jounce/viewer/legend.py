@@ -9,7 +9,7 @@ import numpy as np
 
 from jounce.plot.labels import rounded_down
 from jounce.reporting.peaks import derivative_name
-from jounce.trajectory.shown_units import derivative_unit
+from jounce.units.shown_units import derivative_unit
 from jounce.viewer.appearance import Colour
 from jounce.viewer.arrows import LOAD_COLOURS, LOAD_WORDS, derivative_colour, path_colours, scale_words
 from jounce.viewer.overlay import Overlay

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from jounce.plot.labels import axis_range, scale_of
 from jounce.plot.style import COLOURS
-from jounce.trajectory.shown_units import derivative_unit
+from jounce.units.shown_units import derivative_unit
 from jounce.viewer.legend import legend
 from jounce.viewer.page import Observer, Page
 from jounce.viewer.recording import Recording

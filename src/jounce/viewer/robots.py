@@ -19,7 +19,7 @@ from jounce.robot import forward_kinematics, inverse_dynamics, joint_wrenches
 from jounce.robot.model import Joint
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
-from jounce.trajectory.shown_units import time_axes
+from jounce.units.shown_units import time_axes
 from jounce.viewer.appearance import Appearance, Place
 from jounce.viewer.recording import Load, Parameter, Quantity, Recording, rotated
 

@@ -15,7 +15,7 @@ from jounce.kinematics import Motion, solve
 from jounce.reporting.peaks import derivative_name, peaks, scalar_outputs
 from jounce.settings import under_own_settings
 from jounce.trajectory import Expression
-from jounce.trajectory.dimensions import ANGLE, LENGTH
+from jounce.units.dimensions import ANGLE, LENGTH
 from jounce.viewer.mechanisms import MechanismSubject
 from jounce.viewer.page import Observer, Page
 from jounce.viewer.recording import Recording

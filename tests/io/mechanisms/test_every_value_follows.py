@@ -12,7 +12,8 @@ from jounce.constraints import catalogue
 from jounce.integrate.batch_equations import ParametricMechanism
 from jounce.io import json_schema
 from jounce.io.mechanisms.inertia_forms import _solid_keys
-from jounce.io.mechanisms.keys import file_keys, output_holder, output_types
+from jounce.io.mechanisms.keys import file_keys
+from jounce.io.mechanisms.output_types import output_holder, output_types
 from jounce.io.mechanisms.overrides import override
 from jounce.mechanism import build, time_grid
 from jounce.mechanism.builder import starting_guess

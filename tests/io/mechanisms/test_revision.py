@@ -9,7 +9,7 @@ import pytest
 import jounce as jn
 from jounce.errors import OutputError
 from jounce.io.mechanisms.revision import with_value, write_revised
-from jounce.trajectory.units import parse_value
+from jounce.units.values import parse_value
 
 FOUR_BAR = pathlib.Path("examples/four_bar.yaml")
 

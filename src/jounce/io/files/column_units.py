@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from jounce.settings import under_own_settings
-from jounce.trajectory.shown_units import ShownUnits, unit_size
+from jounce.units.shown_units import ShownUnits, unit_size
 
 if TYPE_CHECKING:
     import xarray

@@ -9,8 +9,8 @@ from typing import Any
 
 from jounce.errors import UNSET, ExpressionError, JounceError, MechanismFileError, unknown
 from jounce.io.files.reading import named_file
-from jounce.trajectory.dimensions import Dimension
-from jounce.trajectory.units import Value, parse_value
+from jounce.units.dimensions import Dimension
+from jounce.units.values import Value, parse_value
 
 MAX_VALUES, MAX_KEYS = 200_000, 20_000  # of a file, and of one mapping in it
 MAX_DEPTH = 50

@@ -13,8 +13,8 @@ from jaxtyping import Float
 from jounce.errors import JounceError, MechanismFileError, UnitError, did_you_mean, no_such
 from jounce.io.files.column_units import name_and_unit
 from jounce.io.files.reading import fault_of_number, known_name, read_rows
-from jounce.trajectory.dimensions import NUMBER, TIME, Dimension, describe_dimension, dimension_of
-from jounce.trajectory.shown_units import unit_size
+from jounce.units.dimensions import NUMBER, TIME, Dimension, describe_dimension, dimension_of
+from jounce.units.shown_units import unit_size
 
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
 """What other programs put between entries, and its name."""

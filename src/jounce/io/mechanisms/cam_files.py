@@ -21,8 +21,8 @@ from jounce.kinematics.cams.plate_cam import SENSES
 from jounce.mechanism.resolve import resolve_motion
 from jounce.settings import under_own_settings
 from jounce.trajectory import AbstractMotion, Expression, SplineMotion
-from jounce.trajectory.dimensions import Dimension
-from jounce.trajectory.expression import check_parameter_name
+from jounce.units.dimensions import Dimension
+from jounce.units.expression import check_parameter_name
 
 KEYS = ("title", "parameters", "units", "cam", "follower", "law")
 CAM_KEYS = ("base_radius", "sense", "count")

@@ -20,7 +20,7 @@ from jounce.mechanism import Mechanism, TimeGrid
 from jounce.mechanism.mechanism import GROUND, names_column
 from jounce.robot import Robot
 from jounce.robot.closed_loop import DRIVE
-from jounce.trajectory.units import parse_value
+from jounce.units.values import parse_value
 
 
 def converted(

@@ -14,7 +14,7 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.robot.model import Limits
 from jounce.settings import under_own_settings
-from jounce.trajectory.dimensions import describe_dimension, dimension_of
+from jounce.units.dimensions import describe_dimension, dimension_of
 
 RATES = {"velocity": 1, "acceleration": 2, "jerk": 3}
 EFFORTS = {"effort": 2, "effort_rate": 3}

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from jounce import importing
 from jounce.constraints import catalogue
 from jounce.errors import JounceError, MechanismFileError, unknown
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.file_laws import FileLaws
-from jounce.io.mechanisms.keys import ROLES, FileKey, file_keys, location_of, output_types
+from jounce.io.mechanisms.keys import ROLES, FileKey, file_keys, location_of
 from jounce.io.mechanisms.unit_hints import warn_of_units
 from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid, with_outputs_held
 from jounce.mechanism.builder import starting_guess
@@ -24,7 +25,7 @@ from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.settings import under_own_settings
 from jounce.trajectory import Expression
-from jounce.trajectory.units import parse_value
+from jounce.units.values import parse_value
 
 _Places = dict[str, tuple[Location, tuple[FileKey, ...]]]
 """Where in the file the elements of a mechanism stand, by dotted name, and the keys of each."""
@@ -96,10 +97,11 @@ def _space(source: Source) -> str:
 
 def _validate(source: Source, space: str) -> dict[str, Any]:
     """Check a file against the schema; return its values by key, with numbers and expressions in place of text."""
-    from pydantic import ValidationError
+    with importing.lock:  # all kinds of outputs are known to the schema, and so the rooms that compute them
+        from pydantic import ValidationError
 
-    from jounce.io.mechanisms.schema import file_model
-    from jounce.io.mechanisms.schema_errors import first_problem
+        from jounce.io.mechanisms.schema import file_model
+        from jounce.io.mechanisms.schema_errors import first_problem
 
     parameters = source.data.get("parameters")
     names = dict.fromkeys(parameters if isinstance(parameters, dict) else ())  # found at once, however many
@@ -214,6 +216,8 @@ def _arguments(keys: tuple[FileKey, ...], given: dict[str, Any]) -> dict[str, An
 
 def _elements(laws: FileLaws, space: str, section: str, models: dict[str, Any], places: _Places) -> dict[str, Any]:
     """Build joints, drivers, forces or outputs, and note where their fields stand in the file."""
+    from jounce.io.mechanisms.output_types import output_types  # as the schema, which was imported before
+
     outputs = {f"{space}_{tag.replace(' ', '_')}": kind for tag, (_, kind) in output_types(space).items()}
     found = {}
     for name, model in models.items():

@@ -32,9 +32,9 @@ from jounce.io.mechanisms.values import (
     problem,
     scalar_schema,
 )
-from jounce.trajectory.dimensions import TIME, Dimension
 from jounce.trajectory.measured import HIGHEST as MOST
 from jounce.trajectory.splines import HIGHEST_DEGREE
+from jounce.units.dimensions import TIME, Dimension
 
 WAYS = ("refuse", "hold", "repeat")
 

@@ -16,7 +16,7 @@ from jounce.io.files.source import read_source
 from jounce.io.files.writing import check_target, replacing
 from jounce.io.mechanisms.loader import load
 from jounce.mechanism import Mechanism
-from jounce.trajectory.units import parse_unit, parse_value
+from jounce.units.values import parse_unit, parse_value
 
 ROUNDING = 4e-16  # of values in units whose size is no decimal number, relative
 _NUMBER_AND_UNIT = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)(\s*)([^\s0-9.*/+-].*?|/.*?)\s*")

@@ -17,8 +17,9 @@ from jounce.constraints import catalogue
 from jounce.constraints.planar import COORDINATES
 from jounce.errors import JounceError, MechanismFileError, no_such
 from jounce.io.mechanisms.inertia_forms import inertia
-from jounce.io.mechanisms.keys import HOLDERS, FileKey, file_keys, output_holder, output_tag, output_types
+from jounce.io.mechanisms.keys import FileKey, file_keys
 from jounce.io.mechanisms.motion_values import laws, motion
+from jounce.io.mechanisms.output_types import HOLDERS, output_holder, output_tag, output_types
 from jounce.io.mechanisms.values import (
     Checked,
     orientation,
@@ -33,8 +34,8 @@ from jounce.mechanism.mechanism import NEAREST, SIDES, check_body_name, check_ou
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.orientation import FRAMES
 from jounce.rigid.rotations import SEQUENCES
-from jounce.trajectory.dimensions import variables_of
-from jounce.trajectory.expression import PARAMETER_NAME, check_parameter_name
+from jounce.units.dimensions import variables_of
+from jounce.units.expression import PARAMETER_NAME, check_parameter_name
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,99}")
 _CHOICES = {"coordinate": COORDINATES, "frame": FRAMES, "sequence": SEQUENCES}

@@ -7,7 +7,8 @@ from typing import Any
 from jounce.constraints import catalogue
 from jounce.errors import JounceError, did_you_mean, no_such, show_value
 from jounce.io.files.located_data import Location, Source
-from jounce.io.mechanisms.keys import ROLES, file_keys, output_holder, output_types
+from jounce.io.mechanisms.keys import ROLES, file_keys
+from jounce.io.mechanisms.output_types import output_holder, output_types
 from jounce.io.mechanisms.schema import file_model, output_form
 
 _HINTS = {

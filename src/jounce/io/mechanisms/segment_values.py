@@ -8,9 +8,9 @@ from typing import Any
 from jounce.errors import UNSET, TrajectoryError, show_value, unknown
 from jounce.io.mechanisms.values import ANY_VALUE, defined, list_schema, object_schema, parse, problem, scalar_schema
 from jounce.trajectory import AbstractMotion, Expression, FollowingMotion, PiecewiseMotion, Segment, SegmentedMotion
-from jounce.trajectory.dimensions import Dimension, is_rate, per_power
 from jounce.trajectory.segment_pieces import SEGMENT_PROFILES
 from jounce.trajectory.segments import BEYOND, MOST_CONDITIONS
+from jounce.units.dimensions import Dimension, is_rate, per_power
 
 PROFILE_KEYS = ("profile", "initial", "start", "beyond", "of")
 SEGMENT_KEYS = tuple(field.name for field in dataclasses.fields(Segment))

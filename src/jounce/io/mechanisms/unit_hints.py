@@ -20,9 +20,9 @@ from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.resolve import resolve, resolve_motion
 from jounce.mechanism.time import instants_of
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FollowingMotion, SplineMotion
-from jounce.trajectory.dimensions import ANGLE, LENGTH, Dimension
 from jounce.trajectory.unit_doubts import TURN, degrees_meant, looks_like_degrees, values_of
-from jounce.trajectory.units import parse_value
+from jounce.units.dimensions import ANGLE, LENGTH, Dimension
+from jounce.units.values import parse_value
 
 FAR_OFF = 100.0  # times the other lengths
 ALIKE = 30.0  # within which a thousandth of a length must be to them

@@ -15,9 +15,9 @@ from jounce.errors import UNSET, JounceError, MechanismError
 from jounce.io.files.located_data import shows_value
 from jounce.mechanism.redundant_reactions import CHOICES, STIFFNESSES
 from jounce.rigid.euler_parameters import form_of
-from jounce.trajectory.dimensions import KINDS, Dimension
-from jounce.trajectory.expression import Expression
-from jounce.trajectory.units import Value, parse_value
+from jounce.units.dimensions import KINDS, Dimension
+from jounce.units.expression import Expression
+from jounce.units.values import Value, parse_value
 
 
 def problem(message: str, *at: str | int, value: object = ...) -> PydanticCustomError:

@@ -25,7 +25,7 @@ from jounce.trajectory import (
     SplineMotion,
     TrapezoidalMotion,
 )
-from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
+from jounce.units.expression import CONSTANTS, FUNCTIONS
 
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 

@@ -16,7 +16,7 @@ from jounce.mechanism.driver_outputs import is_turning
 from jounce.planning.elastic.drives import Drive
 from jounce.robot.robot import Robot
 from jounce.settings import under_own_settings
-from jounce.trajectory.dimensions import Dimension, describe_dimension, dimension_of
+from jounce.units.dimensions import Dimension, describe_dimension, dimension_of
 
 KEYS = tuple(field.name for field in dataclasses.fields(Drive))
 UNITS = {

@@ -20,7 +20,7 @@ from jounce.robot.model import Joint, Limits
 from jounce.robot.robot import Robot
 from jounce.settings import under_own_settings
 from jounce.trajectory import Expression
-from jounce.trajectory.dimensions import Dimension, describe_dimension
+from jounce.units.dimensions import Dimension, describe_dimension
 
 FIELDS = tuple(field.name for field in dataclasses.fields(Limits))
 KEYS = (*FIELDS, "jounce")

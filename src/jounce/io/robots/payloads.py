@@ -8,7 +8,7 @@ from jounce.errors import JounceError, RobotError
 from jounce.io.files.assignments import assignments
 from jounce.rigid.inertia import Inertia
 from jounce.robot.robot import Robot
-from jounce.trajectory.units import parse_value
+from jounce.units.values import parse_value
 
 
 def with_payloads(robot: Robot, texts: Iterable[str]) -> Robot:

@@ -28,9 +28,9 @@ from jounce.trajectory import (
     MeasuredMotion,
     SplineMotion,
 )  # fmt: skip
-from jounce.trajectory.dimensions import TIME, Dimension, describe_dimension, is_rate, per_power
-from jounce.trajectory.expression import check_parameter_name
 from jounce.trajectory.trapezoid import LIMITS
+from jounce.units.dimensions import TIME, Dimension, describe_dimension, is_rate, per_power
+from jounce.units.expression import check_parameter_name
 
 _DERIVATIVE = re.compile(r"_d[0-9]+$")
 _KINDS = ("joints", "point_to_point", "motion")

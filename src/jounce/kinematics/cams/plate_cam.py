@@ -29,7 +29,7 @@ from jounce.trajectory import (
     continuity,
 )
 from jounce.trajectory.checks import positive
-from jounce.trajectory.shown_units import ShownUnits
+from jounce.units.shown_units import ShownUnits
 
 if TYPE_CHECKING:
     import xarray

@@ -16,7 +16,7 @@ from jounce.planning.elastic.pieces import resolved
 from jounce.planning.elastic.spring_deflection import SpringDeflection
 from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.motion import AbstractMotion
-from jounce.trajectory.shown_units import derivatives_of, time_axes
+from jounce.units.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray

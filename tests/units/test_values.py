@@ -12,8 +12,9 @@ import pytest
 import jounce as jn
 from jounce.errors import ExpressionError, JounceError, UnitError
 from jounce.trajectory import Expression
-from jounce.trajectory.dimensions import KINDS, check_dimension, describe_dimension
-from jounce.trajectory.units import COMMON, parse_unit, parse_value
+from jounce.units.dimensions import KINDS, check_dimension, describe_dimension
+from jounce.units.table import COMMON
+from jounce.units.values import parse_unit, parse_value
 
 REGISTRY = pint.UnitRegistry()
 LENGTH, ANGLE, TIME = (((name, 1),) for name in ("length", "angle", "time"))
@@ -142,7 +143,7 @@ def test_every_kind_is_worded():
 
 
 def test_usual_units_do_not_import_pint():
-    code = "import sys, jounce.trajectory.units as u; u.parse_value('3 cm'); assert 'pint' not in sys.modules"
+    code = "import sys, jounce.units.values as u; u.parse_value('3 cm'); assert 'pint' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
 
 

@@ -15,7 +15,7 @@ import pytest
 from jounce.errors import ExpressionError
 from jounce.jet import Jet
 from jounce.trajectory import Expression
-from jounce.trajectory.expression import CONSTANTS, FUNCTIONS
+from jounce.units.expression import CONSTANTS, FUNCTIONS
 
 NAMES = {"a": 0.7, "b": -1.3, "tau": 2.0}
 PYTHON = {name: function for name, (_, function) in FUNCTIONS.items()} | CONSTANTS | NAMES

@@ -12,7 +12,7 @@ from fractions import Fraction
 from typing import Any
 
 from jounce.errors import UnitError
-from jounce.trajectory.expression import CONSTANTS, Expression
+from jounce.units.expression import CONSTANTS, Expression
 
 Dimension = tuple[tuple[str, int | Fraction], ...]
 """Powers of the base quantities, sorted by name; empty for a pure number."""
@@ -192,7 +192,7 @@ def inferred(
 
     Examples
     --------
-    >>> from jounce.trajectory.dimensions import LENGTH, TIME, inferred
+    >>> from jounce.units.dimensions import LENGTH, TIME, inferred
     >>> inferred(Expression("pi*r/T"), {"r": LENGTH, "T": TIME})
     (('length', 1), ('time', -1))
     >>> inferred(Expression("r + T"), {"r": LENGTH, "T": TIME})

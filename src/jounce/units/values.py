@@ -6,7 +6,6 @@ then.
 
 from __future__ import annotations
 
-import importlib
 import math
 import re
 from collections import ChainMap
@@ -15,62 +14,11 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation, Overflow, localcontext
 from functools import lru_cache
 
-from jounce.errors import ExpressionError, UnitError, did_you_mean, show_value
-from jounce.jet.turns import WHOLE_TURN
-from jounce.trajectory.dimensions import (
-    ANGLE,
-    FORCE,
-    LENGTH,
-    MASS,
-    NUMBER,
-    TIME,
-    TORQUE,
-    Dimension,
-    check_dimension,
-    dimension_of,
-    inferred,
-    times,
-)
-from jounce.trajectory.expression import CONSTANTS, FUNCTIONS, MAX_CHARACTERS, Expression
-
-Size = Decimal | float
-
-
-def _sizes(dimension: Dimension, text: str) -> dict[str, tuple[Size, Dimension]]:
-    pairs = (pair.split("=") for pair in text.split())
-    return {name: (Decimal(size), dimension) for name, size in pairs}
-
-
-COMMON: dict[str, tuple[Size, Dimension]] = {
-    **_sizes(LENGTH, "m=1 dm=0.1 cm=0.01 mm=0.001 um=1e-6 km=1e3 in=0.0254 inch=0.0254 ft=0.3048"),
-    **_sizes(LENGTH, "mil=2.54e-5 thou=2.54e-5"),
-    **dict.fromkeys(("deg", "degree", "degrees", "\N{DEGREE SIGN}"), (CONSTANTS["deg"], ANGLE)),
-    **dict.fromkeys(("rev", "turn", "turns", "U", "r", "tr"), (WHOLE_TURN, ANGLE)),
-    **_sizes(ANGLE, "rad=1 mrad=0.001"),
-    **dict.fromkeys(("rpm", "RPM"), (WHOLE_TURN / 60, dimension_of(angle=1, time=-1))),
-    **_sizes(TIME, "s=1 sec=1 ms=1e-3 us=1e-6 min=60 h=3600"),
-    **_sizes(dimension_of(time=-1), "Hz=1 kHz=1000"),
-    **_sizes(MASS, "kg=1 g=0.001 mg=1e-6 t=1000"),
-    **_sizes(FORCE, "N=1 mN=0.001 kN=1000 MN=1e6 kgf=9.80665 kp=9.80665"),
-    **_sizes(TORQUE, "J=1 kJ=1000"),
-    **_sizes(times(TORQUE, TIME, -1), "W=1 kW=1000 PS=735.49875 CV=735.49875"),
-    **_sizes(dimension_of(mass=1, length=-1, time=-2), "Pa=1 kPa=1e3 MPa=1e6 GPa=1e9 bar=1e5"),
-}
-"""Size in SI units and dimension. Decimal sizes make ``13.21 cm`` the double nearest to 0.1321."""
-
-_LENGTHS = ("mm", "cm", "dm", "m")
-COMPACT: dict[str, tuple[str, ...]] = {
-    **{f"{force}{arm}": (force, arm) for force in ("N", "mN", "kN", "MN") for arm in _LENGTHS},
-    **{f"{prefix}Nm": (f"{prefix}N", "m") for prefix in "ucd"},
-    **{f"{mass}{arm}": (mass, arm) for mass in ("kg", "g") for arm in _LENGTHS},
-    **{f"{force}ms": (force, "m", "s") for force in ("N", "mN", "kN")},
-    **{f"{force}s": (force, "s") for force in ("N", "kN")},
-    **{f"{power}{time}": (power, time) for power in ("W", "kW") for time in "sh"},
-    **dict.fromkeys(("lbft", "ftlb", "lbfft", "ftlbf"), ("lbf", "ft")),
-    **dict.fromkeys(("lbin", "inlb", "lbfin", "inlbf"), ("lbf", "in")),
-    "ozin": ("ozf", "in"),
-}
-"""Products that are written without a sign between; a power belongs to the last factor, as in ``kgm^2``."""
+from jounce.errors import ExpressionError, UnitError, show_value
+from jounce.units.dimensions import ANGLE, NUMBER, Dimension, check_dimension, inferred, times
+from jounce.units.expression import FUNCTIONS, MAX_CHARACTERS, Expression
+from jounce.units.pint_units import ask_pint
+from jounce.units.table import COMMON, COMPACT, Size, nearest_unit
 
 _DIGITS = str.maketrans("\N{SUPERSCRIPT ONE}\N{SUPERSCRIPT TWO}\N{SUPERSCRIPT THREE}\N{SUPERSCRIPT FOUR}", "1234")
 _NUMBER_PATTERN = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
@@ -158,21 +106,11 @@ def _product(size: Size, factor: Size, power: int) -> Size:
 
 
 def _looked_up(name: str) -> tuple[Size, Dimension]:
-    """Return what a library of units knows; the room that asks it is above this one, so is imported by its name."""
-    if found := importlib.import_module("jounce.io.files.units").ask_pint(name):
+    """Return what the library of units knows."""
+    if found := ask_pint(name):
         return found
-    raise UnitError(f"unknown unit '{_ascii(name)}'; {nearest_unit(name)}".rstrip("; "))
-
-
-def nearest_unit(name: str) -> str:
-    """Suggest the unit of the table that is meant: the one that differs in capitals only, or else the nearest."""
-    names = [*COMMON, *COMPACT]
-    same = [known for known in names if known.lower() == name.lower() and known != name]
-    return f"did you mean '{same[0]}'?" if same else did_you_mean(name, names, limit=0)
-
-
-def _ascii(text: str) -> str:
-    return text.encode("ascii", "backslashreplace").decode("ascii")
+    shown = name.encode("ascii", "backslashreplace").decode("ascii")
+    raise UnitError(f"unknown unit '{shown}'; {nearest_unit(name)}".rstrip("; "))
 
 
 def parse_value(

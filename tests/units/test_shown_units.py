@@ -5,7 +5,7 @@ import math
 import pytest
 
 import jounce as jn
-from jounce.trajectory.shown_units import ShownUnits, derivative_unit, units_given
+from jounce.units.shown_units import ShownUnits, derivative_unit, units_given
 
 OUTPUTS = {"psi": "rad", "C": "m", "spin": "rad/s", "T": "N*m", "e": "1", "length": "rad"}
 

@@ -7,8 +7,8 @@ from functools import lru_cache
 from typing import Any
 
 from jounce.errors import UnitError
-from jounce.trajectory.dimensions import NUMBER, Dimension, dimension_of
-from jounce.trajectory.units import nearest_unit
+from jounce.units.dimensions import NUMBER, Dimension, dimension_of
+from jounce.units.table import nearest_unit
 
 _BASES = {"meter": "length", "radian": "angle", "second": "time", "kilogram": "mass"}
 

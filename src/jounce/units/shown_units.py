@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError, UnitError, no_such
 from jounce.shapes import Numbers
-from jounce.trajectory.dimensions import (
+from jounce.units.dimensions import (
     ANGLE,
     FORCE,
     LENGTH,
@@ -28,7 +28,7 @@ from jounce.trajectory.dimensions import (
     dimension_of,
     times,
 )
-from jounce.trajectory.units import parse_unit, parse_value
+from jounce.units.values import parse_unit, parse_value
 
 QUANTITIES: dict[str, tuple[str, Dimension]] = {
     "angle": ("rad", ANGLE),
