@@ -11,10 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.kinematics.advance import Arrival, Lanes, Pieces, SolvedState, solved_batch
+from jounce.kinematics.advance import Arrival, Lanes, SolvedState, solved_batch
 from jounce.kinematics.compilation import compiled
 from jounce.kinematics.device import on_processor
-from jounce.kinematics.kernels import LIBRARIES
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
@@ -24,7 +23,6 @@ CACHED_ENTRIES = 2**16  # of the factors of a lot: half a megabyte
 MOST_LOTS = 8  # in a call,
 CALL_ENTRIES = 2**21  # of which the coordinates have no more entries than this: 16 megabytes
 GPU_WIDTH = 2**15
-PIECES = Pieces(corrections=3000, derivatives=3000)  # a fourth less time; what is larger compiles too long
 
 
 def lot_width(system: System) -> int:
@@ -44,7 +42,7 @@ def lots_in_a_call(width: int, entries: int) -> int:
     return min(MOST_LOTS, max(1, CALL_ENTRIES // (width * entries))) if on_processor() else 1
 
 
-@compiled("pose_type", "order", "width", without=LIBRARIES)
+@compiled("pose_type", "order", "width")
 def advance_in_lots(
     system: System,
     known: SolvedState,
@@ -77,7 +75,7 @@ def advance_in_lots(
 
         (coordinates, angles, sign), away, when = jax.tree.map(some, (known, step, instant))
         given = coordinates, angles, sign, away, when, *settings
-        arrival, _, _ = solved_batch(system, *given, pose_type=pose_type, order=order, pieces=PIECES)
+        arrival, _, _ = solved_batch(system, *given, pose_type=pose_type, order=order)
         return arrival._replace(turnover=np.zeros(width))
 
     def go_on(lot: Any, found: Any) -> Any:
