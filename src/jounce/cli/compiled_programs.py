@@ -97,13 +97,13 @@ def keep_programs(folder: PrivateFolder) -> bool:
     Returns whether they are in checked files.
     """
     import jax
-    from jax._src import compilation_cache
+
+    from jounce.jax_internals import use_file_cache
 
     def file_cache(path: str) -> Any:
         return JaxEntries(folder), path
 
-    if known := hasattr(compilation_cache, "get_file_cache"):
-        compilation_cache.get_file_cache = file_cache
+    known = use_file_cache(file_cache)
     jax.config.update("jax_compilation_cache_dir", str(folder.path))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.01)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)

@@ -20,11 +20,12 @@ import numpy as np
 from jax.core import Tracer
 from jax.experimental import serialize_executable
 
+from jounce.jax_internals import description_reader, runs_at_once, without_sources
 from jounce.kinematics.alone import Alone
 from jounce.kinematics.device import on_processor
 from jounce.kinematics.store import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
 from jounce.kinematics.structure import UndescribedError, program_key, settings
-from jounce.mechanism.preconditions import check_process
+from jounce.settings import check_process
 
 _thread = threading.local()
 
@@ -186,7 +187,7 @@ class Compiled:
             return code()
         static |= self._otherwise
         if traced:
-            whole = self.jitted if all(map(_runs_at_once, traced)) else self._within
+            whole = self.jitted if all(map(runs_at_once, traced)) else self._within
             return whole(*arguments, **keywords, **static)
         if (store := current_store()) is None:
             return self.jitted(*arguments, **keywords, **static)
@@ -226,28 +227,11 @@ class Compiled:
                 store.drop(key)
         with compiling_anew():
             lowered = self.jitted.lower(*arguments, **keywords, **static)
-            _forget_sources(lowered.compiler_ir())
+            without_sources(lowered.compiler_ir())
             program = lowered.compile(None if level is None else {"xla_backend_optimization_level": level})
         if (content := _packed(program, tree)) is not None:
             store.put(key, content)
         return program, program(*arguments, **keywords)
-
-
-def _forget_sources(module: Any) -> None:
-    """Take the lines of Python out of a module of MLIR: a fourth of the time in which its program is read again.
-
-    Parameters
-    ----------
-    module : jaxlib.mlir.ir.Module
-        Changed in place; left as it is by a release of JAX that has not what this needs, which is private to it.
-    """
-    try:
-        from jaxlib.mlir.passmanager import PassManager
-
-        with module.context:
-            PassManager.parse("builtin.module(strip-debuginfo)").run(module.operation)
-    except (ImportError, AttributeError, ValueError):
-        return
 
 
 def _packed(program: Any, tree: Any) -> bytes | None:
@@ -263,17 +247,11 @@ def _packed(program: Any, tree: Any) -> bytes | None:
     return content if in_tree == tree else None
 
 
-class _Description(Descriptions, serialize_executable._JaxPjrtUnpickler):
-    """Reads what JAX writes beside the code of a program, and no code."""
-
-    def persistent_load(self, pid: Any) -> Any:
-        """Return a device or a client, and nothing in the place of code."""
-        return None if pid[0] == "exec" else super().persistent_load(pid)
-
-
 def _unpacked(content: bytes, tree: Any) -> Callable[..., Any]:
     payload, out_tree = unpacked(content)
-    _Description(io.BytesIO(payload), jax.devices()[0].client).load()  # or JAX would run whatever is named there
+    description_reader(Descriptions)(
+        io.BytesIO(payload), jax.devices()[0].client
+    ).load()  # or JAX would run whatever is named there
     return serialize_executable.deserialize_and_load(payload, tree, out_tree)
 
 
@@ -286,19 +264,6 @@ def _kind(leaf: Any) -> tuple[Any, ...] | None:
     if isinstance(leaf, jax.Array) and not isinstance(leaf, Tracer) and leaf.sharding == _home():
         return leaf.shape, str(leaf.dtype), leaf.weak_type
     return None
-
-
-def _runs_at_once(leaf: Tracer) -> bool:
-    """Tell whether what JAX does with a value that it traces runs at once, as under `jax.jvp` outside of `jax.jit`.
-
-    Then a program is a whole one, which takes options. What is not known, and what is run later, is part of another.
-    """
-    trace: Any = getattr(leaf, "_trace", None)
-    kinds = []
-    while trace is not None:
-        kinds.append(type(trace).__name__)
-        trace = getattr(trace, "parent_trace", None)
-    return kinds[-1:] == ["EvalTrace"] and {"JVPTrace", "BatchTrace"}.issuperset(kinds[:-1])
 
 
 @cache

@@ -22,7 +22,8 @@ from typing import Any
 
 import jax
 import numpy as np
-from jax._src import config  # what is private to JAX has no public name; see `jounce.cli.compiled_programs`
+
+from jounce.jax_internals import is_missing, trace_settings as settings
 
 PACKAGE = Path(__file__).parents[1]
 LIBRARIES = ("equinox", "jax", "jaxlib", "numpy")  # whose releases decide what is traced and compiled
@@ -60,7 +61,7 @@ def description(value: Any) -> str:
     if dataclasses.is_dataclass(value):  # by the fields by which it is compared, as `jax.jit` compares it too
         compared = [field.name for field in dataclasses.fields(value) if field.compare]
         return f"{_own(kind)}({', '.join(f'{name}={description(getattr(value, name))}' for name in compared)})"
-    if f"{kind.__module__}.{kind.__qualname__}" == "equinox._module._flatten._Missing":
+    if is_missing(value):
         return "missing"
     raise UndescribedError(f"{kind.__module__}.{kind.__qualname__}")
 
@@ -127,11 +128,6 @@ def program_key(
         _surroundings(),
     ]
     return hashlib.sha256("\n".join(told).encode()).hexdigest()
-
-
-def settings() -> tuple[Any, ...]:
-    """Return how JAX is set up in this thread, as `jax.jit` tells its own programs apart."""
-    return config.trace_context()
 
 
 def _described_settings() -> str:

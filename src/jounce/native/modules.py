@@ -8,6 +8,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from jounce.jax_internals import is_tried
 from jounce.native import rows as rows_
 from jounce.native.arrays import constants
 from jounce.native.code import Code, flat
@@ -21,7 +22,6 @@ from jounce.native.views import Array, Stored, contiguous
 
 MOST_MEMORY = 2**20  # bytes of the stack: threads have little
 MOST_HEAP = 2**30  # bytes elsewhere
-TRIED = (0, 10), (0, 11)  # releases of JAX: another one may say otherwise what an operation is to do
 _thread = threading.local()
 ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
 attributes #2 = { nounwind willreturn memory(none) "min-legal-vector-width"="512" "prefer-vector-width"="512" }
@@ -74,7 +74,7 @@ def object_file(
     try:
         text = _text(closed, count, known, vector_width(), rows=rows, **options)
     except (AttributeError, KeyError, TypeError) as failure:  # of what JAX says of an operation, under another name
-        if jax.__version_info__[:2] in TRIED:
+        if is_tried():
             raise
         raise UnsupportedOperationError(f"JAX {jax.__version__}, which was not tried: {failure!r}") from failure
     getattr(_thread, "written", lambda: None)()

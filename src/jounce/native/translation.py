@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jax.extend.core import Literal, jaxprs_in_params
 
-from jounce.jet.programs import sizes_of_scan
+from jounce.jax_internals import sizes_of_scan
 from jounce.native.arrays import constants, each, filled
 from jounce.native.calls import call
 from jounce.native.carried import Carried

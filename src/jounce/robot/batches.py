@@ -18,8 +18,8 @@ from jounce.kinematics.compilation import Compiled
 from jounce.kinematics.device import on_processor
 from jounce.kinematics.side_by_side import SideBySide
 from jounce.kinematics.threads import Threads, thread_count
-from jounce.mechanism.preconditions import check_process
 from jounce.robot.abstract_robot import AbstractRobot
+from jounce.settings import check_process
 from jounce.shapes import is_traced
 
 CHUNK = 128  # samples that are computed side by side; a GPU computes a block at once
