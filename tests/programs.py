@@ -3,8 +3,8 @@
 import sys
 from collections.abc import Iterator
 
-from jounce.kinematics.compilation import Compiled
-from jounce.kinematics.side_by_side import SideBySide
+from jounce.execution.compilation import Compiled
+from jounce.execution.side_by_side import SideBySide
 
 SOME = {"march", "leg", "exerted", "_balanced", "advance_instant"}
 

@@ -21,8 +21,8 @@ import pytest
 import jounce as jn
 from jounce import jet
 from jounce.constraints import MotionLaw
-from jounce.kinematics import alone, side_by_side, store as programs
-from jounce.kinematics.alone import VARIABLE
+from jounce.execution import alone, side_by_side, store as programs
+from jounce.execution.alone import VARIABLE
 from tests.problems.own_types import taken_back
 
 GROUND = ("ground", "rod")

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.execution.device import on_processor
 from jounce.kinematics import wide_batches
-from jounce.kinematics.device import on_processor
 from jounce.robot import batches
 from tests.problems.mechanisms import example, reference
 

@@ -7,7 +7,7 @@ import pytest
 
 import jounce as jn
 from jounce.dynamics.inverse import MotionForces
-from jounce.native import machine, programs
+from jounce.execution.llvm import machine, programs
 
 pytestmark = pytest.mark.skipif(
     not machine.is_usable(), reason="there is no compiler, or a system where it was not tried"

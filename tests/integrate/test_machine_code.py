@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.native import machine, programs
+from jounce.execution.llvm import machine, programs
 
 pytestmark = pytest.mark.skipif(
     not machine.is_usable(), reason="there is no compiler, or a system where it was not tried"

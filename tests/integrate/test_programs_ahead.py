@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.execution.alone import Alone
+from jounce.execution.llvm import machine
+from jounce.execution.rehearsal import NAME
+from jounce.execution.side_by_side import SideBySide
 from jounce.integrate.marching import march
 from jounce.integrate.simulation import expanded
-from jounce.kinematics.alone import Alone
-from jounce.kinematics.rehearsal import NAME
-from jounce.kinematics.side_by_side import SideBySide
-from jounce.native import machine
 from tests.problems.dynamics import simple_pendulum
 
 needs_machine_code = pytest.mark.skipif(

@@ -7,8 +7,8 @@ import pytest
 
 import jounce as jn
 from jounce import drivers, forces, planar, spatial
-from jounce.kinematics.alone import is_wanted
-from jounce.kinematics.compilation import Compiled
+from jounce.execution.alone import is_wanted
+from jounce.execution.compilation import Compiled
 from tests.problems.dynamics import GRAVITY, simple_pendulum
 
 GRID = [0.0, 0.4, 1.1, 2.0]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.execution.device import on_processor
 from jounce.kinematics import Status
-from jounce.kinematics.device import on_processor
 from jounce.kinematics.wide_batches import lot_width
 from jounce.mechanism import build
 from tests.problems.small import four_bar, slider_crank

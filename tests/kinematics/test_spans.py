@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.execution.llvm.machine import is_usable
 from jounce.kinematics import Status, grid, long_grids, spans
 from jounce.kinematics.spans import rounds, spans_of
-from jounce.native.machine import is_usable
 from tests.problems.small import four_bar, slider_crank
 
 needs_machine_code = pytest.mark.skipif(

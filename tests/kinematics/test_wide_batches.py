@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 
 import jounce as jn
+from jounce.execution.device import on_processor
 from jounce.kinematics import wide_batches
-from jounce.kinematics.device import on_processor
 from jounce.kinematics.grid import _lots
 from jounce.kinematics.wide_batches import CALL_ENTRIES, MOST_LOTS, lots_in_a_call
 from tests.problems.small import four_bar

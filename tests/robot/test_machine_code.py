@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.kinematics.alone import VARIABLE
-from jounce.native.machine import is_usable
+from jounce.execution.alone import VARIABLE
+from jounce.execution.llvm.machine import is_usable
 from jounce.robot.batches import LEAST_THREADED
 from jounce.robot.forward_dynamics import _moved
 from jounce.robot.inverse_dynamics import _generalised_forces

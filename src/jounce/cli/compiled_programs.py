@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from jounce.errors import OutputError
-from jounce.kinematics import store
-from jounce.kinematics.compilation import compiles_anew
+from jounce.execution import store
+from jounce.execution.compilation import compiles_anew
 from jounce.private_folder import PrivateFolder
 
 ENDING = ".program"
@@ -79,7 +79,7 @@ class CheckedEntries:
 
 
 class JaxEntries(CheckedEntries):
-    """The programs that JAX keeps by itself: those that `jounce.kinematics.store` does not."""
+    """The programs that JAX keeps by itself: those that `jounce.execution.store` does not."""
 
     def get(self, key: str) -> bytes | None:
         """Return the program of this key, or None, as it is where programs are to be compiled anew."""

@@ -19,12 +19,12 @@ from jounce.dynamics.forward import Lanes
 from jounce.dynamics.loads import loads, mass_matrices
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.dynamics.motion_values import Coordinates, in_lots, part_of, pose_of
+from jounce.execution.compilation import compiled
+from jounce.execution.side_by_side import Prepared, SideBySide
+from jounce.execution.store import is_wanted_soon
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked, total
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.jacobian_series import along_displacements, slopes
-from jounce.kinematics.side_by_side import Prepared, SideBySide
-from jounce.kinematics.store import is_wanted_soon
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import Group, System, movable, with_rows
 from jounce.rigid.pose import Pose

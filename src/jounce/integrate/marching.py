@@ -9,6 +9,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, expand, inverted
+from jounce.execution.compilation import compiled
+from jounce.execution.kernels import LIBRARIES, in_one_piece
 from jounce.integrate.energy_balance import Balance, begun, energies, followed as follow_balance, is_balanced, unknown
 from jounce.integrate.lookahead import (
     FINEST,
@@ -23,8 +25,6 @@ from jounce.integrate.lookahead import (
 from jounce.integrate.methods import MARGIN, NEEDED, AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import AnglesOfForces, followed, measured
-from jounce.kinematics.compilation import compiled
-from jounce.kinematics.kernels import LIBRARIES, in_one_piece
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.shapes import Numbers
 

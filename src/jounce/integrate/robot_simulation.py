@@ -14,12 +14,12 @@ from jaxtyping import Float, Int
 
 from jounce.display import Displayed
 from jounce.errors import RobotError
+from jounce.execution.chunks import in_chunks
+from jounce.execution.compilation import compiled
 from jounce.integrate.methods import Lanes
 from jounce.integrate.robot_marching import RobotProblem, RobotState, RobotSteps, at
 from jounce.jet import Jet, compose
 from jounce.kinematics import Status
-from jounce.kinematics.chunks import in_chunks
-from jounce.kinematics.compilation import compiled
 from jounce.robot.base_motion import BaseMotion
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.robot import Robot

@@ -13,6 +13,8 @@ from jounce.dynamics.forward import Equations, Instants, State
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
+from jounce.execution.compilation import compiled
+from jounce.execution.store import expect
 from jounce.integrate.events import Event, EventDetector, EventLog, pose_coordinates
 from jounce.integrate.lookahead import hiding_names, watched_names
 from jounce.integrate.marching import MOVING, STUCK, DenseOutput, IntegratorState, Outcome, march, unexpanded
@@ -26,9 +28,7 @@ from jounce.integrate.simulation import Simulation
 from jounce.integrate.user_methods import integrator
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.motion import check_output, output_group
-from jounce.kinematics.store import expect
 from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.element_indices import force_names
 from jounce.mechanism.law_checks import check_laws

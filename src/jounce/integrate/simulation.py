@@ -12,6 +12,10 @@ from jounce.dynamics.forward import Equations, Instants, Lanes, State, expand
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart
 from jounce.errors import MechanismError
+from jounce.execution.chunks import in_chunks
+from jounce.execution.compilation import Compiled, compiled
+from jounce.execution.side_by_side import SideBySide
+from jounce.execution.store import is_wanted_soon
 from jounce.integrate.breaks import breaks
 from jounce.integrate.events import WIDTHS, in_pieces, pose_coordinates, series_of
 from jounce.integrate.lookahead import watched_names
@@ -23,11 +27,7 @@ from jounce.jet import Jet, dot
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.chunks import in_chunks
-from jounce.kinematics.compilation import Compiled, compiled
 from jounce.kinematics.pose_outputs import output_series
-from jounce.kinematics.side_by_side import SideBySide
-from jounce.kinematics.store import is_wanted_soon
 from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle, with_turns
 from jounce.mechanism.system import Group

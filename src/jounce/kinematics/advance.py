@@ -19,7 +19,6 @@ from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.turns import brought_near
 from jounce.kinematics.factors import Factor, factored
-from jounce.kinematics.least_squares import LeastSquaresFactor
 from jounce.kinematics.newton_raphson import newton_raphson
 from jounce.kinematics.predictions import (
     hidden_by_laws,
@@ -29,6 +28,7 @@ from jounce.kinematics.predictions import (
 )
 from jounce.kinematics.status import Status
 from jounce.kinematics.turnover import turnover_of
+from jounce.linear_algebra.least_squares import LeastSquaresFactor
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.system import Group, System
 from jounce.rigid.pose import Pose

@@ -13,17 +13,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.execution.compilation import compiled
+from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, predicts_turns, solved_batch
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.designs import Coordinates, Designs
 from jounce.kinematics.legs import GROWTH, LARGEST_TURNOVER, PASSAGE, SLIVER
 from jounce.kinematics.path_following import PLACES, SMALLEST_STEP, blended_attitudes
 from jounce.kinematics.predictions import hidden_by_laws
 from jounce.kinematics.solver import Solver
 from jounce.kinematics.status import Status
-from jounce.kinematics.threads import Threads
 from jounce.kinematics.turnover import turnovers_of
 from jounce.mechanism.axis_angles import measures_angle, raw_angles
 from jounce.mechanism.system import Group, System

@@ -14,6 +14,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.advance import Arrival, SolvedState
 from jounce.kinematics.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
@@ -26,7 +27,6 @@ from jounce.kinematics.path_following import (
 from jounce.kinematics.solver import SMALL_BATCH, Solver
 from jounce.kinematics.spans import solve_spans, spans_of
 from jounce.kinematics.status import Status
-from jounce.kinematics.threads import Threads
 from jounce.mechanism.time import nearest_instants
 
 Indices = Int[np.ndarray, " lane"]

@@ -2,8 +2,8 @@
 
 from typing import Any
 
+from jounce.execution.side_by_side import SideBySide
 from jounce.kinematics.advance import Arrival, advance
-from jounce.kinematics.side_by_side import SideBySide
 from jounce.mechanism.system import System
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose

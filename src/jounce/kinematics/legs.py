@@ -18,10 +18,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.execution.compilation import compiled
+from jounce.execution.side_by_side import called
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, advance, predictor
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.instant_program import finds_turnover
-from jounce.kinematics.side_by_side import called
 from jounce.kinematics.status import Status
 from jounce.kinematics.turnover import turnover_at
 from jounce.mechanism.system import System

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.advance import SolvedState
 from jounce.kinematics.change_points import half_width, spoiled_width
@@ -15,7 +16,6 @@ from jounce.kinematics.path_following import FollowedPath
 from jounce.kinematics.solver import Solver
 from jounce.kinematics.spans import solve_spans, spans_of
 from jounce.kinematics.status import Status
-from jounce.kinematics.threads import Threads
 from jounce.mechanism.time import Instants
 
 STRETCH = 2**16  # instants

@@ -12,10 +12,10 @@ from jaxtyping import Float
 from jounce.constraints import AbstractConstraint
 from jounce.display import Displayed
 from jounce.errors import MechanismError, check_name
+from jounce.execution.chunks import in_chunks
+from jounce.execution.on_demand import OnDemand
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
-from jounce.kinematics.chunks import in_chunks
-from jounce.kinematics.on_demand import OnDemand
 from jounce.kinematics.path_following import Passage
 from jounce.kinematics.pose_outputs import output_series
 from jounce.kinematics.status import Status

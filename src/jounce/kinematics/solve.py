@@ -11,24 +11,24 @@ import numpy as np
 from jax.errors import ConcretizationTypeError
 
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
+from jounce.execution.device import resident
+from jounce.execution.rehearsal import first_time, rehearsed, tried
+from jounce.execution.store import expect, is_wanted_soon
+from jounce.execution.threads import thread_count
 from jounce.kinematics.actuation import actuated
 from jounce.kinematics.advance import SolvedState
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.dead_ends import dead_end_words
-from jounce.kinematics.device import resident
 from jounce.kinematics.forces_at_rest import ask_forces_at_rest
 from jounce.kinematics.grid import LONG_GRID
 from jounce.kinematics.long_grids import solve_grid
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.path_following import FollowedPath, follow
-from jounce.kinematics.rehearsal import first_time, rehearsed, tried
 from jounce.kinematics.sensitivities import differentiable_motion
 from jounce.kinematics.solver import NO_GRID, Solver
 from jounce.kinematics.status import Status
-from jounce.kinematics.store import expect, is_wanted_soon
 from jounce.kinematics.stretches import Stretches
-from jounce.kinematics.threads import thread_count
 from jounce.kinematics.traced_motion import TracedMotion
 from jounce.mechanism import (
     Mechanism,

@@ -10,15 +10,15 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from jounce.execution.llvm.relays import Relay
+from jounce.execution.side_by_side import Prepared
 from jounce.kinematics.advance import LARGEST_GAP, Arrival, SolvedState, predictor
 from jounce.kinematics.instant_program import advance_instant
 from jounce.kinematics.legs import Leg, LegLimits, Place, Settings, Way, leg
-from jounce.kinematics.side_by_side import Prepared
 from jounce.kinematics.status import Status
 from jounce.kinematics.wide_batches import CALL_ENTRIES, advance_in_lots, lot_width, lots_in_a_call
 from jounce.mechanism import Model
 from jounce.mechanism.time import MAX_INSTANTS
-from jounce.native.relays import Relay
 
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 LONGEST_LEG = 32  # batches

@@ -16,7 +16,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.kinematics.kept_memory import arrays_in, borrow, give_back, room_of
+from jounce.execution.kept_memory import arrays_in, borrow, give_back, room_of
 from jounce.kinematics.path_following import Anchor, FollowedPath
 from jounce.kinematics.solver import Solver
 from jounce.mechanism.time import nearest_instants

@@ -11,9 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.execution.compilation import compiled
+from jounce.execution.device import on_processor
 from jounce.kinematics.advance import Arrival, Lanes, SolvedState, solved_batch
-from jounce.kinematics.compilation import compiled
-from jounce.kinematics.device import on_processor
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers

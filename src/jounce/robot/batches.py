@@ -13,11 +13,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.execution.compilation import Compiled
+from jounce.execution.device import on_processor
+from jounce.execution.side_by_side import SideBySide
+from jounce.execution.threads import Threads, thread_count
 from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
-from jounce.kinematics.compilation import Compiled
-from jounce.kinematics.device import on_processor
-from jounce.kinematics.side_by_side import SideBySide
-from jounce.kinematics.threads import Threads, thread_count
 from jounce.robot.abstract_robot import AbstractRobot
 from jounce.settings import check_process
 from jounce.shapes import is_traced
