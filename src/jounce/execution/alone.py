@@ -34,7 +34,7 @@ def is_wanted() -> bool:
 
 
 def is_traced_alone() -> bool:
-    """Tell whether what this thread traces becomes machine code, which needs no help to be in one piece."""
+    """Tell whether what this thread traces becomes machine code, in which a loop is shorter than all its turns."""
     return getattr(_thread, "tracing", False)
 
 

@@ -10,7 +10,7 @@ import io
 import os
 import pickle
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache, cached_property, partial, update_wrapper
 from typing import Any
@@ -73,22 +73,20 @@ UNENDING = ("simplify-while-loops", "while-loop-invariant-code-motion", "while-l
 to do here, and one that moves reshapes to where its simplifier does not want them."""
 
 
-def compiler_options(without: Iterable[str] = (), *, narrow: bool = False) -> dict[str, Any] | None:
+def compiler_options(*, narrow: bool = False) -> dict[str, Any] | None:
     """Return options that halve XLA's compile time of long chains of small operations, without making them slower.
 
     They are private to XLA: those that a release does not know are left out. There are none on a GPU.
 
     Parameters
     ----------
-    without : iterable of str, optional
-        Further passes of XLA to leave out.
     narrow : bool, default False
         Whether arrays are so short that most of the time is that of calling operations: then LLVM need not do more
         than the first level of its optimisations, a fifth of the time in which a program is compiled.
     """
     if not on_processor():
         return None
-    options = {"xla_cpu_use_fusion_emitters": False, "xla_disable_hlo_passes": ",".join((*UNENDING, *without))}
+    options = {"xla_cpu_use_fusion_emitters": False, "xla_disable_hlo_passes": ",".join(UNENDING)}
     if narrow and not _level_is_set():
         options["xla_backend_optimization_level"] = 1
     return {name: value for name, value in options.items() if name in _known_options()} or None
@@ -127,8 +125,6 @@ class Compiled:
         Names of the static arguments.
     made_of : tuple of callable, optional
         Functions of the package that say what it computes, where it is none of them itself.
-    without : tuple of str, optional
-        Passes of XLA to leave out.
     narrow : bool, optional
         Whether its arrays are short, as `compiler_options` has it.
     brief : bool, optional
@@ -146,7 +142,6 @@ class Compiled:
         function: Callable[..., Any],
         static: tuple[str, ...],
         made_of: tuple[Callable[..., Any], ...] = (),
-        without: tuple[str, ...] = (),
         *,
         narrow: bool = False,
         brief: bool = False,
@@ -154,7 +149,7 @@ class Compiled:
         otherwise: Mapping[str, Any] | None = None,
     ):
         self.function, self.static, self.made_of = function, static, made_of or (function,)
-        self.without, self.narrow, self.brief = without, narrow, brief
+        self.narrow, self.brief = narrow, brief
         self._programs: dict[Any, Callable[..., Any]] = {}
         self._suits_alone, self._alone, self._otherwise = alone, Alone(function, self.made_of), dict(otherwise or {})
         self._names = tuple(inspect.signature(function).parameters)
@@ -164,7 +159,7 @@ class Compiled:
     @cached_property
     def jitted(self) -> Any:
         """The function as `jax.jit` returns it."""
-        options = compiler_options(self.without, narrow=self.narrow)
+        options = compiler_options(narrow=self.narrow)
         return jax.jit(self.function, static_argnames=self.static, compiler_options=options)
 
     @cached_property

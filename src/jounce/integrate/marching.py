@@ -10,7 +10,6 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, expand, inverted
 from jounce.execution.compilation import compiled
-from jounce.execution.kernels import LIBRARIES, in_one_piece
 from jounce.integrate.energy_balance import Balance, begun, energies, followed as follow_balance, is_balanced, unknown
 from jounce.integrate.lookahead import (
     FINEST,
@@ -145,7 +144,7 @@ def _is_one(_: Equations, current: IntegratorState, *__: Any, **___: Any) -> boo
     return len(current.time) == 1
 
 
-@compiled("count", "keep", without=LIBRARIES, alone=_is_one)
+@compiled("count", "keep", alone=_is_one)
 def march(
     equations: Equations,
     current: IntegratorState,
@@ -271,9 +270,7 @@ def march(
 
     kept = _blank(method, current, count) if keep else None
     start = (current, kept, 0)
-    if len(current.time) > 1:  # arrays of many runs are worth a call for each operation
-        return jax.lax.while_loop(unfinished, iterate, start)
-    return in_one_piece(lambda carry: jax.lax.while_loop(unfinished, iterate, carry), start)
+    return jax.lax.while_loop(unfinished, iterate, start)
 
 
 def _blank(

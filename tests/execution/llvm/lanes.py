@@ -4,13 +4,12 @@ import operator
 
 import jax
 import jax.numpy as jnp
+import llvmlite.binding as llvm
 import numpy as np
 import pytest
 
 from jounce.execution.llvm import machine, modules, programs
 from jounce.execution.llvm.text.scalars import MOST_LINES
-
-llvm = pytest.importorskip("llvmlite.binding", reason="the compiler is an extra")
 
 COUNT = 17  # two whole vectors and a rest
 FEW = 3  # numbers of an array that is a single value each

@@ -19,11 +19,14 @@ _published: set[str] = set()
 
 @lru_cache(maxsize=1)
 def is_usable() -> bool:
-    """Tell whether there is a compiler, which is an extra of this package, on a system where it has been tried.
+    """Tell whether there is a compiler, and its code has been tried on this system, or passes a test here."""
+    if find_spec("llvmlite") is None:  # from an installation that leaves out what this package depends on
+        return False
+    if sys.platform in TRIED:
+        return True
+    from jounce.execution.llvm import self_test  # here, since this file is also run by its name, without the package
 
-    Elsewhere code may ask for functions that LLVM does not find, and then it ends the process.
-    """
-    return sys.platform in TRIED and find_spec("llvmlite") is not None
+    return self_test.passes()
 
 
 @lru_cache(maxsize=1)
@@ -67,9 +70,13 @@ def compiled(text: str, *, hasty: bool = False) -> bytes:
     hasty : bool, default False
         Whether a third of the time is worth more than code that is twice as fast. Its results are the same.
     """
-    elsewhere = hasty or (text.count("\n") > LONG and len(os.sched_getaffinity(0)) > 1)
+    elsewhere = hasty or (text.count("\n") > LONG and _cores() > 1)
     found = _compiled_elsewhere(text, hasty) if elsewhere else None
     return _compiled_here(text) if found is None else found
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _compiled_here(text: str) -> bytes:

@@ -127,8 +127,14 @@ def _text(
     borrowed, returned = [], []
     if code.heap:
         borrowed, returned = (
-            [f"%heap = call ptr @aligned_alloc(i64 64, i64 {code.heap})"],
-            ["call void @free(ptr %heap)"],
+            [
+                f"%block = call noalias ptr @malloc(i64 {code.heap + 64})",
+                "%begun = ptrtoint ptr %block to i64",
+                "%before = sub i64 0, %begun",
+                "%gap = and i64 %before, 63",
+                "%heap = getelementptr i8, ptr %block, i64 %gap",
+            ],
+            ["call void @free(ptr %block)"],
         )
     loop = [
         f"%most = sub i64 %total, {width}",
@@ -154,7 +160,7 @@ def _text(
         *returned,
         "ret void",
         "}",
-        "declare ptr @aligned_alloc(i64, i64)",
+        "declare noalias ptr @malloc(i64)",
         "declare void @free(ptr)",
         *sorted(code.intrinsics | {"declare i64 @llvm.smin.i64(i64, i64)"}),
     ]
