@@ -22,9 +22,11 @@ def passes() -> bool:
     else:
         try:
             subprocess.run([sys.executable, "-P", "-c", CALL], capture_output=True, check=True, timeout=LONGEST)
-        except (OSError, subprocess.SubprocessError) as error:
-            told = getattr(error, "stderr", b"") or b""
-            reason = told.decode(errors="replace").strip().rpartition("\n")[2] or str(error)
+        except subprocess.CalledProcessError as error:
+            last = error.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+            reason = last or f"the process that tried it ended with status {error.returncode}"
+        except (OSError, subprocess.TimeoutExpired) as error:
+            reason = f"the process that was to try it: {type(error).__name__}"
         else:
             return True
     warnings.warn(
