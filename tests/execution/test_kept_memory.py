@@ -7,7 +7,7 @@ import pytest
 
 import jounce as jn
 from jounce.execution import kept_memory
-from jounce.execution.alone import is_wanted
+from jounce.execution.backends import is_wanted
 from jounce.execution.kept_memory import LINE, arrays_in, borrow, give_back, room_of
 from tests.problems.small import four_bar
 

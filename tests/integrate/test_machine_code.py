@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.execution.llvm import machine, programs
+from jounce.execution.llvm import programs, self_test
 
 pytestmark = pytest.mark.skipif(
-    not machine.is_usable(), reason="there is no compiler, or a system where it was not tried"
+    not self_test.is_usable(), reason="there is no compiler, or a system where it was not tried"
 )
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.execution.llvm.machine import is_usable
+from jounce.execution.llvm.self_test import is_usable
 from jounce.kinematics import Status, grid, long_grids, spans
 from jounce.kinematics.spans import rounds, spans_of
 from tests.problems.small import four_bar, slider_crank

@@ -20,13 +20,15 @@ import numpy as np
 from jax.core import Tracer
 from jax.experimental import serialize_executable
 
-from jounce.execution.alone import Alone
 from jounce.execution.device import on_processor
 from jounce.execution.store import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
 from jounce.execution.structure import UndescribedError, program_key, settings
+from jounce.execution.translated import Translated
 from jounce.jax_internals import description_reader, runs_at_once, without_sources
 from jounce.settings import check_process, under_own_settings
 
+LARGE = 32  # numbers of an array that stays in memory in machine code of one instant
+_NOTHING = jax.tree.structure(())
 _thread = threading.local()
 
 
@@ -131,7 +133,7 @@ class Compiled:
         Whether a command calls it so seldom, or has it compute so little, that it waits longer for the compiler: then
         LLVM optimises nothing where code is wanted soon, in half the time.
     alone : bool or callable, optional
-        Whether machine code is better where there is a compiler for it, as `Alone` has it; or what tells that from the
+        Whether machine code, all in one piece, is better where there is a compiler for it; or what tells that from the
         arguments.
     otherwise : mapping of str to object, optional
         Static arguments where there is none, in the place of those given.
@@ -151,7 +153,8 @@ class Compiled:
         self.function, self.static, self.made_of = function, static, made_of or (function,)
         self.narrow, self.brief = narrow, brief
         self._programs: dict[Any, Callable[..., Any]] = {}
-        self._suits_alone, self._alone, self._otherwise = alone, Alone(function, self.made_of), dict(otherwise or {})
+        self._suits_alone, self._otherwise = alone, dict(otherwise or {})
+        self.machine_code = Translated(function, self.made_of, alone=True)
         self._names = tuple(inspect.signature(function).parameters)
         self._traced = min([self._names.index(name) for name in static], default=len(self._names))
         update_wrapper(self, function)
@@ -179,8 +182,12 @@ class Compiled:
         traced = [leaf for leaf in leaves if isinstance(leaf, Tracer)]
         suits = self._suits_alone if not traced else False
         suits = suits if isinstance(suits, bool) else suits(*arguments, **keywords, **static)
-        if suits and (code := self._alone.program(leaves, tree, static)) is not None:
-            return code()
+        if suits:
+            arrays = [np.asarray(leaf) for leaf in leaves]
+            hasty = is_wanted_soon()
+            code = self.machine_code.program((arrays, tree), ((), _NOTHING), static, large=LARGE, hasty=hasty)
+            if code is not None:
+                return code(arrays)
         static |= self._otherwise
         if traced:
             whole = self.jitted if all(map(runs_at_once, traced)) else self._within

@@ -1,6 +1,6 @@
 """What programs run on: a processor, whose cache their batches have to fit, or a GPU, which they have to fill."""
 
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import jax
 
@@ -21,8 +21,13 @@ def on_processor() -> bool:
     ...     on_processor()
     True
     """
-    chosen = getattr(jax.config, "jax_default_device", None)
-    return (getattr(chosen, "platform", chosen) or jax.default_backend()) == "cpu"
+    return device_name() == "cpu"
+
+
+def device_name() -> str:
+    """Return the name of the kind of device that JAX computes on."""
+    chosen: Any = getattr(jax.config, "jax_default_device", None)
+    return str(getattr(chosen, "platform", chosen) or jax.default_backend())
 
 
 def resident(arrays: T) -> T:

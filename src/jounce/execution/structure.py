@@ -56,6 +56,8 @@ def description(value: Any) -> str:
         return f"{kind.__name__} {value.dtype.str} {value.shape} {digest}"
     if isinstance(value, type | types.FunctionType):
         return _own(value)
+    if isinstance(value, jax.tree_util.PyTreeDef):
+        return tree_description(value)
     if isinstance(value, enum.Enum):
         return f"{_own(kind)}.{value.name}"
     if dataclasses.is_dataclass(value):  # by the fields by which it is compared, as `jax.jit` compares it too

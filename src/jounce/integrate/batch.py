@@ -343,7 +343,7 @@ class _Runs:
             time = self.instants[at[lanes]]
             since = time - begin[lanes]
             started = polynomial.map(lambda part, lanes=lanes: part[..., lanes])
-            *_, found = expanded(shared, (turned_by, started, since, time), order=self._expansion)
+            *_, found = expanded.on_xla(shared, (turned_by, started, since, time), (("order", self._expansion),))
             for which, (group, series) in enumerate(zip(outputs, map(np.array, found), strict=True)):
                 if which in before and measures_angle(group):
                     series[0, 0] = brought_near(series[0, 0], before[which][:, lanes])

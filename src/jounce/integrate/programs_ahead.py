@@ -11,7 +11,7 @@ from jaxtyping import Float
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.masses import gravity_of, required_masses
 from jounce.dynamics.start import ConsistentStart, at_rest, equations_of
-from jounce.execution.alone import is_wanted
+from jounce.execution.backends import is_wanted
 from jounce.execution.compilation import check_wanted
 from jounce.execution.device import resident
 from jounce.execution.llvm.modules import telling

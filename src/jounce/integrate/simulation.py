@@ -13,8 +13,8 @@ from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart
 from jounce.errors import MechanismError
 from jounce.execution.chunks import in_chunks
-from jounce.execution.compilation import Compiled, compiled
-from jounce.execution.side_by_side import SideBySide
+from jounce.execution.compilation import compiled
+from jounce.execution.mapped import mapped
 from jounce.execution.store import is_wanted_soon
 from jounce.integrate.breaks import breaks
 from jounce.integrate.events import WIDTHS, in_pieces, pose_coordinates, series_of
@@ -259,18 +259,13 @@ def motion_at(
         polynomial = dense.polynomial.map(lambda part: part[steps].transpose(1, 2, 3, 0))
         return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
 
-    code = expanded_instant.program(
-        shared, lanes_of(np.zeros(1, int)), large=LARGE, hasty=is_wanted_soon(), order=order
-    )
-
-    def chunk(places: np.ndarray) -> Any:
-        lanes = lanes_of(places)
-        return expanded(shared, lanes, order=order) if code is None else code(lanes)
-
-    return in_chunks(chunk, len(instants), (FEW_INSTANTS, *WIDTHS))
+    example = lanes_of(np.zeros(1, int))
+    program = expanded.program(shared, example, large=LARGE, hasty=is_wanted_soon(), order=order)
+    return in_chunks(lambda places: program(lanes_of(places)), len(instants), (FEW_INSTANTS, *WIDTHS))
 
 
-def _expanded(
+@mapped(widths=(FEW_INSTANTS, *WIDTHS), narrow=True)
+def expanded(
     shared: tuple[Equations, tuple[Group, ...]], lanes: tuple[AnglesOfForces, State, Lanes, Lanes], order: int
 ) -> tuple[State, AnglesOfForces, tuple[Float[Numbers, "_ _ _ batch"], ...]]:
     """Return the Taylor coefficients of the motion at instants, from the equations there.
@@ -302,10 +297,6 @@ def _expanded(
     series = expand(there, state, instants[None], order, inverse).state
     found = output_series(outputs, pose_coordinates(series), equations.pose_type)
     return series, measured(there, state), found
-
-
-expanded = Compiled(_expanded, ("order",), narrow=True)
-expanded_instant = SideBySide(_expanded)
 
 
 def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:

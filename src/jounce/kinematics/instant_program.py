@@ -1,15 +1,25 @@
-"""`advance` for one instant, of which machine code is made that solves many side by side."""
+"""`advance` for one instant, as a program that solves many: machine code side by side, or XLA in arrays."""
 
 from typing import Any
 
-from jounce.execution.side_by_side import SideBySide
-from jounce.kinematics.advance import Arrival, advance
+import jax.numpy as jnp
+
+from jounce.execution.mapped import mapped
+from jounce.kinematics.advance import Arrival, advance, solved_batch
 from jounce.mechanism.system import System
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
 
 
-@SideBySide
+def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> Arrival:
+    """Solve many instants as `advance_instant` does one; nothing is surveyed."""
+    (system, tolerance, refine, wanted), (known, step, instant, _) = shared, instants
+    settings = tolerance, refine, wanted
+    arrival, _, _ = solved_batch(system, *known, step, instant, *settings, pose_type=pose_type, order=order)
+    return arrival._replace(turnover=jnp.zeros_like(step))
+
+
+@mapped(by_xla=_of_many)
 def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> Arrival:
     """Solve an instant from a neighbour solved before.
 

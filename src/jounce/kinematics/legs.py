@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.execution.compilation import compiled
-from jounce.execution.side_by_side import called
+from jounce.execution.mapped import called
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, advance, predictor
 from jounce.kinematics.instant_program import finds_turnover
 from jounce.kinematics.status import Status

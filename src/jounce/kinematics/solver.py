@@ -10,8 +10,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
-from jounce.execution.llvm.relays import Relay
-from jounce.execution.side_by_side import Prepared
+from jounce.execution.mapped import OnLlvm, Rounds
 from jounce.kinematics.advance import LARGEST_GAP, Arrival, SolvedState, predictor
 from jounce.kinematics.instant_program import advance_instant
 from jounce.kinematics.legs import Leg, LegLimits, Place, Settings, Way, leg
@@ -88,7 +87,7 @@ class Solver:
         instant: Float[np.ndarray, " time"],
         status: Int[np.ndarray, " time"],
         sources: Int[np.ndarray, " time"],
-    ) -> Relay:
+    ) -> Rounds:
         """Return what solves instants of a grid in rounds of machine code; only where solving `is_compiled`.
 
         Parameters
@@ -107,7 +106,7 @@ class Solver:
         wanted = {"coordinates": coordinates, "outputs": outputs, "status": status, "sign": sign}
         results, native = Arrival(**(nothing | wanted)), self._native
         assert native is not None
-        return native.relay((self.needed(store), (step, instant), np.zeros(1, bool)), results, sources)
+        return native.rounds((self.needed(store), (step, instant), np.zeros(1, bool)), results, sources)
 
     def leg(self, way: Way, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> Leg:
         """Go on along a way with the next instants of a grid, as far as they fit; see `legs.leg`."""
@@ -142,7 +141,7 @@ class Solver:
     def lanes(self) -> int:
         """How many instants the vectors of machine code hold; only where solving `is_compiled`."""
         assert self._native is not None
-        return self._native.lanes
+        return self._native.width
 
     @cached_property
     def longest_stride(self) -> int:
@@ -159,7 +158,7 @@ class Solver:
         return max(self.width, min(MOST_SIDE_BY_SIDE, CALL_ENTRIES // self._entries))
 
     @cached_property
-    def _native(self) -> Prepared | None:
+    def _native(self) -> OnLlvm | None:
         """Machine code of `advance_instant`; None where instants are solved in arrays of XLA."""
         system, (tolerance, refine, _, wanted) = self.model.system, self._settings
         nothing = np.zeros(1)
@@ -173,7 +172,8 @@ class Solver:
         tables = max(map(np.size, jax.tree.leaves(laws)), default=0) > LARGE
         how = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE, "hasty": self.hasty}
         shared = system, tolerance, refine, wanted
-        return advance_instant.program(shared, instants, **how, pose_type=kind, order=self.order)
+        program = advance_instant.program(shared, instants, **how, pose_type=kind, order=self.order)
+        return program if isinstance(program, OnLlvm) else None
 
     @cached_property
     def _batches(self) -> int:

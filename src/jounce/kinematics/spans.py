@@ -99,7 +99,8 @@ class _Room:
         self.state = jax.tree.unflatten(form, state)
         self._source[:] = 0
         self._relay = solver.relay(self.state, self._step, self._time, self.status, self._source)
-        self._rounds = rounds(0, 1, self._relay.width)
+        self._width = solver.lanes
+        self._rounds = rounds(0, 1, self._width)
 
     def begin(self, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
         """Take up the instants of a span, s, with the anchors around it."""
@@ -115,7 +116,7 @@ class _Room:
         self._time[:count] = time
         self._source[:count] = np.where(near, neighbour, self._size + nearest)
         self._step[:count] = np.where(near, to_neighbour, to_anchor)
-        self._rounds = rounds(count, stride, self._relay.width)
+        self._rounds = rounds(count, stride, self._width)
 
     def solve(self) -> None:
         """Solve the instants that were taken up last."""

@@ -14,7 +14,7 @@ import numpy as np
 from jounce.design.design_space import Grid, Sobol
 from jounce.design.variations import Values
 from jounce.errors import OutputError
-from jounce.execution.alone import is_wanted
+from jounce.execution.backends import is_wanted
 from jounce.execution.device import on_processor
 from jounce.sweeps.fingerprints import fingerprint
 

@@ -5,11 +5,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jounce.execution.llvm import machine, modules, programs
+from jounce.execution.llvm import modules, programs, self_test
 from jounce.execution.llvm.text.values import UnsupportedOperationError
 
 pytestmark = pytest.mark.skipif(
-    not machine.is_usable(), reason="there is no compiler, or a system where it was not tried"
+    not self_test.is_usable(), reason="there is no compiler, or a system where it was not tried"
 )
 LANES = 11  # a vector and a rest
 

@@ -4,8 +4,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jounce.execution.llvm.machine import is_usable, vector_width
-from jounce.execution.side_by_side import SideBySide
+from jounce.execution.llvm.machine import vector_width
+from jounce.execution.llvm.self_test import is_usable
+from jounce.execution.mapped import Mapped, OnLlvm
 
 pytestmark = pytest.mark.skipif(not is_usable(), reason="there is no compiler, or a system where it was not tried")
 COUNT = 24
@@ -18,7 +19,7 @@ def step(shared, lanes):
     return {"label": label + 1, "late": time > 3, "position": position, "rest": moved[:1]}
 
 
-STEP = SideBySide(step)
+STEP = Mapped(step)
 
 
 def arrays(behind=1):
@@ -34,9 +35,9 @@ def relay(position, label, time, sources, found=None, late=None):
     """Return what solves all instants, straight into the arrays unless others are given."""
     lanes = (position, label), time, np.array([True])
     program = STEP.program(np.float64(0.5), ((np.zeros((3, 2, 1)), np.zeros(1, np.int64)), np.zeros(1), lanes[2]))
-    assert program is not None
+    assert isinstance(program, OnLlvm)
     results = {"label": label, "late": late, "position": position if found is None else found, "rest": None}
-    return program.relay(lanes, results, sources)
+    return program.rounds(lanes, results, sources)
 
 
 def in_turn(position, label, time, sources):
@@ -122,7 +123,7 @@ def test_truth_values_have_no_place_of_their_own():
 
 def test_programs_with_instants_along_the_first_axis_have_no_rounds():
     lanes = np.ones((3, 2))
-    program = SideBySide(lambda shared, x: x + shared, rows=True).program(np.float64(1.0), lanes)
-    assert program is not None
+    program = Mapped(lambda shared, x: x + shared, rows=True).program(np.float64(1.0), lanes)
+    assert isinstance(program, OnLlvm)
     with pytest.raises(ValueError, match="first axis"):
-        program.relay((lanes, (), ()), lanes, np.arange(3))
+        program.rounds((lanes, (), ()), lanes, np.arange(3))

@@ -4,16 +4,16 @@ import subprocess
 
 import pytest
 
-from jounce.execution.llvm import machine, programs, self_test
+from jounce.execution.llvm import programs, self_test
 
 
 @pytest.fixture(autouse=True)
 def untried(monkeypatch):
-    monkeypatch.setattr(machine, "TRIED", ())
-    for function in (machine.is_usable, self_test.passes):
+    monkeypatch.setattr(self_test, "TRIED", ())
+    for function in (self_test.is_usable, self_test.passes):
         function.cache_clear()
     yield
-    for function in (machine.is_usable, self_test.passes):
+    for function in (self_test.is_usable, self_test.passes):
         function.cache_clear()
 
 
@@ -30,7 +30,7 @@ def test_other_numbers_do_not(monkeypatch):
 
 @pytest.mark.slow
 def test_another_process_tries_it():
-    assert machine.is_usable()
+    assert self_test.is_usable()
 
 
 def failed(words, **_):
@@ -45,12 +45,12 @@ def killed(words, **_):
 def test_where_it_fails_one_warning_says_why(monkeypatch, run, reason):
     monkeypatch.setattr(self_test.subprocess, "run", run)
     with pytest.warns(UserWarning, match=reason) as told:
-        assert not machine.is_usable()
-    assert not machine.is_usable()
+        assert not self_test.is_usable()
+    assert not self_test.is_usable()
     assert len(told) == 1
 
 
 def test_an_application_is_not_started_again(monkeypatch):
     monkeypatch.setattr(self_test.sys, "executable", "/opt/editor/editor")
     with pytest.warns(UserWarning, match="/opt/editor/editor"):
-        assert not machine.is_usable()
+        assert not self_test.is_usable()

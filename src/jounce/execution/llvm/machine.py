@@ -6,27 +6,13 @@ import subprocess
 import sys
 import threading
 from functools import lru_cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-TRIED = ("linux",)
 HASTE = ("-regalloc=fast", "-enable-misched=false")  # options of LLVM
 LONG = 10_000  # lines, for which another process is worth its start
 _lock = threading.Lock()  # LLVM's state is one for the process
 _published: set[str] = set()
-
-
-@lru_cache(maxsize=1)
-def is_usable() -> bool:
-    """Tell whether there is a compiler, and its code has been tried on this system, or passes a test here."""
-    if find_spec("llvmlite") is None:  # from an installation that leaves out what this package depends on
-        return False
-    if sys.platform in TRIED:
-        return True
-    from jounce.execution.llvm import self_test  # here, since this file is also run by its name, without the package
-
-    return self_test.passes()
 
 
 @lru_cache(maxsize=1)

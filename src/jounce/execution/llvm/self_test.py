@@ -1,4 +1,4 @@
-"""A small program as machine code beside XLA's, in a process of its own, on systems where none was tried.
+"""Whether machine code is used here: a small program beside XLA's decides, on systems where none was tried.
 
 Code may ask there for functions that LLVM does not find, and then it ends the process: so it is another one.
 """
@@ -7,11 +7,23 @@ import subprocess
 import sys
 import warnings
 from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 
+from jounce.errors import MachineCodeWarning
+
+TRIED = ("linux",)
 HOME = Path(__file__).parents[3]  # the folder that this package is imported from
 LONGEST = 120.0  # s
 CALL = f"import sys; sys.path.insert(0, {str(HOME)!r}); from jounce.execution.llvm import self_test; self_test.check()"
+
+
+@lru_cache(maxsize=1)
+def is_usable() -> bool:
+    """Tell whether there is a compiler, and its code has been tried on this system, or passes a test here."""
+    if find_spec("llvmlite") is None:  # from an installation that leaves out what this package depends on
+        return False
+    return sys.platform in TRIED or passes()
 
 
 @lru_cache(maxsize=1)
@@ -29,12 +41,12 @@ def passes() -> bool:
             reason = f"the process that was to try it: {type(error).__name__}"
         else:
             return True
-    warnings.warn(
+    message = (
         f"machine code was not tried on {sys.platform}, and a small program does not run here as it does in XLA "
         f"({reason}); XLA computes in its place, with the same results in two to six times the time; "
-        "JOUNCE_NATIVE=0 in the environment asks for that without this message",
-        stacklevel=2,
+        "JOUNCE_NATIVE=0 in the environment asks for that without this message"
     )
+    warnings.warn(message, MachineCodeWarning, stacklevel=2)
     return False
 
 

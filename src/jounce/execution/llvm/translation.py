@@ -28,7 +28,7 @@ from jounce.execution.llvm.text.stored import (
     stored,
     values_of,
 )
-from jounce.execution.llvm.text.values import Region, UnsupportedOperationError, Value, kind_of
+from jounce.execution.llvm.text.values import NoRuleError, Region, UnsupportedOperationError, Value, kind_of
 from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored, as_read, contiguous, further
 from jounce.jax_internals import sizes_of_scan
 
@@ -126,7 +126,7 @@ def _results(code: Code, equation: Any, given: Sequence[Array], *, delayed: bool
         found = [settled(code, array) for array in rule(code, equation, given)]
         return [stored(code, x) if isinstance(x, Deferred) and not delayed else x for x in found]
     if (rule := RULES.get(name)) is None:
-        raise UnsupportedOperationError(name)
+        raise NoRuleError(name)
     return rule(code, equation, [values_of(code, array) for array in given])
 
 

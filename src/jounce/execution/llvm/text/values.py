@@ -15,6 +15,10 @@ class UnsupportedOperationError(Exception):
     """An operation that this room has no code for."""
 
 
+class NoRuleError(UnsupportedOperationError):
+    """An operation of JAX, by its name, that this room does not know."""
+
+
 @dataclass(frozen=True, eq=False)
 class Region:
     """Numbers of one kind one after another in memory, each alone or as a vector of lanes."""

@@ -1,27 +1,20 @@
 """Machine code for many instants beside XLA's programs: the same motions, and XLA's where there is none."""
 
-import threading
-
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.execution import side_by_side, store as store_
-from jounce.execution.llvm import machine
-from jounce.execution.llvm.modules import object_file
+from jounce.execution.llvm import self_test
 from jounce.execution.llvm.programs import Program
-from jounce.execution.side_by_side import SideBySide
+from jounce.execution.mapped import Mapped, OnLlvm
 from jounce.kinematics import Status, legs
 from jounce.kinematics.instant_program import advance_instant
 from jounce.mechanism.builder import build
-from tests.execution.test_compilation import Shelf
 from tests.linear_algebra.test_frontal import chain
 from tests.problems.small import four_bar, slider_crank
 
 pytestmark = pytest.mark.skipif(
-    not machine.is_usable(), reason="there is no compiler, or a system where it was not tried"
+    not self_test.is_usable(), reason="there is no compiler, or a system where it was not tried"
 )
 SPATIAL = ["rsur", "rssr", "hooke_joint", "bennett", "sarrus", "stewart_platform", "delta_robot"]
 PLANAR = ["six_bar_watt", "jansen_leg", "quick_return", "gear_pair", "wolfrom_train", "peaucellier", "servo_press"]
@@ -59,11 +52,9 @@ def test_motions_are_those_of_xla(mechanism, count, monkeypatch):
 @pytest.mark.parametrize("samples", [25, pytest.param(301, marks=pytest.mark.slow)])
 def test_motions_by_laws_through_samples_are_those_of_xla(samples, monkeypatch):
     """Of many samples, too: their table stays in memory, where single values would be too much code."""
-    made, program = [], side_by_side.SideBySide.program
+    made, program = [], Mapped.program
     monkeypatch.setattr(
-        side_by_side.SideBySide,
-        "program",
-        lambda *a, **k: made.append(program(*a, **k) is not None) or program(*a, **k),
+        Mapped, "program", lambda *a, **k: made.append(isinstance(program(*a, **k), OnLlvm)) or program(*a, **k)
     )
     instants = np.linspace(0, 2, samples)
     law = jn.trajectory.SplineMotion(instants, 0.5 + np.sin(np.pi * instants), 7)
@@ -115,125 +106,31 @@ def test_results_depend_neither_on_threads_nor_on_neighbours():
     np.testing.assert_array_equal(found[2], found[0])
 
 
-@SideBySide
-def example(shared, lanes, *, times):
-    """A function of one instant."""
-    return {"sum": shared[0] * lanes[0] + times, "larger": lanes[0] > shared[0]}
-
-
-def fresh():
-    """The function as in a new process."""
-    return SideBySide(example.function)
-
-
-def results(function):
-    """Its results for five instants."""
-    x = np.arange(5.0)
-    found = function.program((2.0,), (x,), times=3)((x,))
-    np.testing.assert_array_equal(found["sum"], 2 * x + 3)
-    np.testing.assert_array_equal(found["larger"], x > 2)
-    return found
-
-
-def test_what_is_kept_is_not_made_again(monkeypatch):
-    store, made = Shelf(), []
-    monkeypatch.setattr(store_, "_store", store)
-    function = example.function
-    monkeypatch.setattr(side_by_side, "program_key", lambda *given: repr(given[2]))  # it has no name in the package
-    monkeypatch.setattr(side_by_side, "object_file", lambda *a, **k: made.append(1) or object_file(*a, **k))
-    for _ in range(3):
-        results(SideBySide(function))
-    assert (len(made), len(store)) == (1, 1)
-    (key,) = store
-    store[key] = b"damaged"
-    results(SideBySide(function))
-    assert (len(made), store.dropped) == (2, [b"damaged"])
-
-
-def test_a_function_of_a_user_is_not_kept(monkeypatch):
-    store = Shelf()
-    monkeypatch.setattr(store_, "_store", store)
-    results(fresh())
-    assert not store
-
-
-def test_threads_that_ask_at_once_get_one_program():
-    function, found = fresh(), []
-
-    def ask():
-        found.append(function.program((2.0,), (np.arange(5.0),), times=3))
-
-    threads = [threading.Thread(target=ask) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len({id(prepared.machine_code) for prepared in found}) == 1
-
-
-@pytest.mark.parametrize("variable, installed", [("0", True), ("1", False)], ids=["not wanted", "not installed"])
-def test_there_may_be_none(variable, installed, monkeypatch):
-    monkeypatch.setenv("JOUNCE_NATIVE", variable)
-    monkeypatch.setattr(machine, "is_usable", lambda: installed)
-    assert fresh().program((2.0,), (np.arange(5.0),), times=3) is None
-
-
-def test_there_is_none_for_what_is_traced():
-    def traced(x):
-        assert fresh().program((x,), (np.arange(5.0),), times=3) is None
-        return x
-
-    jax.jit(traced)(2.0)
-
-
-def test_there_is_none_for_what_has_no_code():
-    def transformed(shared, lanes):
-        return jnp.fft.fft(lanes[0]).real * shared[0]
-
-    assert SideBySide(transformed).program((np.arange(3.0),), (np.arange(5.0),)) is None
-
-
-@pytest.mark.parametrize(
-    "shared, lanes",
-    [((np.float32(2.0),), (np.arange(5.0),)), ((2.0,), (np.arange(5),)), ((np.ones(2),), (np.arange(5.0),))],
-    ids=["single precision", "whole numbers", "another shape"],
-)
-def test_arrays_of_another_kind_are_refused(shared, lanes):
-    code = fresh().program((2.0,), (np.arange(5.0),), times=3).machine_code
-    with pytest.raises(ValueError, match="made for"):
-        code([np.asarray(x) for x in shared], [np.asarray(x) for x in lanes])
-
-
 def test_a_leg_without_code_of_its_own_is_left_to_xla_whole(monkeypatch):
     """XLA cannot call the machine code of an instant."""
     grid = np.linspace(0.0, 2.0, 5)
     expected = jn.solve(four_bar(), grid)
     wanted = []
 
-    def program(leaves, tree, static):
+    def program(shared, lanes, static, **how):
         wanted.append(static["native"])
 
-    monkeypatch.setattr(legs.leg._alone, "program", program)
+    monkeypatch.setattr(legs.leg.machine_code, "program", program)
     found = jn.solve(four_bar(), grid)
     assert wanted
     assert None not in wanted
     agree(found, expected)
 
 
-def test_only_a_program_that_becomes_machine_code_calls_it():
-    name = fresh().program((2.0,), (np.arange(5.0),), times=3).name
-    lanes = np.arange(16.0)
-    with pytest.raises(Exception, match=name):
-        jax.jit(lambda x: side_by_side.called(name, (jnp.asarray(2.0),), (x,)))(lanes)
-    with pytest.raises(ValueError, match="a vector has"):
-        side_by_side.called(name, (jnp.asarray(2.0),), (jnp.zeros(1),))
-
-
 def test_the_machine_code_of_a_motion_is_that_of_its_structure():
-    before = len(advance_instant._programs)
+    before = len(advance_instant.machine_code._programs)
     jn.solve(four_bar(), np.linspace(0, 2, 5))
-    known = len(advance_instant._programs)
+    known = len(advance_instant.machine_code._programs)
     jn.solve(four_bar(), np.linspace(0, 1, 1100))
     assert known in (before, before + 1)
-    assert len(advance_instant._programs) == known
-    assert all(isinstance(program, Program) for program in advance_instant._programs.values() if program is not None)
+    assert len(advance_instant.machine_code._programs) == known
+    assert all(
+        isinstance(program, Program)
+        for program in advance_instant.machine_code._programs.values()
+        if program is not None
+    )
