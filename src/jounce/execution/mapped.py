@@ -75,6 +75,10 @@ class OnLlvm:
         """How many instants a round has: as many as a vector holds."""
         return self.machine_code.width
 
+    def room(self, count: int) -> int:
+        """Return of how many instants the arrays of rounds are to be, where so many are solved."""
+        return count
+
     @cached_property
     def name(self) -> str:
         """Name by which other machine code calls it, as `called` has it."""
@@ -141,6 +145,16 @@ class OnXla:
 
         return jax.tree.map(whole, *parts)
 
+    def room(self, count: int) -> int:
+        """Return of how many instants the arrays of rounds are to be, where so many are solved: one of few numbers.
+
+        Each of them compiles once.
+        """
+        room = 2 * self.width
+        while room < count:
+            room *= 4
+        return room
+
     def rounds(self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"]) -> Rounds:
         """Return what solves instants in rounds, as that of `OnLlvm`; the arrays are written when all are solved."""
         linked, own, held = map(jax.tree.leaves, lanes)
@@ -150,12 +164,12 @@ class OnXla:
         links = tuple(next(k for k, whole in enumerate(wholes) if whole is part) for part in linked)
 
         def run(targets: Int[np.ndarray, "round lane"]) -> None:
-            turns, room = np.asarray(len(targets)), -(-len(sources) // self.width)
+            end, turns, room = targets.max(initial=-1) + 1, np.asarray(len(targets)), -(-len(sources) // self.width)
             targets = np.concatenate([targets, np.zeros((max(0, room - len(targets)), self.width), np.int64)])
             how = (links, wanted, self.form, self.how)
             found = self.mapped.in_rounds(self.shared, wholes, (own, held), (sources, targets, turns), how)
             for whole, part in zip(wholes, found, strict=True):
-                whole[...] = part
+                whole[..., :end] = np.asarray(part)[..., :end]
 
         return run
 

@@ -1,14 +1,31 @@
 """`advance` for one instant, as a program that solves many: machine code side by side, or XLA in arrays."""
 
+import math
 from typing import Any
 
 import jax.numpy as jnp
 
-from jounce.execution.mapped import mapped
+from jounce.execution.device import on_processor
+from jounce.execution.mapped import GPU_WIDTH, mapped
 from jounce.kinematics.advance import Arrival, advance, solved_batch
 from jounce.mechanism.system import System
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
+
+WIDTHS = 128, 512  # instants that XLA solves side by side: as many as the cache holds, within these bounds
+CACHED_ENTRIES = 2**16  # of the factors of a round: half a megabyte
+
+
+def round_width(system: System) -> int:
+    """Return how many instants of a long grid XLA solves side by side: a power of two.
+
+    On a processor so many that the factors of their Jacobians fit into the cache, on a GPU so many that they fill it.
+    """
+    if not on_processor():
+        return GPU_WIDTH
+    entries = math.prod(system.shape if system.fronts is None else system.fronts.shape)
+    least, most = WIDTHS
+    return max(least, min(most, 2 ** int(math.log2(max(1, CACHED_ENTRIES // max(1, entries))))))
 
 
 def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> Arrival:

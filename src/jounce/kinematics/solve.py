@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-import jax
 import numpy as np
 from jax.errors import ConcretizationTypeError
 
@@ -21,12 +20,12 @@ from jounce.kinematics.assembly import assemble
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.dead_ends import dead_end_words
 from jounce.kinematics.forces_at_rest import ask_forces_at_rest
-from jounce.kinematics.grid import LONG_GRID
 from jounce.kinematics.long_grids import solve_grid
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.path_following import FollowedPath, follow
 from jounce.kinematics.sensitivities import differentiable_motion
 from jounce.kinematics.solver import NO_GRID, Solver
+from jounce.kinematics.spans import LONG_GRID, prepare_spans
 from jounce.kinematics.status import Status
 from jounce.kinematics.stretches import Stretches
 from jounce.kinematics.traced_motion import TracedMotion
@@ -269,10 +268,9 @@ def _prepare(solver: Solver, instant: float) -> None:
 
 
 def _rehearse(mechanism: Mechanism, solver: Solver, still: SolvedState, instants: Instants) -> None:
-    """Use the programs of wide batches, and those of outputs that are forces, with the bodies at rest."""
+    """Use the programs of long grids, and those of outputs that are forces, with the bodies at rest."""
     if len(instants) > LONG_GRID:
-        known = jax.tree.map(lambda x: np.repeat(x, solver.width, axis=-1), still)
-        solver(solver.needed(known), np.zeros(solver.width), np.asarray(instants[: solver.width]))
+        prepare_spans(solver, still, len(instants))
     pose = {name: part[0] for name, part in still[0].items()}
     order = solver.order - lost_orders(mechanism)
     ask_forces_at_rest(mechanism, solver.model, pose, instants, order, solver.order + 1)
