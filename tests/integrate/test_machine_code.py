@@ -28,6 +28,7 @@ def both_ways(mechanism, times, monkeypatch, **given):
     monkeypatch.setenv("JOUNCE_NATIVE", "0")
     wanted = jn.simulate(mechanism, times, **given)
     assert not called
+    assert (found.backend, wanted.backend) == ("llvm", "xla")
     return found, wanted
 
 

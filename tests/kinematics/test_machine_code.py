@@ -46,7 +46,9 @@ def both_ways(mechanism, times, monkeypatch, **given):
 @pytest.mark.parametrize("count", [1, 40, 1500])
 @pytest.mark.parametrize("mechanism", [four_bar, slider_crank])
 def test_motions_are_those_of_xla(mechanism, count, monkeypatch):
-    agree(*both_ways(mechanism(), np.linspace(0, 2, count), monkeypatch))
+    found, wanted = both_ways(mechanism(), np.linspace(0, 2, count), monkeypatch)
+    agree(found, wanted)
+    assert (found.backend, wanted.backend) == ("llvm", "xla")
 
 
 @pytest.mark.parametrize("samples", [25, pytest.param(301, marks=pytest.mark.slow)])
@@ -119,7 +121,9 @@ def test_a_leg_without_code_of_its_own_is_left_to_xla_whole(monkeypatch):
     found = jn.solve(four_bar(), grid)
     assert wanted
     assert None not in wanted
+    assert found.backend == "xla"
     agree(found, expected)
+    assert jn.solve(four_bar(), np.linspace(0.0, 2.0, 1100)).backend == "llvm, xla"  # by its steps, and its instants
 
 
 def test_the_machine_code_of_a_motion_is_that_of_its_structure():

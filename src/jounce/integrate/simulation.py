@@ -12,6 +12,7 @@ from jounce.dynamics.forward import Equations, Instants, Lanes, State, expand
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart
 from jounce.errors import MechanismError
+from jounce.execution.backends import joined
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import mapped
@@ -61,6 +62,9 @@ class Simulation(Motion):
         When a force or a motion law had a jump or a kink, s, and which.
     dense : DenseOutput
         The steps, as polynomials.
+    steps_backend : str
+        Which arithmetic took the steps; none unless they were taken here. `backend` also tells what expanded the
+        motion at the instants.
     """
 
     def __init__(
@@ -72,13 +76,14 @@ class Simulation(Motion):
         order: int,
         ending: tuple[Status, str] = (Status.OK, ""),
         events: list[list[float]] | None = None,
+        steps_backend: str = "",
     ):
-        self.dense_output, self._start = dense, start
+        self.dense_output, self._start, self.steps_backend = dense, start, steps_backend
         self.events = [] if events is None else events
         self._ending = ending
         reached, chosen = _steps_of(dense, instants)
         outputs, highest = start.model.system.outputs, derivatives_of_motion(mechanism, order)
-        state, self._angles, found = motion_at(start.equations, outputs, dense, instants, chosen, highest)
+        (state, self._angles, found), backend = motion_at(start.equations, outputs, dense, instants, chosen, highest)
         coordinates = pose_coordinates(state)
         found = zip(outputs, found, strict=True)
         groups = tuple(self._counted(group, series, instants) for group, series in found)
@@ -97,6 +102,7 @@ class Simulation(Motion):
             status[beyond[0]], faults[int(beyond[0])] = int(ending[0]), ending[1]
         values = tuple(plain_derivatives(np.asarray(series)) for series in groups)
         super().__init__(mechanism, start.model, instants, order, (coordinates, values), status, faults)
+        self.backend = joined({backend, *filter(None, steps_backend.split(", "))})
 
     def __repr__(self) -> str:
         return f"<Simulation{super().__repr__()[7:-1]}, {self.steps} steps>"
@@ -157,7 +163,8 @@ class Simulation(Motion):
         """
         instants = np.atleast_1d(seconds("time", time, MechanismError))
         order = self.order if order is None else order
-        return Simulation(self.mechanism, self._start, self.dense_output, instants, order, self._ending, self.events)
+        outcome = self._ending, self.events, self.steps_backend
+        return Simulation(self.mechanism, self._start, self.dense_output, instants, order, *outcome)
 
     @property
     def energy(self) -> Float[np.ndarray, " time"]:
@@ -250,8 +257,8 @@ def motion_at(
     instants: np.ndarray,
     chosen: np.ndarray,
     order: int,
-) -> Any:
-    """Return what `expanded` does at instants in chosen steps, all of them."""
+) -> tuple[Any, str]:
+    """Return what `expanded` does at instants in chosen steps, all of them, and what computes it."""
     shared = equations, outputs
 
     def lanes_of(places: np.ndarray) -> Any:
@@ -261,7 +268,8 @@ def motion_at(
 
     example = lanes_of(np.zeros(1, int))
     program = expanded.program(shared, example, large=LARGE, hasty=is_wanted_soon(), order=order)
-    return in_chunks(lambda places: program(lanes_of(places)), len(instants), (FEW_INSTANTS, *WIDTHS))
+    found = in_chunks(lambda places: program(lanes_of(places)), len(instants), (FEW_INSTANTS, *WIDTHS))
+    return found, program.backend
 
 
 @mapped(widths=(FEW_INSTANTS, *WIDTHS), narrow=True)

@@ -10,6 +10,7 @@ import numpy as np
 from jax.errors import ConcretizationTypeError
 
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
+from jounce.execution.backends import joined
 from jounce.execution.device import resident
 from jounce.execution.rehearsal import first_time, rehearsed, tried
 from jounce.execution.store import expect, is_wanted_soon
@@ -148,7 +149,8 @@ def solve(
     solver, path = _followed(mechanism, instants, order, tolerance, refine=refine)
     found = solve_grid(solver, path, instants, progress, count, keep=keep)
     state, outcome = (found.coordinates, found.outputs), (found.status, found.faults, path.change_points)
-    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, path.history()))
+    told = path.history(), _backend(solver, path, instants)
+    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, *told))
     if strict:
         raise_for_status(motion)
     return motion
@@ -198,7 +200,7 @@ def solve_in_stretches(
     count = thread_count(threads)
     instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
     found = _followed(mechanism, instants, order, tolerance, refine=refine)
-    return Stretches(mechanism, found, instants, order, progress, count)
+    return Stretches(mechanism, found, instants, order, progress, count, _backend(*found, instants))
 
 
 def checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
@@ -250,6 +252,11 @@ def _followed(
         where = f"t = {first:g} s, {path.fault}"
         raise SolveError(f"{where}: {_words(path.status)}: {path.status.advice}", status=path.status)
     return solver, path
+
+
+def _backend(solver: Solver, path: FollowedPath, instants: Instants) -> str:
+    """Return what has computed a motion: what followed it, and what solves the instants of a long grid."""
+    return joined({*path.backends, *([solver.backend] if len(instants) > LONG_GRID else [])})
 
 
 def _rank_is_open(model: Model) -> bool:
