@@ -1,7 +1,7 @@
 """The same programs on a CUDA device, in double precision: their results are those of the processor to rounding.
 
 Where JAX finds no such device, the tests that need one are skipped, with what JAX says; what a GPU makes different,
-wider batches, is tested on the processor.
+wider rounds and blocks, is tested on the processor.
 """
 
 import json
@@ -90,7 +90,7 @@ def test_a_default_device_is_asked_before_the_first_backend():
 
 
 @pytest.mark.slow
-def test_the_wide_batches_of_a_gpu_give_the_same_motion(monkeypatch):
+def test_the_wide_rounds_of_a_gpu_give_the_same_motion(monkeypatch):
     mechanism, grid = jn.load(example("four_bar")), np.linspace(0.0, 2.0, 1500)
     expected = jn.solve(mechanism, grid).outputs["psi"]
     monkeypatch.setenv("JOUNCE_NATIVE", "0")
