@@ -30,9 +30,9 @@ def round_width(system: System) -> int:
 
 def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> Arrival:
     """Solve many instants as `advance_instant` does one; nothing is surveyed."""
-    (system, tolerance, refine, wanted), (known, step, instant, _) = shared, instants
-    settings = tolerance, refine, wanted
-    arrival, _, _ = solved_batch(system, *known, step, instant, *settings, pose_type=pose_type, order=order)
+    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, _) = shared, instants
+    given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
+    arrival, _, _ = solved_batch(system, *given, pose_type=pose_type, order=order)
     return arrival._replace(turnover=jnp.zeros_like(step))
 
 
