@@ -18,7 +18,7 @@ from benchmarks.arm import REFERENCE, arm, motion
 from benchmarks.cases import EXAMPLES, CannotRunError, Case, Cases, Contestant
 from benchmarks.processes import Worker
 from benchmarks.references import KINEMATIC, error_of, largest_error
-from jounce.kinematics.wide_batches import advance_in_lots
+from jounce.kinematics.instant_program import advance_instant
 
 os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")  # several processes share the device
 ON_CPU, ON_GPU = {"JAX_PLATFORMS": "cpu"}, {"JAX_PLATFORMS": "cuda,cpu"}
@@ -50,8 +50,8 @@ def program(name: str, lanes: int) -> Callable[[], Any]:
 
     def run() -> Any:
         settings = np.asarray(1e-12), np.asarray(True), np.asarray(4)  # tolerance, refined, highest derivative wanted
-        how = {"pose_type": model.pose_type, "order": 4, "width": lanes}
-        arrival = advance_in_lots(model.system, *given, settings, np.asarray(1), **how)
+        how = ("pose_type", model.pose_type), ("order", 4)
+        arrival = advance_instant.on_xla((model.system, *settings), (*given, np.zeros(lanes, bool)), how)
         return jax.block_until_ready((arrival.outputs[place], arrival.status))
 
     jets, status = run()

@@ -19,7 +19,7 @@ from jounce.cli import main
 from jounce.cli.compiled_programs import keep_programs
 from jounce.constraints import base
 from jounce.errors import OutputError
-from jounce.kinematics.rehearsal import NAME
+from jounce.execution.rehearsal import NAME
 from jounce.private_folder import PrivateFolder
 from tests.precision import watched
 from tests.shares_of_tests import pytest_addoption, pytest_collection_modifyitems  # noqa: F401 - found here by pytest

@@ -3,33 +3,37 @@
 import sys
 from collections.abc import Iterator
 
-from jounce.kinematics.compilation import Compiled
-from jounce.kinematics.side_by_side import SideBySide
+from jounce.execution.compilation import Compiled
+from jounce.execution.mapped import Mapped
 
 SOME = {"march", "leg", "exerted", "_balanced", "advance_instant"}
 
 
-def functions() -> dict[str, Compiled | SideBySide]:
+def functions() -> dict[str, Compiled | Mapped]:
     """Return them by name, of all modules that were imported."""
     found = {}
     for module in list(sys.modules.values()):
         if getattr(module, "__name__", "").startswith("jounce."):
             for value in vars(module).values():
-                if isinstance(value, Compiled | SideBySide):
+                if isinstance(value, Compiled | Mapped):
                     found[value.function.__name__] = value
     assert set(found) >= SOME
     return found
 
 
-def _programs(function: Compiled | SideBySide) -> Iterator[dict]:
-    yield function._programs
-    if isinstance(function, Compiled):
-        yield function._alone._programs
+def _by_xla(function: Compiled | Mapped) -> list[Compiled]:
+    return [function] if isinstance(function, Compiled) else [function.on_xla, function.in_rounds]
+
+
+def _programs(function: Compiled | Mapped) -> Iterator[dict]:
+    yield function.machine_code._programs
+    for compiled in _by_xla(function):
+        yield compiled._programs
 
 
 def counts() -> dict[str, int]:
     """Return how many programs there are, those of machine code among them."""
-    jitted = {n: f.jitted._cache_size() if isinstance(f, Compiled) else 0 for n, f in functions().items()}
+    jitted = {n: sum(c.jitted._cache_size() for c in _by_xla(f)) for n, f in functions().items()}
     return {name: jitted[name] + sum(map(len, _programs(function))) for name, function in functions().items()}
 
 

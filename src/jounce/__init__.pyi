@@ -63,6 +63,7 @@ from jounce.errors import (
     DesignError as DesignError,
     ExpressionError as ExpressionError,
     JounceError as JounceError,
+    MachineCodeWarning as MachineCodeWarning,
     MechanismError as MechanismError,
     MechanismFileError as MechanismFileError,
     MobilityError as MobilityError,

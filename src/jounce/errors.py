@@ -343,6 +343,10 @@ class AssemblyWarning(_BoundedWarning):
     """Bodies were put together with a part turned over in its joint, unlike in the starting guess."""
 
 
+class MachineCodeWarning(_BoundedWarning):
+    """XLA computes what there is no machine code for: the same results in two to six times the time."""
+
+
 class DamageWarning(_BoundedWarning):
     """Files of a result were lost or changed after they were written; what they held is computed again."""
 

@@ -138,7 +138,6 @@ def _after_fork() -> None:
     global _left_behind
     if "jax" not in sys.modules:
         return
-    from jax._src import xla_bridge
+    from jounce.jax_internals import processes_started
 
-    started = getattr(xla_bridge, "backends_are_initialized", lambda: True)  # private to JAX: if unknown, the worst
-    _left_behind = _left_behind or started()
+    _left_behind = _left_behind or processes_started()

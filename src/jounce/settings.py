@@ -19,9 +19,10 @@ from typing import Any, ParamSpec, TypeVar
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax._src import config, core  # what is private to JAX has no public name
 
 from jounce.errors import UnsupportedError
+from jounce.interrupts import left_behind
+from jounce.jax_internals import config, core
 from jounce.jax_options import OPTIONS
 
 _rooms: list[str] = []  # of which all that they offer computes in double precision
@@ -84,6 +85,19 @@ class _OwnSettings:
             other.__exit__(kind, error, place)
         if isinstance(error, AssertionError | RuntimeError):
             _check_device(error)
+
+
+def check_process() -> None:
+    """Raise UnsupportedError in a process that was forked after JAX had started: it would wait for ever.
+
+    XLA computes in threads, and a fork has none of them, only the locks that they held.
+    """
+    if left_behind():
+        raise UnsupportedError(
+            "this process was forked after JAX had already computed, and would wait forever for threads that a fork "
+            "does not have; start processes by 'spawn' or 'forkserver' (multiprocessing.get_context), or fork "
+            "before the first computation"
+        )
 
 
 def _check_device(error: BaseException) -> None:

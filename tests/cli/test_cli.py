@@ -398,7 +398,7 @@ def test_a_cache_that_cannot_be_made_does_no_harm(tmp_path):
 def test_a_command_that_fails_waits_for_no_program_that_is_compiled_beside(monkeypatch, rehearsing):
     ended = []
     monkeypatch.setattr("sys.argv", ["jounce", "run", "examples/no_such_file.yaml"])
-    monkeypatch.setattr("jounce.kinematics.rehearsal.is_rehearsing", lambda: rehearsing)
+    monkeypatch.setattr("jounce.execution.rehearsal.is_rehearsing", lambda: rehearsing)
     monkeypatch.setattr("jounce.cli.end_on_signals", lambda: None)
     monkeypatch.setattr("jounce.cli.gc", SimpleNamespace(freeze=lambda: None, set_threshold=lambda _: None))
     monkeypatch.setattr("jounce.cli.os._exit", ended.append)

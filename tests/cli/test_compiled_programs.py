@@ -12,7 +12,7 @@ import pytest
 
 from jounce.cli import compiled_programs
 from jounce.cli.compiled_programs import CheckedEntries, JaxEntries
-from jounce.kinematics import compilation, store
+from jounce.execution import compilation, store
 from jounce.private_folder import PrivateFolder
 
 FOUR_BAR = pathlib.Path(__file__).resolve().parents[2] / "examples" / "four_bar.yaml"

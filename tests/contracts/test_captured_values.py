@@ -21,8 +21,8 @@ import pytest
 import jounce as jn
 from jounce import jet
 from jounce.constraints import MotionLaw
-from jounce.kinematics import alone, side_by_side, store as programs
-from jounce.kinematics.alone import VARIABLE
+from jounce.execution import store as programs, translated
+from jounce.execution.backends import VARIABLE
 from tests.problems.own_types import taken_back
 
 GROUND = ("ground", "rod")
@@ -583,7 +583,7 @@ def test_machine_code_and_kept_programs(monkeypatch, machine_code, folder):
 def compilations(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     """Count what is compiled, by XLA or to machine code."""
     found: list[str] = []
-    made = alone.object_file
+    made = translated.object_file
 
     def counted(*arguments: Any, **keywords: Any) -> Any:
         found.append("machine code")
@@ -594,8 +594,7 @@ def compilations(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
         if "backend_compile" in event:
             found.append(event)
 
-    for module in (alone, side_by_side):
-        monkeypatch.setattr(module, "object_file", counted)
+    monkeypatch.setattr(translated, "object_file", counted)
     jax.monitoring.register_event_duration_secs_listener(listener)
     try:
         yield found

@@ -1,7 +1,7 @@
 """The same programs on a CUDA device, in double precision: their results are those of the processor to rounding.
 
 Where JAX finds no such device, the tests that need one are skipped, with what JAX says; what a GPU makes different,
-wider batches, is tested on the processor.
+wider rounds and blocks, is tested on the processor.
 """
 
 import json
@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.kinematics import wide_batches
-from jounce.kinematics.device import on_processor
-from jounce.robot import batches
+from jounce.execution import mapped
+from jounce.execution.device import on_processor
+from jounce.kinematics import instant_program
 from tests.problems.mechanisms import example, reference
 
 ROBOTS = Path(__file__).parents[2] / "examples" / "robots"
@@ -90,11 +90,12 @@ def test_a_default_device_is_asked_before_the_first_backend():
 
 
 @pytest.mark.slow
-def test_the_wide_batches_of_a_gpu_give_the_same_motion(monkeypatch):
+def test_the_wide_rounds_of_a_gpu_give_the_same_motion(monkeypatch):
     mechanism, grid = jn.load(example("four_bar")), np.linspace(0.0, 2.0, 1500)
     expected = jn.solve(mechanism, grid).outputs["psi"]
-    monkeypatch.setattr(wide_batches, "on_processor", lambda: False)
-    monkeypatch.setattr(wide_batches, "GPU_WIDTH", 2**10)
+    monkeypatch.setenv("JOUNCE_NATIVE", "0")
+    monkeypatch.setattr(instant_program, "on_processor", lambda: False)
+    monkeypatch.setattr(instant_program, "GPU_WIDTH", 2**10)
     found = jn.solve(mechanism, grid).outputs["psi"]
     assert np.all(peaks_apart(found, expected, 1) < ROUNDING)
 
@@ -102,8 +103,10 @@ def test_the_wide_batches_of_a_gpu_give_the_same_motion(monkeypatch):
 @pytest.mark.slow
 def test_the_wide_blocks_of_a_gpu_give_the_same_torques(monkeypatch):
     robot, q, expected = arm()
-    monkeypatch.setattr(batches, "on_processor", lambda: False)
-    monkeypatch.setattr(batches, "GPU_WIDTHS", (4, 8, 32))
+    monkeypatch.setenv("JOUNCE_NATIVE", "0")
+    monkeypatch.setattr(mapped, "on_processor", lambda: False)
+    monkeypatch.setattr(mapped, "SIDE_BY_SIDE", 4)
+    monkeypatch.setattr(mapped, "GPU_WIDTH", 16)
     for count in (0, 1, 5, 21):
         found = jn.inverse_dynamics(robot, q[:count])
         assert found.shape == (count, 3, 7)

@@ -18,7 +18,7 @@ import pytest
 import jounce as jn
 from tests.precision import watched
 
-WITHOUT = ("cli", "native", "papers", "reporting", "io")  # rooms that offer nothing, or say it function by function
+WITHOUT = ("cli", "execution", "papers", "reporting", "io")  # rooms that offer nothing, or say it function by function
 ROOMS = [room.name for room in pkgutil.iter_modules(jn.__path__) if room.ispkg and room.name not in WITHOUT]
 FOR_JAX = {"tree_flatten", "tree_unflatten", "mro"}  # which JAX calls within programs of any precision
 

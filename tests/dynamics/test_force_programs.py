@@ -7,10 +7,10 @@ import pytest
 
 import jounce as jn
 from jounce.dynamics.inverse import MotionForces
-from jounce.native import machine, programs
+from jounce.execution.llvm import programs, self_test
 
 pytestmark = pytest.mark.skipif(
-    not machine.is_usable(), reason="there is no compiler, or a system where it was not tried"
+    not self_test.is_usable(), reason="there is no compiler, or a system where it was not tried"
 )
 Z = [0.0, 0.0, 1.0]
 

@@ -14,7 +14,7 @@ import jounce as jn
 from jounce import drivers, forces, planar, spatial
 from jounce.dynamics.forward import State, expand
 from jounce.dynamics.start import consistent_start
-from jounce.kinematics.compilation import compiled
+from jounce.execution.compilation import compiled
 from tests.oracles import mp_benchmarks
 from tests.oracles.mp_dynamics import Problem
 from tests.problems import dynamics, massed

@@ -11,7 +11,7 @@ import jounce as jn
 from jounce.dynamics.forward import expand, inverted
 from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.dynamics.start import consistent_start
-from jounce.kinematics.compilation import compiled
+from jounce.execution.compilation import compiled
 from jounce.mechanism import build
 from tests.problems import dynamics
 

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jounce as jn
-from jounce.kinematics.compilation import compiler_options
+from jounce.execution.compilation import compiler_options
 from jounce.mechanism import build
 from jounce.rigid import PlanarPose, SpatialPose
 from tests.oracles.mp_wrenches import Moving, rates

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.native import machine, programs
+from jounce.execution.llvm import programs, self_test
 
 pytestmark = pytest.mark.skipif(
-    not machine.is_usable(), reason="there is no compiler, or a system where it was not tried"
+    not self_test.is_usable(), reason="there is no compiler, or a system where it was not tried"
 )
 
 
@@ -28,6 +28,7 @@ def both_ways(mechanism, times, monkeypatch, **given):
     monkeypatch.setenv("JOUNCE_NATIVE", "0")
     wanted = jn.simulate(mechanism, times, **given)
     assert not called
+    assert (found.backend, wanted.backend) == ("llvm", "xla")
     return found, wanted
 
 

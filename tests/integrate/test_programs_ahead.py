@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.execution.llvm import self_test
+from jounce.execution.rehearsal import NAME
+from jounce.execution.translated import Translated
 from jounce.integrate.marching import march
 from jounce.integrate.simulation import expanded
-from jounce.kinematics.alone import Alone
-from jounce.kinematics.rehearsal import NAME
-from jounce.kinematics.side_by_side import SideBySide
-from jounce.native import machine
 from tests.problems.dynamics import simple_pendulum
 
 needs_machine_code = pytest.mark.skipif(
-    not machine.is_usable(), reason="there is no compiler, or a system where it was not tried"
+    not self_test.is_usable(), reason="there is no compiler, or a system where it was not tried"
 )
 
 
@@ -24,16 +23,14 @@ needs_machine_code = pytest.mark.skipif(
 def made(monkeypatch):
     """What machine code is made of, but for that of starts."""
     monkeypatch.delenv("JOUNCE_NATIVE", raising=False)
-    found = []
-    for kind in (Alone, SideBySide):
-        make = kind._made
+    found, make = [], Translated._made
 
-        def told(self, *given, make=make, **named):
-            if self.function.__name__ in ("march", "_expanded"):
-                found.append(self.function.__name__)
-            return make(self, *given, **named)
+    def told(self, *given, **named):
+        if self.function.__name__ in ("march", "expanded"):
+            found.append(self.function.__name__)
+        return make(self, *given, **named)
 
-        monkeypatch.setattr(kind, "_made", told)
+    monkeypatch.setattr(Translated, "_made", told)
     return found
 
 
@@ -48,18 +45,18 @@ def test_they_are_those_of_the_run(made, monkeypatch, threads):
     monkeypatch.setenv("JOUNCE_THREADS", threads)
     tolerance = {"1": 3e-5, "2": 2e-6}[threads]
     found = swing(simple_pendulum(0.3, 1.0), tolerance)
-    assert sorted(made) == ["_expanded", "march"]
+    assert sorted(made) == ["expanded", "march"]
     again = swing(simple_pendulum(0.4, 1.0), tolerance)
-    assert sorted(made) == ["_expanded", "march"]
+    assert sorted(made) == ["expanded", "march"]
     assert found.outputs["angle"][0, 0] != again.outputs["angle"][0, 0]
 
 
 def test_xla_compiles_each_once(monkeypatch):
     monkeypatch.setenv("JOUNCE_NATIVE", "0")
     monkeypatch.setenv("JOUNCE_THREADS", "2")
-    before = [program.jitted._cache_size() for program in (march, expanded)]
+    before = [program.jitted._cache_size() for program in (march, expanded.on_xla)]
     swing(simple_pendulum(0.3, 1.0), 7e-6)
-    assert [program.jitted._cache_size() for program in (march, expanded)] == [count + 1 for count in before]
+    assert [program.jitted._cache_size() for program in (march, expanded.on_xla)] == [count + 1 for count in before]
 
 
 @needs_machine_code
@@ -69,7 +66,7 @@ def test_those_with_redundant_rows_begin_with_the_start(made, monkeypatch):
     pendulum = simple_pendulum(0.3, 1.0)
     joints = pendulum.joints | {"again": next(iter(pendulum.joints.values()))}
     swing(dataclasses.replace(pendulum, joints=joints), 1e-7)
-    assert sorted(made) == ["_expanded", "march"]
+    assert sorted(made) == ["expanded", "march"]
 
 
 def test_a_start_that_is_refused_is_told_and_no_further_program_is_begun(made, monkeypatch):
@@ -81,4 +78,4 @@ def test_a_start_that_is_refused_is_told_and_no_further_program_is_begun(made, m
     for thread in threading.enumerate():
         if thread.name == NAME:
             thread.join()
-    assert "_expanded" not in made
+    assert "expanded" not in made

@@ -7,8 +7,8 @@ import pytest
 
 import jounce as jn
 from jounce import drivers, forces, planar, spatial
-from jounce.kinematics.alone import is_wanted
-from jounce.kinematics.compilation import Compiled
+from jounce.execution.backends import is_wanted
+from jounce.execution.compilation import Compiled
 from tests.problems.dynamics import GRAVITY, simple_pendulum
 
 GRID = [0.0, 0.4, 1.1, 2.0]
@@ -34,11 +34,11 @@ def test_a_short_run_calls_few_programs(monkeypatch):
         return call(self, *arguments, **keywords)
 
     pendulum = simple_pendulum(0.3, 0.0)
-    jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)  # `_expanded` is traced here, with `output_series` in it
+    jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)  # `expanded` is traced here, with `output_series` in it
     monkeypatch.setattr(Compiled, "__call__", told)
     jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)
     start = ["_moved", "_with_rates_told", "_judged"]
-    assert called == [*start, "march", *([] if is_wanted() else ["_expanded"])]  # else it is machine code of an instant
+    assert called == [*start, "march", *([] if is_wanted() else ["_block"])]  # else it is machine code of an instant
 
 
 @pytest.mark.slow

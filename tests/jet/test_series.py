@@ -7,10 +7,10 @@ import pytest
 from mpmath import mp
 
 import jounce as jn
+from jounce.execution.compilation import compiler_options
 from jounce.jet import Jet, elementary
 from jounce.jet.operations import COMPOSED, LINEAR, PAIRS, SLOPES, STEPWISE
 from jounce.jet.series import Recursion
-from jounce.kinematics.compilation import compiler_options
 from tests.oracles import mp_taylor
 
 ORDER = 6

@@ -12,8 +12,8 @@ from jounce.jet import Jet
 from jounce.kinematics import Status
 from jounce.kinematics.advance import _status
 from jounce.kinematics.assembly import assemble
-from jounce.kinematics.linear import DenseFactor
 from jounce.kinematics.solver import Solver
+from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism import build
 from tests.problems.small import crank, distance_slider, four_bar, slider_crank
 

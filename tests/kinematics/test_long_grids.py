@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.execution.device import on_processor
 from jounce.kinematics import Status
-from jounce.kinematics.device import on_processor
-from jounce.kinematics.wide_batches import lot_width
+from jounce.kinematics.instant_program import round_width
 from jounce.mechanism import build
 from tests.problems.small import four_bar, slider_crank
 
@@ -71,4 +71,4 @@ def test_a_large_mechanism_is_solved_fewer_instants_side_by_side():
     many = jn.Mechanism(
         space="planar", bodies={f"b{k}": jn.Body([k, 0]) for k in range(30)}, joints=pins, drivers=drivers
     )
-    assert lot_width(build(many).system) < lot_width(build(four_bar()).system)
+    assert round_width(build(many).system) < round_width(build(four_bar()).system)

@@ -28,7 +28,7 @@ def assembled(request):
     @jax.jit
     def solved(step, refine):
         guess = begun.displaced(*system.coordinates(step, begun.shifts))
-        return newton_raphson(system, guess, time, np.asarray(TOLERANCE), refine, 0)
+        return newton_raphson(system, guess, time, np.asarray(TOLERANCE), refine)
 
     @jax.jit
     def judged(pose, factor, known):

@@ -6,8 +6,8 @@ import pytest
 
 import jounce as jn
 from jounce.jet import Jet
+from jounce.kinematics.instant_program import advance_instant
 from jounce.kinematics.legs import leg
-from jounce.kinematics.wide_batches import advance_in_lots
 from jounce.mechanism import build
 from tests.problems.small import crank, four_bar, law, screw, slider_crank, spindle
 
@@ -114,7 +114,8 @@ def test_long_grid_is_the_short_one_and_progress_is_told():
 
 
 def compilations():
-    return advance_in_lots.jitted._cache_size() + leg.jitted._cache_size()
+    by_xla = advance_instant.on_xla, advance_instant.in_rounds, leg
+    return sum(one.jitted._cache_size() for one in by_xla) + len(advance_instant.machine_code)
 
 
 def test_parameters_and_number_of_instants_compile_nothing_again():

@@ -54,7 +54,7 @@ def test_a_bennett_linkage_moves_as_its_closed_form():
 def test_fronts_and_dense_least_squares_find_the_same(monkeypatch):
     dense = jn.solve(overconstrained.sarrus().mechanism, TIMES, order=1)
     assert dense.model.system.fronts is None
-    monkeypatch.setattr("jounce.mechanism.fronts.MOST_DENSE", 0)
+    monkeypatch.setattr("jounce.linear_algebra.fronts.MOST_DENSE", 0)
     builder._layout.cache_clear()
     fronts = jn.solve(overconstrained.sarrus().mechanism, TIMES, order=1)
     builder._layout.cache_clear()

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.kinematics import Status, host_jacobian
+from jounce.kinematics import Status
+from jounce.linear_algebra import host_jacobian
 
 TIME = np.linspace(0.0, 0.1, 3)
 FLAT = (90e-3, 140e-3, 100e-3, 130e-3)  # crank and coupler are as long as base and rocker

@@ -1,12 +1,12 @@
-"""Spans of a grid: each instant once, after what it starts from; the same motion to the bit as level after level."""
+"""Spans of a grid: each instant once, after what it starts from; the same motion as one instant after another."""
 
 import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.execution.llvm.self_test import is_usable
 from jounce.kinematics import Status, grid, long_grids, spans
 from jounce.kinematics.spans import rounds, spans_of
-from jounce.native.machine import is_usable
 from tests.problems.small import four_bar, slider_crank
 
 needs_machine_code = pytest.mark.skipif(
@@ -51,8 +51,8 @@ def assert_same(one, other):
     assert one.faults == other.faults
 
 
-def level_after_level(monkeypatch, mechanism, time, **given):
-    """The motion of machine code without rounds."""
+def in_turn(monkeypatch, mechanism, time, **given):
+    """The motion without rounds."""
     with monkeypatch.context() as patch:
         patch.setattr(grid.GridSolver, "_in_spans", lambda self, left, *_: left)
         return jn.solve(mechanism, time, **given, strict=False, threads=1)
@@ -61,9 +61,9 @@ def level_after_level(monkeypatch, mechanism, time, **given):
 @needs_machine_code
 @pytest.mark.parametrize("order", [0, 4, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("count", [1025, 4097])
-def test_motions_are_those_of_levels(monkeypatch, count, order):
+def test_motions_are_those_without_rounds(monkeypatch, count, order):
     time = np.linspace(0, 2, count)
-    expected = level_after_level(monkeypatch, four_bar(), time, order=order)
+    expected = in_turn(monkeypatch, four_bar(), time, order=order)
     for threads in (1, 2):
         assert_same(jn.solve(four_bar(), time, order=order, threads=threads), expected)
 
@@ -79,16 +79,30 @@ FAILING = {
 @needs_machine_code
 @pytest.mark.parametrize("keep", [True, False])
 @pytest.mark.parametrize("name", FAILING)
-def test_failures_are_those_of_levels(monkeypatch, name, keep):
+def test_failures_are_those_without_rounds(monkeypatch, name, keep):
     time = np.linspace(0, 2, 2049)
-    expected = level_after_level(monkeypatch, FAILING[name], time, order=3, keep=keep)
+    expected = in_turn(monkeypatch, FAILING[name], time, order=3, keep=keep)
     found = jn.solve(FAILING[name], time, order=3, keep=keep, strict=False, threads=2)
     assert_same(found, expected)
 
 
+@pytest.mark.parametrize("native", [pytest.param("1", marks=needs_machine_code), "0"])
+@pytest.mark.parametrize("name", ["nothing", "a dead point", "a law out of its range", "change points"])
+def test_xla_has_the_same_outcome(monkeypatch, name, native):
+    """By rounds as wide as the cache holds: the same statuses, and numbers to rounding."""
+    mechanism, time = FAILING.get(name, four_bar()), np.linspace(0, 2, 1500)
+    expected = jn.solve(mechanism, time[::100], order=2, strict=False)
+    monkeypatch.setenv("JOUNCE_NATIVE", native)
+    found = jn.solve(mechanism, time, order=2, strict=False)
+    np.testing.assert_array_equal(found.status[::100] == Status.OK, expected.status == Status.OK)
+    for output, wanted in expected.outputs.items():
+        peak = np.nanmax(np.abs(wanted), axis=0) + 1e-300
+        np.testing.assert_allclose(found.outputs[output][::100] / peak, wanted / peak, rtol=0, atol=1e-9)
+
+
 @needs_machine_code
 def test_instants_that_start_from_failures_are_solved_again(monkeypatch):
-    """Where machine code tells that some instants failed, they and what starts from them go level after level."""
+    """Where it is told that some instants failed, they and what starts from them are solved once more."""
     time, again = np.linspace(0, 2, 3001), []
     expected = jn.solve(four_bar(), time)
     in_spans, solve = grid.GridSolver._in_spans, spans._Room.solve

@@ -7,12 +7,13 @@ import pytest
 
 import jounce as jn
 from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
-from jounce.robot.batches import CHUNK, WIDTHS
+from jounce.robot.batches import WIDTHS
 from jounce.robot.inverse_dynamics import _generalised_forces
 from tests.problems.robots import random_robot
 
 ROBOT = random_robot(5, 4, tree=False)
 LAST = ROBOT.moving_links[-1]
+CHUNK = WIDTHS[1]
 Q = np.random.default_rng(1).uniform(-1, 1, (2 * WIDTHS[-1] + 1, 4, 4))
 
 
@@ -49,7 +50,7 @@ def test_shapes_of_batches_are_kept(torque, lead):
 
 
 def compilations():
-    return _generalised_forces.jitted._cache_size() + len(_generalised_forces.machine_code)
+    return _generalised_forces.jitted._cache_size() + len(_generalised_forces.mapped.machine_code)
 
 
 def test_values_and_robots_of_one_kind_compile_nothing_again(torque):

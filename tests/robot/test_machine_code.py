@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.kinematics.alone import VARIABLE
-from jounce.native.machine import is_usable
+from jounce.execution.backends import VARIABLE
+from jounce.execution.llvm.self_test import is_usable
 from jounce.robot.batches import LEAST_THREADED
 from jounce.robot.forward_dynamics import _moved
 from jounce.robot.inverse_dynamics import _generalised_forces
@@ -57,7 +57,7 @@ def test_torques_agree(monkeypatch, robot, count):
     q = motion(robot, count, 4)
     expected, found = both_ways(monkeypatch, lambda: jn.inverse_dynamics(robot, q, drives=True))
     assert_same(found, expected)
-    assert _generalised_forces.machine_code.program((robot.tree, ()), (q,), static=((), True)) is not None
+    assert _generalised_forces.mapped.program((robot.tree, ()), (q,), static=((), True)).backend == "llvm"
 
 
 @pytest.mark.slow
@@ -101,7 +101,7 @@ def test_free_motion_gives_back_its_torques(monkeypatch, robot, levels):
     again = jn.inverse_dynamics(robot, found, drives=True)
     size = np.abs(found[:, 2:]).max(axis=(0, 2)) * np.abs(jn.mass_matrix(robot, q[:, 0])).max() + 1.0
     assert (np.abs(again - tau) <= 1e-12 * size[:, None]).all()
-    assert len(_moved.machine_code)
+    assert len(_moved.mapped.machine_code)
 
 
 def test_threads_change_no_bit(monkeypatch):

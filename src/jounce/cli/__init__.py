@@ -137,9 +137,9 @@ def _settings() -> AbstractContextManager[Any]:
 
 def _end_at_once(status: int) -> None:
     """End the process without waiting for programs that threads still compile, which nobody wants any more."""
-    if "jounce.kinematics.rehearsal" not in sys.modules:
+    if "jounce.execution.rehearsal" not in sys.modules:
         return
-    from jounce.kinematics.rehearsal import is_rehearsing
+    from jounce.execution.rehearsal import is_rehearsing
 
     if is_rehearsing():
         sys.stdout.flush()

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from jounce.errors import OutputError
-from jounce.kinematics import store
-from jounce.kinematics.compilation import compiles_anew
+from jounce.execution import store
+from jounce.execution.compilation import compiles_anew
 from jounce.private_folder import PrivateFolder
 
 ENDING = ".program"
@@ -79,7 +79,7 @@ class CheckedEntries:
 
 
 class JaxEntries(CheckedEntries):
-    """The programs that JAX keeps by itself: those that `jounce.kinematics.store` does not."""
+    """The programs that JAX keeps by itself: those that `jounce.execution.store` does not."""
 
     def get(self, key: str) -> bytes | None:
         """Return the program of this key, or None, as it is where programs are to be compiled anew."""
@@ -97,13 +97,13 @@ def keep_programs(folder: PrivateFolder) -> bool:
     Returns whether they are in checked files.
     """
     import jax
-    from jax._src import compilation_cache
+
+    from jounce.jax_internals import use_file_cache
 
     def file_cache(path: str) -> Any:
         return JaxEntries(folder), path
 
-    if known := hasattr(compilation_cache, "get_file_cache"):
-        compilation_cache.get_file_cache = file_cache
+    known = use_file_cache(file_cache)
     jax.config.update("jax_compilation_cache_dir", str(folder.path))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.01)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)

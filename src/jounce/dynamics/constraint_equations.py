@@ -21,12 +21,12 @@ from jounce.dynamics.mechanism_state import MotionAtState, at_state
 from jounce.dynamics.motion_values import Coordinates, cut, derivatives_along, pose_of
 from jounce.dynamics.saddle_point import Jacobian, MassMatrix, block_diagonal, even_scale, saddle_point
 from jounce.errors import MechanismError
+from jounce.execution.chunks import in_chunks
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.chunks import in_chunks
-from jounce.kinematics.compilation import compiled
-from jounce.kinematics.host_jacobian import RANK_TOLERANCE
+from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism
 from jounce.mechanism.element_indices import ElementIndex, element_indices
 from jounce.mechanism.preconditions import concrete

@@ -27,9 +27,9 @@ from jounce.dynamics.saddle_point import (
 )
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked, total
-from jounce.kinematics.frontal import FrontalFactor
 from jounce.kinematics.jacobian_series import Slope, solver
-from jounce.kinematics.linear import DenseFactor
+from jounce.linear_algebra.frontal import FrontalFactor
+from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.system import LeftOut, System, with_rows
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers

@@ -20,12 +20,12 @@ from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import Masses, required_masses
 from jounce.dynamics.motion_values import Coordinates, cut, labelled, pose_of
 from jounce.errors import MechanismError
+from jounce.execution.chunks import in_chunks
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion
 from jounce.kinematics.change_points import spoiled
-from jounce.kinematics.chunks import in_chunks
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.factors import Factor, factored
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.element_indices import element_indices

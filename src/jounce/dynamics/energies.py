@@ -17,10 +17,10 @@ from jaxtyping import Float
 from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses, second_moments
 from jounce.dynamics.motion_values import Coordinates, check_motion, cut, held, labelled, pose_of
 from jounce.errors import JounceError, MechanismError, RobotError, flag, whole_number
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.solve import HIGHEST_ORDER
 from jounce.mechanism.system import Group
 from jounce.rigid import PlanarPose

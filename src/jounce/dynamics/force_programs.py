@@ -19,12 +19,12 @@ from jounce.dynamics.forward import Lanes
 from jounce.dynamics.loads import loads, mass_matrices
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.dynamics.motion_values import Coordinates, in_lots, part_of, pose_of
+from jounce.execution.compilation import compiled
+from jounce.execution.mapped import Mapped, OnLlvm
+from jounce.execution.store import is_wanted_soon
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked, total
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.jacobian_series import along_displacements, slopes
-from jounce.kinematics.side_by_side import Prepared, SideBySide
-from jounce.kinematics.store import is_wanted_soon
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import Group, System, movable, with_rows
 from jounce.rigid.pose import Pose
@@ -70,7 +70,7 @@ def multipliers(
     return in_lots(of_lot, LOT, blocks, load, mass) if dense else of_lot(blocks, load, mass)
 
 
-@SideBySide
+@Mapped
 def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, Any]:
     """Return multipliers of one instant for some cases, and which applied forces are finite there.
 
@@ -100,9 +100,10 @@ def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, A
     return multipliers.function(system, blocks, load, still, masses, pose_type)[None], finite
 
 
-def balance_of_instant(shared: Any, lanes: Any, pose_type: type[Pose]) -> Prepared | None:
+def balance_of_instant(shared: Any, lanes: Any, pose_type: type[Pose]) -> OnLlvm | None:
     """Return machine code for `_balanced`, None where there is none; any instant serves as an example."""
-    return _balanced.program(shared, lanes, large=LARGE, hasty=is_wanted_soon(), pose_type=pose_type)
+    program = _balanced.program(shared, lanes, large=LARGE, hasty=is_wanted_soon(), pose_type=pose_type)
+    return program if isinstance(program, OnLlvm) else None  # XLA's programs are those of each kind of joint
 
 
 @compiled(brief=True)

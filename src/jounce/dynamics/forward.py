@@ -37,8 +37,8 @@ from jounce.dynamics.saddle_point import (
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.jet.series import Recursion
-from jounce.kinematics.least_squares import range_basis
-from jounce.kinematics.linear import DenseFactor
+from jounce.linear_algebra.least_squares import range_basis
+from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import System
 from jounce.modules import Module

@@ -17,9 +17,9 @@ from jounce.errors import MechanismError
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.change_points import spoiled
+from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism.axis_angles import at_lanes, measures_angle
 from jounce.mechanism.element_indices import ElementIndex, element_indices, force_names
-from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.system import Group, law_left_out
 from jounce.shapes import Numbers

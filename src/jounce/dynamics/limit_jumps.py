@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.trajectories import BLOCK, FollowedTrajectory
-from jounce.kinematics.chunks import in_chunks
+from jounce.execution.chunks import in_chunks
 from jounce.trajectory.seen_jumps import level_sizes, seen_jumps
 from jounce.trajectory.smoothness import known_jumps
 from jounce.trajectory.stacking import law_derivatives

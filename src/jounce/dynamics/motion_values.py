@@ -9,11 +9,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.errors import MechanismError
+from jounce.execution.chunks import in_chunks
+from jounce.execution.device import on_processor
 from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.chunks import in_chunks
-from jounce.kinematics.device import on_processor
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 from jounce.units.shown_units import time_axes

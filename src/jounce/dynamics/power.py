@@ -11,10 +11,10 @@ from jounce.dynamics.forward import Lanes
 from jounce.dynamics.inverse import MotionForces
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.dynamics.motion_values import Coordinates, check_motion, labelled, pose_of
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
-from jounce.kinematics.compilation import compiled
 from jounce.mechanism.axis_angles import at_lanes
 from jounce.mechanism.system import Group
 from jounce.rigid import PlanarPose

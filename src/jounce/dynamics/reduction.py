@@ -16,7 +16,7 @@ from jaxtyping import Float
 from jounce.dynamics.forward import Equations
 from jounce.dynamics.variations import LEVELS, law_variations, loads_at, masses_at, output_variations, variations
 from jounce.errors import MechanismError, check_name
-from jounce.kinematics.host_jacobian import RANK_TOLERANCE
+from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.element_indices import element_indices

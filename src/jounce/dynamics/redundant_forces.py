@@ -23,9 +23,9 @@ from jaxtyping import Float
 from jounce.dynamics.constraint_forces import Slopes, by_group, jacobian_of, onto_bodies, work_along
 from jounce.dynamics.saddle_point import as_column, by_body, saddle_point
 from jounce.errors import MechanismError
-from jounce.kinematics.least_squares import range_basis
-from jounce.kinematics.linear import DenseFactor
 from jounce.kinematics.redundancy import repetitions
+from jounce.linear_algebra.least_squares import range_basis
+from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism import Model
 from jounce.mechanism.system import System
 from jounce.shapes import Numbers

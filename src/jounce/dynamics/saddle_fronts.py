@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.dynamics.saddle_point import BodyMatrices
-from jounce.kinematics.frontal import FrontalFactor
-from jounce.kinematics.frontal_inverse import FrontalInverse, InversePlan
-from jounce.mechanism.fronts import Fronts
-from jounce.mechanism.pattern import Pattern
+from jounce.linear_algebra.frontal import FrontalFactor
+from jounce.linear_algebra.frontal_inverse import FrontalInverse, InversePlan
+from jounce.linear_algebra.fronts import Fronts
+from jounce.linear_algebra.pattern import Pattern
 from jounce.modules import Module
 from jounce.shapes import Numbers
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.jet.algebra import total
-from jounce.kinematics.linear import DenseFactor
+from jounce.linear_algebra.linear import DenseFactor
 from jounce.modules import Module
 from jounce.shapes import Numbers
 

@@ -14,14 +14,14 @@ from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses
 from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.dynamics.saddle_point import even_scale
 from jounce.errors import AssemblyError, MechanismError, MobilityError
+from jounce.execution.compilation import compiled
+from jounce.execution.device import resident
 from jounce.jet import Jet
 from jounce.kinematics.advance import LARGEST_CONTRADICTION
 from jounce.kinematics.assembly import SETTLED, assemble, freely_moving
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.curves.choice import chosen
-from jounce.kinematics.device import resident
-from jounce.kinematics.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.kinematics.status import Status
+from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import released, with_reference
 from jounce.modules import unchecked, with_fields

@@ -13,12 +13,12 @@ from jounce.dynamics.reduction import Place
 from jounce.dynamics.start import TOLERANCE
 from jounce.dynamics.variations import LEVELS, at_rest, clock_at, residuals_at, sizes_of_forces
 from jounce.errors import SolveError
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.kinematics import Status
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.gauss_newton import put_together
-from jounce.kinematics.host_jacobian import RANK_TOLERANCE
 from jounce.kinematics.initial_turns import Coordinates
+from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.builder import pose_at, with_reference
 from jounce.mechanism.element_indices import force_names

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, UnitWarning, flag, no_such
-from jounce.kinematics.chunks import in_chunks
+from jounce.execution.chunks import in_chunks
 from jounce.robot.arguments import joints_of, whole_number
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.model import Limits

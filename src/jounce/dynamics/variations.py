@@ -17,9 +17,9 @@ from jounce.dynamics.driver_coordinates import with_changes
 from jounce.dynamics.forward import Equations, conjugate
 from jounce.dynamics.loads import inertia_forces, mass_matrices
 from jounce.dynamics.motion_values import pose_of
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
-from jounce.kinematics.compilation import compiled
 from jounce.mechanism.system import Group, movable
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers

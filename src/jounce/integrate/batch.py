@@ -13,6 +13,7 @@ from jaxtyping import Float, Int
 from jounce.display import Displayed
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.start import consistent_start, initial_as_drivers
+from jounce.execution.threads import in_callers_context
 from jounce.integrate.batch_equations import BatchStart, ParametricMechanism, Turns
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
@@ -26,7 +27,6 @@ from jounce.jet.turns import brought_near, whole_periods
 from jounce.kinematics import Status
 from jounce.kinematics.families import checked_values
 from jounce.kinematics.pose_outputs import output_series
-from jounce.kinematics.threads import in_callers_context
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
 from jounce.mechanism.axis_angles import measures_angle, raw_angles, with_turns
 from jounce.mechanism.builder import with_reference
@@ -343,7 +343,7 @@ class _Runs:
             time = self.instants[at[lanes]]
             since = time - begin[lanes]
             started = polynomial.map(lambda part, lanes=lanes: part[..., lanes])
-            *_, found = expanded(shared, (turned_by, started, since, time), order=self._expansion)
+            *_, found = expanded.on_xla(shared, (turned_by, started, since, time), (("order", self._expansion),))
             for which, (group, series) in enumerate(zip(outputs, map(np.array, found), strict=True)):
                 if which in before and measures_angle(group):
                     series[0, 0] = brought_near(series[0, 0], before[which][:, lanes])

@@ -15,11 +15,11 @@ from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.dynamics.saddle_fronts import SaddleFronts
 from jounce.dynamics.start import consistent_start, with_rates
 from jounce.errors import JounceError, MobilityError
+from jounce.execution.compilation import compiled
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.projection import projected
 from jounce.jet import Jet
 from jounce.jet.turns import brought_near
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.axis_angles import measures_angle, raw_angles

@@ -16,10 +16,10 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.forward import Equations, State
 from jounce.errors import UnsupportedError
+from jounce.execution.compilation import compiled
 from jounce.integrate.breaks import Break
 from jounce.integrate.marching import DenseOutput
 from jounce.integrate.methods import LOWEST_ORDER, evaluated
-from jounce.kinematics.compilation import compiled
 from jounce.shapes import Numbers
 
 MOST_STEPS = 2**17

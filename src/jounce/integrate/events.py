@@ -13,8 +13,8 @@ from jaxtyping import Float, Int
 from jounce.dynamics.forward import State, turns_with_ground, with_ground
 from jounce.dynamics.motion_values import Coordinates
 from jounce.errors import MechanismError
+from jounce.execution.chunks import in_chunks
 from jounce.jet.turns import counted_by_rates
-from jounce.kinematics.chunks import in_chunks
 from jounce.kinematics.pose_outputs import output_series
 from jounce.mechanism import AbstractOutput
 from jounce.mechanism.system import Group

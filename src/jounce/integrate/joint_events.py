@@ -10,10 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.errors import RobotError, check_name
+from jounce.execution.chunks import in_chunks
 from jounce.integrate.events import EDGE, INTERPOLATION, NODES, WIDTHS, crossings
 from jounce.integrate.robot_marching import RobotSteps
 from jounce.jet.compose import OfSample
-from jounce.kinematics.chunks import in_chunks
 from jounce.robot.arguments import whole_number
 from jounce.robot.robot import Robot
 

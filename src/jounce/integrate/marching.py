@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.dynamics.forward import Equations, Expansion, Flags, Indices, Lanes, State, expand, inverted
+from jounce.execution.compilation import compiled
 from jounce.integrate.energy_balance import Balance, begun, energies, followed as follow_balance, is_balanced, unknown
 from jounce.integrate.lookahead import (
     FINEST,
@@ -23,8 +24,6 @@ from jounce.integrate.lookahead import (
 from jounce.integrate.methods import MARGIN, NEEDED, AbstractMethod, Number, near_singular
 from jounce.integrate.projection import projected
 from jounce.integrate.turns import AnglesOfForces, followed, measured
-from jounce.kinematics.compilation import compiled
-from jounce.kinematics.kernels import LIBRARIES, in_one_piece
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.shapes import Numbers
 
@@ -145,7 +144,7 @@ def _is_one(_: Equations, current: IntegratorState, *__: Any, **___: Any) -> boo
     return len(current.time) == 1
 
 
-@compiled("count", "keep", without=LIBRARIES, alone=_is_one)
+@compiled("count", "keep", alone=_is_one)
 def march(
     equations: Equations,
     current: IntegratorState,
@@ -271,9 +270,7 @@ def march(
 
     kept = _blank(method, current, count) if keep else None
     start = (current, kept, 0)
-    if len(current.time) > 1:  # arrays of many runs are worth a call for each operation
-        return jax.lax.while_loop(unfinished, iterate, start)
-    return in_one_piece(lambda carry: jax.lax.while_loop(unfinished, iterate, carry), start)
+    return jax.lax.while_loop(unfinished, iterate, start)
 
 
 def _blank(

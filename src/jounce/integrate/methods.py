@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 
 from jounce.dynamics.forward import Equations, Expansion, Flags, Inverse, Lanes, State
 from jounce.errors import JounceError
-from jounce.kinematics.alone import is_traced_alone
+from jounce.execution.translated import is_traced_alone
 from jounce.modules import Module
 from jounce.shapes import Numbers
 

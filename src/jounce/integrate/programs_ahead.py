@@ -11,19 +11,19 @@ from jaxtyping import Float
 from jounce.dynamics.forward import Equations, State
 from jounce.dynamics.masses import gravity_of, required_masses
 from jounce.dynamics.start import ConsistentStart, at_rest, equations_of
+from jounce.execution.backends import is_wanted
+from jounce.execution.compilation import check_wanted
+from jounce.execution.device import resident
+from jounce.execution.llvm.modules import telling
+from jounce.execution.rehearsal import first_time, rehearsed
 from jounce.integrate.events import pose_coordinates
 from jounce.integrate.marching import DenseOutput, IntegratorState, Outcome, march, unexpanded
 from jounce.integrate.methods import AbstractMethod
 from jounce.integrate.simulation import FEW_INSTANTS, derivatives_of_motion, motion_at
 from jounce.integrate.user_methods import integrator
-from jounce.kinematics.alone import is_wanted
-from jounce.kinematics.compilation import check_wanted
-from jounce.kinematics.device import resident
 from jounce.kinematics.forces_at_rest import ask_forces_at_rest
-from jounce.kinematics.rehearsal import first_time, rehearsed
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.builder import released
-from jounce.native.modules import telling
 
 STEPS = 64  # tried between two looks at progress and events
 

@@ -10,11 +10,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float, Int
 
+from jounce.execution.compilation import compiled
 from jounce.integrate.lookahead import HARMLESS, NEAR, POINTS, SHORTEST, SPAN_POINTS, finest, steps_counted
 from jounce.integrate.marching import SHORT as UNUSUAL, Outcome
 from jounce.integrate.methods import MARGIN, NEEDED, ROUNDING, Lanes, furthest
 from jounce.jet.series import Recursion
-from jounce.kinematics.compilation import compiled
 from jounce.modules import Module
 from jounce.robot.joint_laws import AbstractJointLaws
 from jounce.robot.motion_series import MotionSeries, motion_series

@@ -14,12 +14,13 @@ from jaxtyping import Float, Int
 
 from jounce.display import Displayed
 from jounce.errors import RobotError
+from jounce.execution.backends import xla_backend
+from jounce.execution.chunks import in_chunks
+from jounce.execution.compilation import compiled
 from jounce.integrate.methods import Lanes
 from jounce.integrate.robot_marching import RobotProblem, RobotState, RobotSteps, at
 from jounce.jet import Jet, compose
 from jounce.kinematics import Status
-from jounce.kinematics.chunks import in_chunks
-from jounce.kinematics.compilation import compiled
 from jounce.robot.base_motion import BaseMotion
 from jounce.robot.inverse_dynamics import inverse_dynamics
 from jounce.robot.robot import Robot
@@ -62,6 +63,8 @@ class RobotSimulation(Displayed):
         For each event asked for, the times at which it happened, s.
     steps : RobotSteps
         As polynomials.
+    backend : str
+        Which arithmetic gave the numbers: "xla", with the device unless that is the processor.
     """
 
     def __init__(
@@ -75,6 +78,7 @@ class RobotSimulation(Displayed):
         events: list[list[float]] | None = None,
         wrenches: tuple[Wrench, ...] = (),
     ):
+        self.backend = xla_backend()
         self.robot, self.time, self.order, self.steps = robot, instants, order, steps
         self.events = [] if events is None else events
         self._problem, self._ending, self._wrenches = problem, ending, wrenches

@@ -27,6 +27,7 @@ from jounce.dynamics.masses import gravity_of, masses_of
 from jounce.dynamics.saddle_point import DenseInverse
 from jounce.dynamics.start import initial_as_drivers
 from jounce.errors import AssemblyError, MobilityError, SolveError, UnsupportedError
+from jounce.execution.compilation import compiled
 from jounce.integrate.breaks import Break, breaks
 from jounce.integrate.divided_steps import Kinks, Pieces, divided_steps
 from jounce.integrate.events import pose_coordinates
@@ -38,7 +39,6 @@ from jounce.integrate.over_kinks import Kinked, met, shifted, with_value
 from jounce.integrate.projection import normalised
 from jounce.integrate.simulation import Simulation
 from jounce.jet import Jet
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.jacobian_series import solver
 from jounce.kinematics.sensitivities import Solved, check_not_redundant, failed, first_of, solved_shapes
 from jounce.kinematics.solve import checked_order, lost_orders

@@ -13,6 +13,9 @@ from jounce.dynamics.forward import Equations, Instants, State
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart, consistent_start
 from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
+from jounce.execution.backends import backend_of, joined
+from jounce.execution.compilation import compiled
+from jounce.execution.store import expect
 from jounce.integrate.events import Event, EventDetector, EventLog, pose_coordinates
 from jounce.integrate.lookahead import hiding_names, watched_names
 from jounce.integrate.marching import MOVING, STUCK, DenseOutput, IntegratorState, Outcome, march, unexpanded
@@ -26,9 +29,7 @@ from jounce.integrate.simulation import Simulation
 from jounce.integrate.user_methods import integrator
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.motion import check_output, output_group
-from jounce.kinematics.store import expect
 from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.element_indices import force_names
 from jounce.mechanism.law_checks import check_laws
@@ -192,7 +193,8 @@ def simulate(
         ahead.go_on(start)
     run = _Run(start, method, float(tolerance), float(longest_step), detectors)
     run.go(instants, progress)
-    simulation = Simulation(mechanism, start, run.dense_output, instants, order, run.ending, run.events.happened)
+    outcome = run.ending, run.events.happened, joined(run.backends)
+    simulation = Simulation(mechanism, start, run.dense_output, instants, order, *outcome)
     if strict and run.events.stopped_at is None:
         raise_for_status(simulation)
     return simulation
@@ -297,6 +299,7 @@ class _Run:
         self.events = EventLog(detectors)
         self.parts: list[DenseOutput] = []
         self.ending = (Status.OK, "")
+        self.backends: set[str] = set()
         self.sense = 1.0  # of time
 
     @property
@@ -315,6 +318,7 @@ class _Run:
         while current.outcome.item() in GOING and self.events.stopped_at is None:
             current, steps, attempts = march(equations, current, *how, **options)
             found, taken = steps
+            self.backends.add(backend_of(found))
             taken = np.asarray(taken)[: int(attempts), 0]
             if taken.any():
                 # a view, unless some were refused: they are joined, and so copied, at the end

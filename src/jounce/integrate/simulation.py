@@ -12,6 +12,11 @@ from jounce.dynamics.forward import Equations, Instants, Lanes, State, expand
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.dynamics.start import ConsistentStart
 from jounce.errors import MechanismError
+from jounce.execution.backends import joined
+from jounce.execution.chunks import in_chunks
+from jounce.execution.compilation import compiled
+from jounce.execution.mapped import mapped
+from jounce.execution.store import is_wanted_soon
 from jounce.integrate.breaks import breaks
 from jounce.integrate.events import WIDTHS, in_pieces, pose_coordinates, series_of
 from jounce.integrate.lookahead import watched_names
@@ -23,11 +28,7 @@ from jounce.jet import Jet, dot
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, counted_by_rates
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.chunks import in_chunks
-from jounce.kinematics.compilation import Compiled, compiled
 from jounce.kinematics.pose_outputs import output_series
-from jounce.kinematics.side_by_side import SideBySide
-from jounce.kinematics.store import is_wanted_soon
 from jounce.mechanism import Mechanism
 from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle, with_turns
 from jounce.mechanism.system import Group
@@ -61,6 +62,9 @@ class Simulation(Motion):
         When a force or a motion law had a jump or a kink, s, and which.
     dense : DenseOutput
         The steps, as polynomials.
+    steps_backend : str
+        Which arithmetic took the steps; none unless they were taken here. `backend` also tells what expanded the
+        motion at the instants.
     """
 
     def __init__(
@@ -72,13 +76,14 @@ class Simulation(Motion):
         order: int,
         ending: tuple[Status, str] = (Status.OK, ""),
         events: list[list[float]] | None = None,
+        steps_backend: str = "",
     ):
-        self.dense_output, self._start = dense, start
+        self.dense_output, self._start, self.steps_backend = dense, start, steps_backend
         self.events = [] if events is None else events
         self._ending = ending
         reached, chosen = _steps_of(dense, instants)
         outputs, highest = start.model.system.outputs, derivatives_of_motion(mechanism, order)
-        state, self._angles, found = motion_at(start.equations, outputs, dense, instants, chosen, highest)
+        (state, self._angles, found), backend = motion_at(start.equations, outputs, dense, instants, chosen, highest)
         coordinates = pose_coordinates(state)
         found = zip(outputs, found, strict=True)
         groups = tuple(self._counted(group, series, instants) for group, series in found)
@@ -97,6 +102,7 @@ class Simulation(Motion):
             status[beyond[0]], faults[int(beyond[0])] = int(ending[0]), ending[1]
         values = tuple(plain_derivatives(np.asarray(series)) for series in groups)
         super().__init__(mechanism, start.model, instants, order, (coordinates, values), status, faults)
+        self.backend = joined({backend, *filter(None, steps_backend.split(", "))})
 
     def __repr__(self) -> str:
         return f"<Simulation{super().__repr__()[7:-1]}, {self.steps} steps>"
@@ -157,7 +163,8 @@ class Simulation(Motion):
         """
         instants = np.atleast_1d(seconds("time", time, MechanismError))
         order = self.order if order is None else order
-        return Simulation(self.mechanism, self._start, self.dense_output, instants, order, self._ending, self.events)
+        outcome = self._ending, self.events, self.steps_backend
+        return Simulation(self.mechanism, self._start, self.dense_output, instants, order, *outcome)
 
     @property
     def energy(self) -> Float[np.ndarray, " time"]:
@@ -250,8 +257,8 @@ def motion_at(
     instants: np.ndarray,
     chosen: np.ndarray,
     order: int,
-) -> Any:
-    """Return what `expanded` does at instants in chosen steps, all of them."""
+) -> tuple[Any, str]:
+    """Return what `expanded` does at instants in chosen steps, all of them, and what computes it."""
     shared = equations, outputs
 
     def lanes_of(places: np.ndarray) -> Any:
@@ -259,18 +266,14 @@ def motion_at(
         polynomial = dense.polynomial.map(lambda part: part[steps].transpose(1, 2, 3, 0))
         return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
 
-    code = expanded_instant.program(
-        shared, lanes_of(np.zeros(1, int)), large=LARGE, hasty=is_wanted_soon(), order=order
-    )
-
-    def chunk(places: np.ndarray) -> Any:
-        lanes = lanes_of(places)
-        return expanded(shared, lanes, order=order) if code is None else code(lanes)
-
-    return in_chunks(chunk, len(instants), (FEW_INSTANTS, *WIDTHS))
+    example = lanes_of(np.zeros(1, int))
+    program = expanded.program(shared, example, large=LARGE, hasty=is_wanted_soon(), order=order)
+    found = in_chunks(lambda places: program(lanes_of(places)), len(instants), (FEW_INSTANTS, *WIDTHS))
+    return found, program.backend
 
 
-def _expanded(
+@mapped(widths=(FEW_INSTANTS, *WIDTHS), narrow=True)
+def expanded(
     shared: tuple[Equations, tuple[Group, ...]], lanes: tuple[AnglesOfForces, State, Lanes, Lanes], order: int
 ) -> tuple[State, AnglesOfForces, tuple[Float[Numbers, "_ _ _ batch"], ...]]:
     """Return the Taylor coefficients of the motion at instants, from the equations there.
@@ -302,10 +305,6 @@ def _expanded(
     series = expand(there, state, instants[None], order, inverse).state
     found = output_series(outputs, pose_coordinates(series), equations.pose_type)
     return series, measured(there, state), found
-
-
-expanded = Compiled(_expanded, ("order",), narrow=True)
-expanded_instant = SideBySide(_expanded)
 
 
 def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:

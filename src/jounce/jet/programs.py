@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jax.extend.core import JaxprEqn, Literal
 
+from jounce.jax_internals import sizes_of_scan
 from jounce.jet.operations import ADDITIVE, REARRANGING
 
 
@@ -120,21 +121,6 @@ def only_adds(jaxpr: Any) -> bool:
         elif equation.primitive.name not in ADDITIVE | REARRANGING:
             return False
     return True
-
-
-def sizes_of_scan(equation: Any) -> tuple[int, int]:
-    """Return how many operands of a loop of known length are constants, and how many are carried from turn to turn.
-
-    Releases of JAX write this down in different ways. What is carried has one shape outside and inside the loop; what
-    is read or collected turn by turn has one axis more outside.
-    """
-    inner = equation.params["jaxpr"].jaxpr
-
-    def alike(outer: Sequence[Any], inside: Sequence[Any]) -> int:
-        return sum(x.aval.ndim == y.aval.ndim for x, y in zip(outer, inside, strict=True))
-
-    carried = alike(equation.outvars, inner.outvars)
-    return alike(equation.invars, inner.invars) - carried, carried
 
 
 def inner_program(parameters: dict[str, Any]) -> Any:

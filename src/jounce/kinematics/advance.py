@@ -19,8 +19,6 @@ from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.turns import brought_near
 from jounce.kinematics.factors import Factor, factored
-from jounce.kinematics.kernels import in_one_piece
-from jounce.kinematics.least_squares import LeastSquaresFactor
 from jounce.kinematics.newton_raphson import newton_raphson
 from jounce.kinematics.predictions import (
     hidden_by_laws,
@@ -30,6 +28,7 @@ from jounce.kinematics.predictions import (
 )
 from jounce.kinematics.status import Status
 from jounce.kinematics.turnover import turnover_of
+from jounce.linear_algebra.least_squares import LeastSquaresFactor
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.system import Group, System
 from jounce.rigid.pose import Pose
@@ -90,35 +89,18 @@ def _size(increment: Float[Numbers, "component body batch"]) -> Float[Numbers, "
     return jnp.max(jnp.abs(increment), axis=0)
 
 
-class Pieces(NamedTuple):
-    """Most operations of what is to be one piece of machine code (see `kernels`): it runs faster, and compiles longer.
-
-    The program must be compiled without the `LIBRARIES` where one is above zero.
-    """
-
-    corrections: int
-    derivatives: int
-
-
-XLA_S_OWN = Pieces(0, 0)
-
-
-def differentiated(system: System, pose: Pose, factor: Factor, time: Float[Jet, "1 batch"], largest_piece: int) -> Pose:
+def differentiated(system: System, pose: Pose, factor: Factor, time: Float[Jet, "1 batch"]) -> Pose:
     """Return the pose with all derivatives that the time jet has: order after order, one solve each.
 
     The coefficient of order k of the residual is affine in the unknown (r[k], w'[k-1] / k) with the Jacobian as its
     slope, so that it is found from the coefficient with the unknown set to zero.
     """
-
-    def order_after_order(pose: Any) -> Any:
-        for k in range(1, time.order + 1):
-            trial = pose.extended(None, None)
-            right = -system.residual(trial, time.truncate(k)).dense().coefficients[k]
-            pose = pose.extended(*system.coordinates(factor.solve(right), pose.shifts))
-            pose = jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
-        return pose
-
-    return in_one_piece(order_after_order, pose, largest_piece)
+    for k in range(1, time.order + 1):
+        trial = pose.extended(None, None)
+        right = -system.residual(trial, time.truncate(k)).dense().coefficients[k]
+        pose = pose.extended(*system.coordinates(factor.solve(right), pose.shifts))
+        pose = jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
+    return pose
 
 
 def _departures(system: System, pose: Pose, predicted: Any) -> Float[Numbers, "body batch"]:
@@ -249,7 +231,6 @@ def advance(
     *,
     pose_type: type[Pose],
     order: int,
-    pieces: Pieces = XLA_S_OWN,
     with_turnover: bool = True,
 ) -> Arrival:
     """Solve a batch of instants, each from a neighbour solved before.
@@ -275,13 +256,11 @@ def advance(
         Highest derivative that must be finite.
     pose_type, order
         PlanarPose or SpatialPose; derivatives wanted.
-    pieces : Pieces, optional
-        Which parts are to be one piece of machine code.
     with_turnover : bool, default True
         Whether the turnover is looked for here, too; else it is left at zero.
     """
     given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
-    arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order, pieces=pieces)
+    arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order)
     first = arrival.status[:1]
 
     def surveyed() -> Any:
@@ -305,17 +284,14 @@ def solved_batch(
     *,
     pose_type: type[Pose],
     order: int,
-    pieces: Pieces = XLA_S_OWN,
 ) -> tuple[Arrival, Factor, dict[str, Jet]]:
     """Return what `advance` does but for the turnover, with the factored Jacobian and the jets of the pose."""
     # what a law makes infinite, such as the third derivative of t**2.5 at t = 0, is of no use to a prediction
     moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in coordinates.items()}
     predicted = pose_type.predicted_from(moving, step)
     time = Jet.variable(instant[None], order)
-    pose, factor, correction = newton_raphson(
-        system, predicted, time.truncate(0), tolerance, refine, pieces.corrections
-    )
-    pose = differentiated(system, pose, factor, time, pieces.derivatives)
+    pose, factor, correction = newton_raphson(system, predicted, time.truncate(0), tolerance, refine)
+    pose = differentiated(system, pose, factor, time)
 
     outputs = _outputs(system, pose, angles, step)
     reached = pose.coordinates()

@@ -10,8 +10,8 @@ from jounce.constraints.drivers import DistanceDriver
 from jounce.constraints.planar import DoubleRevolute
 from jounce.constraints.spatial import DoubleSpherical
 from jounce.errors import AssemblyError, AssemblyWarning, MobilityError
+from jounce.execution.device import resident
 from jounce.jet import Jet
-from jounce.kinematics.device import resident
 from jounce.kinematics.gauss_newton import Displacements, Trial, put_together
 from jounce.kinematics.initial_turns import (
     Coordinates,

@@ -13,20 +13,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.execution.compilation import compiled
+from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
 from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, predicts_turns, solved_batch
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.designs import Coordinates, Designs
-from jounce.kinematics.kernels import LIBRARIES
 from jounce.kinematics.legs import GROWTH, LARGEST_TURNOVER, PASSAGE, SLIVER
 from jounce.kinematics.path_following import PLACES, SMALLEST_STEP, blended_attitudes
 from jounce.kinematics.predictions import hidden_by_laws
 from jounce.kinematics.solver import Solver
 from jounce.kinematics.status import Status
-from jounce.kinematics.threads import Threads
 from jounce.kinematics.turnover import turnovers_of
-from jounce.kinematics.wide_batches import PIECES
 from jounce.mechanism.axis_angles import measures_angle, raw_angles
 from jounce.mechanism.system import Group, System
 from jounce.mechanism.turn_counting import counted_along
@@ -72,7 +70,7 @@ def advance_designs(
     return arrival._replace(turnover=turnovers_of(system, pose_type, reached, factor, instant), status=status)
 
 
-@compiled("varied", "pose_type", "order", without=LIBRARIES)
+@compiled("varied", "pose_type", "order")
 def _solve_designs(
     system: System,
     known: Any,
@@ -118,7 +116,6 @@ def _solve_designs(
             *settings,
             pose_type=pose_type,
             order=order,
-            pieces=PIECES,
         )
         rows = [jnp.transpose(plain_derivatives(jets), (2, 3, 0, 1)) for jets in arrival.outputs]
         return tuple(tuple(row) for row in rows), arrival.status

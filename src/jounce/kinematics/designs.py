@@ -11,8 +11,8 @@ from jax.core import Tracer
 from jaxtyping import Bool, Float, Int
 
 from jounce.constraints.base import field_kind, value_fields
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.factors import factored
 from jounce.kinematics.gauss_newton import MAX_STEPS
 from jounce.mechanism import Mechanism, Model

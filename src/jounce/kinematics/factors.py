@@ -8,10 +8,10 @@ import jax.numpy as jnp
 from jaxtyping import Bool
 
 from jounce.jet import Jet
-from jounce.kinematics.frontal import FrontalFactor
-from jounce.kinematics.least_squares import LeastSquaresFactor
-from jounce.kinematics.linear import DenseFactor
-from jounce.kinematics.reflections import ReflectedFactor
+from jounce.linear_algebra.frontal import FrontalFactor
+from jounce.linear_algebra.least_squares import LeastSquaresFactor
+from jounce.linear_algebra.linear import DenseFactor
+from jounce.linear_algebra.reflections import ReflectedFactor
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers

@@ -10,6 +10,7 @@ from jax.core import Tracer
 from jaxtyping import Float, Int
 
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError, SolveError, check_name
+from jounce.execution.threads import thread_count
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.design_paths import DesignPaths
 from jounce.kinematics.design_sides import Sides, sides_of_designs
@@ -18,7 +19,6 @@ from jounce.kinematics.motion import Motion
 from jounce.kinematics.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
 from jounce.kinematics.solver import Solver
 from jounce.kinematics.status import Status
-from jounce.kinematics.threads import thread_count
 from jounce.mechanism import (
     AbstractMotionOutput,
     Mechanism,

@@ -8,11 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
-from jounce.kinematics.compilation import compiled
-from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import Coordinates, DriverLag, Place
-from jounce.kinematics.linear import DenseFactor
+from jounce.linear_algebra.host_jacobian import HostJacobian
+from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism import Model
 from jounce.mechanism.builder import pose_at
 from jounce.mechanism.system import System

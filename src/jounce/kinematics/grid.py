@@ -1,10 +1,10 @@
-"""All instants of a time grid, solved in batches from the anchors of a motion that was followed.
+"""All instants of a time grid, solved from the anchors of a motion that was followed.
 
-A long grid is not solved one instant after another. The instants start from their nearest anchor, in levels that halve
-the spacing, so that most are predicted to rounding by an instant solved before and all of a level are solved together.
-Machine code takes them up in another order, from the same neighbours (see `spans`): what it tells to have failed is
-solved in levels again. Between two anchors lies no singular position, so that the sign of the determinant tells an
-instant on another branch.
+A long grid is not solved one instant after another. Instants start from their nearest anchor, or from a neighbour
+solved before, so that most are predicted to rounding, and many are solved side by side (see `spans`). What fails there,
+and what starts from it, is solved once more, each after what it starts from; so are the few instants of a short grid
+that were not solved on the way. Between two anchors lies no singular position, so that the sign of the determinant
+tells an instant on another branch.
 """
 
 from collections.abc import Callable, Iterator
@@ -14,6 +14,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.advance import Arrival, SolvedState
 from jounce.kinematics.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
@@ -24,14 +25,11 @@ from jounce.kinematics.path_following import (
     follow,
 )
 from jounce.kinematics.solver import SMALL_BATCH, Solver
-from jounce.kinematics.spans import solve_spans, spans_of
+from jounce.kinematics.spans import LONG_GRID, neighbours, solve_spans, spans_of, stride_of
 from jounce.kinematics.status import Status
-from jounce.kinematics.threads import Threads
 from jounce.mechanism.time import nearest_instants
 
 Indices = Int[np.ndarray, " lane"]
-LONG_GRID = 1024  # instants: from here on in large batches
-FEW_BATCHES = 4  # of instants: no level of its own for each halving of the spacing
 
 
 class GridSolver:
@@ -68,15 +66,12 @@ class GridSolver:
         return coordinates, tuple(map(plain_derivatives, outputs))
 
     def solve(self, progress: Callable[[int, int], None] | None, threads: int, *, explain: bool) -> None:
-        """Solve level after level; an instant that its neighbour cannot predict is followed to from an anchor.
+        """Solve the instants; one that its neighbour cannot predict is followed to from an anchor.
 
-        The batches of a level are solved in several threads; what comes of it does not depend on how many. To `explain`
-        is to say at the first instant that was not reached why.
+        They are solved in several threads; what comes of it does not depend on how many. To `explain` is to say at the
+        first instant that was not reached why.
         """
         count = len(self.time)
-        width, most = SMALL_BATCH, 1
-        if count > LONG_GRID:
-            width, most = self.solver.width, self.solver.together // self.solver.width
         left = self._reached & (self.status != Status.OK)
         stride = stride_of(self.solver, int(np.count_nonzero(left)), count, len(self._anchors))
         done = count - int(np.count_nonzero(left))
@@ -87,17 +82,14 @@ class GridSolver:
             if progress is not None:
                 progress(done, count)
 
-        in_spans = count > LONG_GRID and self.solver.is_compiled
-        with Threads(threads, compiled=in_spans) as pool:
-            if in_spans:
+        with Threads(threads, compiled=self.solver.is_compiled) as pool:
+            if count > LONG_GRID:
                 left = self._in_spans(left, stride, pool, tell)
             if self.path.on_the_way or left.any() or not self._reached.all():
                 self._place_known()
-            for lanes, distance in _levels(left, stride):
-                neighbour = lanes - distance
-                known = (self.status[neighbour] == Status.OK) & (distance > 0)
-                source = self._sources(lanes, neighbour, known)
-                size = width * _lots(len(lanes), width, most, threads)
+            size = self.solver.together if count > LONG_GRID else SMALL_BATCH
+            for lanes in _in_turn(left, stride):
+                source = self._sources(lanes, stride)
                 batches = [(lanes[k : k + size], source[k : k + size]) for k in range(0, len(lanes), size)]
                 for (batch, _), arrival in zip(batches, pool.map(self._solved, batches), strict=True):
                     self._take(batch, arrival)
@@ -114,9 +106,9 @@ class GridSolver:
     def _in_spans(
         self, left: Bool[np.ndarray, " time"], stride: int, pool: Threads, tell: Callable[[int], None]
     ) -> Bool[np.ndarray, " time"]:
-        """Solve instants by machine code; return what is left: those that failed, and what starts from them.
+        """Solve instants in rounds; return what is left: those that failed, and what starts from them.
 
-        Nothing is known of a failure but that there is one, so that these are solved once more, level after level.
+        Nothing is known of a failure but that there is one, so that these are solved once more.
         """
         count = int(np.count_nonzero(left))  # a long grid is reached up to some instant, and nothing is solved yet
 
@@ -124,17 +116,20 @@ class GridSolver:
             self._keep(place, state)
             self.status[place] = status
 
-        spans = spans_of(0, count, stride, self.solver.lanes)
+        spans = spans_of(0, count, stride, self.solver.program.width)
         for solved in solve_spans(self.solver, self.path, self.time, spans, put, pool.map):
             tell(solved)
         failed = left & (self.status != Status.OK)
         if failed.any():
-            for lanes, distance in _levels(left, stride):
-                failed[lanes] |= failed[lanes - distance]
+            for lanes in _in_turn(left, stride):
+                neighbour, known = neighbours(lanes, stride)
+                failed[lanes] |= failed[neighbour] & known
         return failed
 
-    def _sources(self, lanes: Indices, neighbour: Indices, known: Bool[np.ndarray, " lane"]) -> Indices:
+    def _sources(self, lanes: Indices, stride: int) -> Indices:
         """Return from where each instant is predicted: its neighbour, where that is known, or its nearest anchor."""
+        neighbour, known = neighbours(lanes, stride)
+        known &= self.status[neighbour] == Status.OK
         time = self.time[lanes]
         nearest = len(self.time) + nearest_instants(self._instants[len(self.time) :], time)
         nearer = np.abs(time - self._instants[neighbour]) <= np.abs(time - self._instants[nearest])
@@ -143,10 +138,9 @@ class GridSolver:
     def _solved(self, batch: tuple[Indices, Indices]) -> Arrival:
         """Return what comes of a batch of instants, with their sources; nothing is kept but the state at its lanes."""
         lanes, source = batch
-        chosen = _slice_of(source)
-        known = jax.tree.map(lambda x: x[..., chosen], self.solver.needed(self._store))
+        known = jax.tree.map(lambda x: x[..., source], self.solver.needed(self._store))
         arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
-        self._keep(_slice_of(lanes), arrival.state(slice(None)))
+        self._keep(lanes, arrival.state(slice(None)))
         return arrival
 
     def _take(self, lanes: Indices, arrival: Arrival) -> None:
@@ -227,51 +221,9 @@ def room_for(state: Any, lanes: int) -> Any:
     return jax.tree.map(lambda x: np.empty((*x.shape[:-1], lanes)), state)
 
 
-def _lots(count: int, width: int, most: int, threads: int) -> int:
-    """Return how many lots go into a call, so that all threads have as many of them to solve."""
-    lots = -(-count // width)
-    rounds = -(-lots // (most * threads))
-    return max(1, -(-lots // (rounds * threads))) if lots else 1
-
-
-def _slice_of(indices: Indices) -> slice | Indices:
-    """Return evenly spaced indices as a slice, with which NumPy copies several times faster."""
-    first, last = int(indices[0]), int(indices[-1])
-    step = (last - first) // (len(indices) - 1) if len(indices) > 1 else 1
-    if step > 0 and np.array_equal(indices, np.arange(first, last + 1, step)):
-        return slice(first, last + 1, step)
-    return indices
-
-
-def stride_of(solver: Solver, left: int, count: int, anchors: int) -> int:
-    """Return how far apart the instants of the first level are, which start from the anchors, a power of two.
-
-    Parameters
-    ----------
-    solver : Solver
-        What solves them.
-    left, count : int
-        How many of a grid are to be solved, and how many there are.
-    anchors : int
-        From how many. They fill at least one batch. Where few instants are left, they are all of the first level.
-    """
-    width, stride = solver.width if count > LONG_GRID else SMALL_BATCH, 1
-    if left > FEW_BATCHES * width:
-        while count // (2 * stride) >= max(2 * anchors, width) and 2 * stride <= solver.longest_stride:
-            stride *= 2
-    return stride
-
-
-def _levels(left: Bool[np.ndarray, " time"], stride: int) -> Iterator[tuple[Indices, int]]:
-    """Yield the instants left of each level, with the distance of the neighbour that each is predicted from.
-
-    It is zero for those of the first level, which are predicted from anchors.
-    """
-    firsts = [(0, stride, 0)]
-    while stride > 1:
-        firsts.append((stride // 2, stride, stride // 2))
-        stride //= 2
-    for first, apart, distance in firsts:
-        lanes = first + apart * np.flatnonzero(left[first::apart])
-        if lanes.size:
-            yield lanes, distance
+def _in_turn(left: Bool[np.ndarray, " time"], stride: int) -> Iterator[Indices]:
+    """Yield instants in groups, each after what it starts from: the number of ones in an index says how far down."""
+    lanes = np.flatnonzero(left)
+    depth = np.bitwise_count(lanes & (stride - 1))
+    for level in np.unique(depth).tolist():
+        yield lanes[depth == level]

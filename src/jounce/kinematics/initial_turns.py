@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jounce.jet.turns import WHOLE_TURN, principal, whole_periods
-from jounce.kinematics.host_jacobian import HostJacobian
+from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle
 from jounce.mechanism.builder import prescribed_by_drivers

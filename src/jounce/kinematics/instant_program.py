@@ -1,15 +1,42 @@
-"""`advance` for one instant, of which machine code is made that solves many side by side."""
+"""`advance` for one instant, as a program that solves many: machine code side by side, or XLA in arrays."""
 
+import math
 from typing import Any
 
-from jounce.kinematics.advance import Arrival, advance
-from jounce.kinematics.side_by_side import SideBySide
+import jax.numpy as jnp
+
+from jounce.execution.device import on_processor
+from jounce.execution.mapped import GPU_WIDTH, mapped
+from jounce.kinematics.advance import Arrival, advance, solved_batch
 from jounce.mechanism.system import System
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
 
+WIDTHS = 128, 512  # instants that XLA solves side by side: as many as the cache holds, within these bounds
+CACHED_ENTRIES = 2**16  # of the factors of a round: half a megabyte
 
-@SideBySide
+
+def round_width(system: System) -> int:
+    """Return how many instants of a long grid XLA solves side by side: a power of two.
+
+    On a processor so many that the factors of their Jacobians fit into the cache, on a GPU so many that they fill it.
+    """
+    if not on_processor():
+        return GPU_WIDTH
+    entries = math.prod(system.shape if system.fronts is None else system.fronts.shape)
+    least, most = WIDTHS
+    return max(least, min(most, 2 ** int(math.log2(max(1, CACHED_ENTRIES // max(1, entries))))))
+
+
+def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> Arrival:
+    """Solve many instants as `advance_instant` does one; nothing is surveyed."""
+    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, _) = shared, instants
+    given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
+    arrival, _, _ = solved_batch(system, *given, pose_type=pose_type, order=order)
+    return arrival._replace(turnover=jnp.zeros_like(step))
+
+
+@mapped(by_xla=_of_many)
 def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> Arrival:
     """Solve an instant from a neighbour solved before.
 

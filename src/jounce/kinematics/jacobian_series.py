@@ -14,8 +14,8 @@ from jaxtyping import Float
 from jounce.constraints import AbstractConstraint
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
-from jounce.kinematics.frontal import FrontalFactor
-from jounce.kinematics.linear import DenseFactor
+from jounce.linear_algebra.frontal import FrontalFactor
+from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.system import System, movable, with_rows
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers

@@ -18,11 +18,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.kinematics.advance import SAFE_FRACTION, Arrival, Pieces, SolvedState, advance, predictor
-from jounce.kinematics.compilation import compiled
+from jounce.execution.compilation import compiled
+from jounce.execution.mapped import called
+from jounce.kinematics.advance import SAFE_FRACTION, Arrival, SolvedState, advance, predictor
 from jounce.kinematics.instant_program import finds_turnover
-from jounce.kinematics.kernels import LIBRARIES
-from jounce.kinematics.side_by_side import called
 from jounce.kinematics.status import Status
 from jounce.kinematics.turnover import turnover_at
 from jounce.mechanism.system import System
@@ -119,9 +118,7 @@ class Leg(NamedTuple):
     count: Int[Numbers, ""]  # of batches solved
 
 
-# the corrections take a tenth of a second longer to compile; larger pieces are no faster on batches this narrow
-PIECES = Pieces(corrections=3000, derivatives=0)
-_batch = jax.jit(partial(advance, pieces=PIECES), static_argnames=("pose_type", "order"))  # traced once
+_batch = jax.jit(advance, static_argnames=("pose_type", "order"))  # traced once
 
 
 def _calls_code(*_: Any, native: str | None, **__: Any) -> bool:
@@ -132,7 +129,6 @@ def _calls_code(*_: Any, native: str | None, **__: Any) -> bool:
 @compiled(
     *("pose_type", "order", "batches", "native"),
     narrow=True,
-    without=LIBRARIES,
     alone=_calls_code,
     otherwise={"native": None},  # where there is no code for a leg, XLA has none to call
 )

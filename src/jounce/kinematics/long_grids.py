@@ -7,15 +7,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.advance import SolvedState
 from jounce.kinematics.change_points import half_width, spoiled_width
-from jounce.kinematics.grid import LONG_GRID, GridSolver, room_for, stride_of
+from jounce.kinematics.grid import GridSolver, room_for
 from jounce.kinematics.path_following import FollowedPath
 from jounce.kinematics.solver import Solver
-from jounce.kinematics.spans import solve_spans, spans_of
+from jounce.kinematics.spans import LONG_GRID, solve_spans, spans_of, stride_of
 from jounce.kinematics.status import Status
-from jounce.kinematics.threads import Threads
 from jounce.mechanism.time import Instants
 
 STRETCH = 2**16  # instants
@@ -111,7 +111,7 @@ def _solved_at_once(
     Returns the first instants of those in which all are OK; the others are still to be solved, one after another.
     """
     (store, status), spans = results, {}
-    if not solver.is_compiled or path.on_the_way:
+    if path.on_the_way:
         return frozenset()
     points = [(point, half_width(point, solver.order)) for point in path.change_points]
     points += [(point, spoiled_width(point, solver.order)) for point in path.singular_positions_outside()]
@@ -121,14 +121,14 @@ def _solved_at_once(
         near = any(begin - width < point.instant < end + width for point, width in points)
         if count > LONG_GRID and end < path.ended_at and not near:
             stride = stride_of(solver, count, count, len(path.anchors_around(begin, end)))
-            spans[first] = spans_of(first, count, stride, solver.lanes)
+            spans[first] = spans_of(first, count, stride, solver.program.width)
     done, wanted = 0, [*itertools.chain(*spans.values())]
 
     def put(place: slice, state: SolvedState, outcome: Int[np.ndarray, " lane"]) -> None:
         store.put(place, *state[:2], series=True)
         status[place] = outcome
 
-    with Threads(threads, compiled=True) as pool:
+    with Threads(threads, compiled=solver.is_compiled) as pool:
         for solved in solve_spans(solver, path, time, wanted, put, pool.map):
             done += solved
             if progress is not None:

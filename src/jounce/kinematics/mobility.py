@@ -14,11 +14,11 @@ from jaxtyping import Float
 from jounce.errors import MechanismError, whole_number
 from jounce.kinematics.assembly import check_assembled, redundancy_of, settled
 from jounce.kinematics.gauss_newton import Displacements, Trial, put_together
-from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import Coordinates, Mover
 from jounce.kinematics.mobility_series import SINGULAR, ReducedConstraints
 from jounce.kinematics.redundancy import Repetition, closed_nearby
 from jounce.kinematics.tangent_cone import LocalCurve, curves
+from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Mechanism, Model, build, check_mechanism, time_grid
 from jounce.mechanism.builder import with_reference
 from jounce.mechanism.preconditions import concrete

@@ -15,8 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.initial_turns import Coordinates
 from jounce.mechanism import Model
 from jounce.mechanism.builder import pose_at

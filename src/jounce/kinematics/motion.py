@@ -12,10 +12,11 @@ from jaxtyping import Float
 from jounce.constraints import AbstractConstraint
 from jounce.display import Displayed
 from jounce.errors import MechanismError, check_name
+from jounce.execution.backends import xla_backend
+from jounce.execution.chunks import in_chunks
+from jounce.execution.on_demand import OnDemand
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
-from jounce.kinematics.chunks import in_chunks
-from jounce.kinematics.on_demand import OnDemand
 from jounce.kinematics.path_following import Passage
 from jounce.kinematics.pose_outputs import output_series
 from jounce.kinematics.status import Status
@@ -101,6 +102,9 @@ class Motion(Displayed):
         The same, each with the radius of the Taylor series of the motion there.
     derived : dict
         What was computed of the motion and may be wanted again, by name: the forces, for one.
+    backend : str
+        Which arithmetic gave the numbers: "llvm", machine code, or "xla", with the device unless that is the processor;
+        both where each computed a part.
 
     It is put together from the Taylor coefficients of the coordinates of all bodies, or what computes them, and the
     derivatives of the outputs, (order + 1, components, instances, time) for each group.
@@ -119,7 +123,9 @@ class Motion(Displayed):
         faults: dict[int, str],
         passages: Sequence[Passage] = (),
         history: AttitudeHistory | None = None,
+        backend: str = "",
     ):
+        self.backend = backend or xla_backend()
         self.mechanism, self.time, self.order, self.status = mechanism, time, order, status
         self.faults = faults
         self.passages = tuple(passages)
@@ -161,7 +167,7 @@ class Motion(Displayed):
     def moved_by(self, model: Model, actuated: Mechanism) -> "Motion":
         """Return the same motion of the same bodies, with a model of the drivers that move them, and their laws."""
         state = self._bodies, tuple(self._groups.values())
-        outcome = self.status, self.faults, self.passages, self.history
+        outcome = self.status, self.faults, self.passages, self.history, self.backend
         motion = Motion(self.mechanism, model, self.time, self.order, state, *outcome)
         motion._actuated, motion.solved_model = actuated, self.model
         return motion

@@ -16,7 +16,6 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.jet import Jet
 from jounce.kinematics.factors import Factor, blank_factor, refactored
-from jounce.kinematics.kernels import in_one_piece
 from jounce.kinematics.predictions import SMALLEST_DEPARTURE
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
@@ -60,7 +59,6 @@ def newton_raphson(
     time: Float[Jet, "1 batch"],
     tolerance: Float[Numbers, ""],
     refine: Bool[Numbers, ""],
-    largest_piece: int,
 ) -> tuple[Pose, Factor, Correction]:
     """Return the assembled pose, the factored Jacobian there, and how large the corrections were.
 
@@ -118,6 +116,5 @@ def newton_raphson(
     unknown, nothing = np.full(lanes, np.inf), np.zeros(lanes)
     correction = Correction(unknown, unknown, nothing)
     start = _Iteration(pose, blank_factor(system, lanes), correction, nothing, nothing, np.zeros((), int))
-    largest_piece = 0 if system.fronts is not None else largest_piece  # fronts scatter what they leave over
-    end = in_one_piece(lambda start: jax.lax.while_loop(unfinished, iterate, start), start, largest_piece)
+    end = jax.lax.while_loop(unfinished, iterate, start)
     return end.pose, end.factor, end.correction

@@ -15,6 +15,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
+from jounce.execution.backends import backend_of
 from jounce.kinematics.advance import Arrival, SolvedState
 from jounce.kinematics.legs import Ending, Leg, Way
 from jounce.kinematics.solver import NO_GRID, Solver
@@ -89,7 +90,7 @@ class Passage:
 class FollowedPath:
     """Anchors in order of time, the change points passed, and where and why following the motion ended, if it did.
 
-    Instants of a grid that were solved on the way are told by their indices, with their states.
+    Instants of a grid that were solved on the way are told by their indices, with their states; and what computed, too.
     """
 
     anchors: list[Anchor]
@@ -98,9 +99,11 @@ class FollowedPath:
     status: Status = Status.OK
     ended_at: float = np.inf
     fault: str = ""
+    backends: set[str] = dataclasses.field(default_factory=set)
 
     def add(self, done: Leg, first: int) -> None:
         """Add the anchors of a leg, and the instants of the grid that it solved, which begin with the first."""
+        self.backends.add(backend_of(done.records.status))
         count = int(done.count)
         records = jax.tree.map(lambda x: np.asarray(x)[:count], done.records)
         leaves, structure = jax.tree.flatten((records.coordinates, records.outputs, records.sign))

@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.jet.derivatives import plain_derivatives
-from jounce.kinematics.compilation import compiled
 from jounce.mechanism.system import Group
 from jounce.shapes import Numbers
 

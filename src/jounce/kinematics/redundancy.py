@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.initial_turns import Coordinates, Mover
 from jounce.kinematics.mobility_series import ReducedConstraints
 from jounce.kinematics.tangent_cone import curves
+from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Model
 
 SWAYS = (0.1, 0.01)  # rad or sizes of the mechanism: how far a position in general is from the one assembled

@@ -21,9 +21,9 @@ from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError
+from jounce.execution.compilation import Compiled, compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
-from jounce.kinematics.compilation import Compiled, compiled
 from jounce.kinematics.jacobian_series import jacobian_series, solved_series
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.status import Status

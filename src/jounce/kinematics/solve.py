@@ -6,29 +6,29 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-import jax
 import numpy as np
 from jax.errors import ConcretizationTypeError
 
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
+from jounce.execution.backends import joined
+from jounce.execution.device import resident
+from jounce.execution.rehearsal import first_time, rehearsed, tried
+from jounce.execution.store import expect, is_wanted_soon
+from jounce.execution.threads import thread_count
 from jounce.kinematics.actuation import actuated
 from jounce.kinematics.advance import SolvedState
 from jounce.kinematics.assembly import assemble
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.dead_ends import dead_end_words
-from jounce.kinematics.device import resident
 from jounce.kinematics.forces_at_rest import ask_forces_at_rest
-from jounce.kinematics.grid import LONG_GRID
 from jounce.kinematics.long_grids import solve_grid
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.path_following import FollowedPath, follow
-from jounce.kinematics.rehearsal import first_time, rehearsed, tried
 from jounce.kinematics.sensitivities import differentiable_motion
 from jounce.kinematics.solver import NO_GRID, Solver
+from jounce.kinematics.spans import LONG_GRID, prepare_spans
 from jounce.kinematics.status import Status
-from jounce.kinematics.store import expect, is_wanted_soon
 from jounce.kinematics.stretches import Stretches
-from jounce.kinematics.threads import thread_count
 from jounce.kinematics.traced_motion import TracedMotion
 from jounce.mechanism import (
     Mechanism,
@@ -149,7 +149,8 @@ def solve(
     solver, path = _followed(mechanism, instants, order, tolerance, refine=refine)
     found = solve_grid(solver, path, instants, progress, count, keep=keep)
     state, outcome = (found.coordinates, found.outputs), (found.status, found.faults, path.change_points)
-    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, path.history()))
+    told = path.history(), _backend(solver, path, instants)
+    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, *told))
     if strict:
         raise_for_status(motion)
     return motion
@@ -199,7 +200,7 @@ def solve_in_stretches(
     count = thread_count(threads)
     instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
     found = _followed(mechanism, instants, order, tolerance, refine=refine)
-    return Stretches(mechanism, found, instants, order, progress, count)
+    return Stretches(mechanism, found, instants, order, progress, count, _backend(*found, instants))
 
 
 def checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
@@ -253,6 +254,11 @@ def _followed(
     return solver, path
 
 
+def _backend(solver: Solver, path: FollowedPath, instants: Instants) -> str:
+    """Return what has computed a motion: what followed it, and what solves the instants of a long grid."""
+    return joined({*path.backends, *([solver.backend] if len(instants) > LONG_GRID else [])})
+
+
 def _rank_is_open(model: Model) -> bool:
     """Tell whether constraints are redundant by a number that only the assembled bodies show; programs depend on it."""
     rows, columns = model.system.shape
@@ -269,10 +275,9 @@ def _prepare(solver: Solver, instant: float) -> None:
 
 
 def _rehearse(mechanism: Mechanism, solver: Solver, still: SolvedState, instants: Instants) -> None:
-    """Use the programs of wide batches, and those of outputs that are forces, with the bodies at rest."""
+    """Use the programs of long grids, and those of outputs that are forces, with the bodies at rest."""
     if len(instants) > LONG_GRID:
-        known = jax.tree.map(lambda x: np.repeat(x, solver.width, axis=-1), still)
-        solver(solver.needed(known), np.zeros(solver.width), np.asarray(instants[: solver.width]))
+        prepare_spans(solver, still, len(instants))
     pose = {name: part[0] for name, part in still[0].items()}
     order = solver.order - lost_orders(mechanism)
     ask_forces_at_rest(mechanism, solver.model, pose, instants, order, solver.order + 1)

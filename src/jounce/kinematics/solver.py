@@ -10,21 +10,20 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int, Shaped
 
+from jounce.execution.mapped import OnLlvm, OnXla, Rounds
 from jounce.kinematics.advance import LARGEST_GAP, Arrival, SolvedState, predictor
-from jounce.kinematics.instant_program import advance_instant
+from jounce.kinematics.instant_program import advance_instant, round_width
 from jounce.kinematics.legs import Leg, LegLimits, Place, Settings, Way, leg
-from jounce.kinematics.side_by_side import Prepared
 from jounce.kinematics.status import Status
-from jounce.kinematics.wide_batches import CALL_ENTRIES, advance_in_lots, lot_width, lots_in_a_call
 from jounce.mechanism import Model
-from jounce.mechanism.time import MAX_INSTANTS
-from jounce.native.relays import Relay
 
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 LONGEST_LEG = 32  # batches
 LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
 SPAN_ENTRIES = 2**19  # of the coordinates of what a thread solves at once: the cache holds them
-FEWEST_SIDE_BY_SIDE, MOST_SIDE_BY_SIDE = 64, 1024  # instants of a long grid in a call of machine code
+XLA_SPAN_ENTRIES = 2**21  # the same by XLA, whose rounds have more instants, and whose calls take longer
+FEWEST_FROM_ANCHORS = 64  # instants of a long grid that machine code starts from anchors
+MOST_SIDE_BY_SIDE, CALL_ENTRIES = 1024, 2**21  # instants in a call of machine code, and numbers of their coordinates
 FEW_COLUMNS = 36  # of a Jacobian: of more, machine code of single values alone is too long to be fast
 FEW_OF_REDUNDANT_ROWS = 18  # the same in least squares, whose bases take more code than reflections
 LARGE = 64  # numbers of an array that stays in memory there
@@ -51,7 +50,7 @@ class Solver:
         *,
         survey: bool = False,
     ) -> Arrival:
-        """Solve instants from what is `needed` of solved ones, `together` at most.
+        """Solve instants from what is `needed` of solved ones.
 
         Of a few instants, `survey` looks for singular positions.
         """
@@ -61,35 +60,22 @@ class Solver:
             way = _way(known, (0.0,) * 4, away=step, instant=instant, planned=True)
             arrival = self._leg(way, NO_GRID, _limits(0.0, 0.0, 1), survey=survey).last
         else:
-            arrival = self._wide(needed, step, instant)
+            arrival = self.program((needed, step, instant, np.zeros(step.shape, bool)))
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
 
     def needed(self, known: SolvedState) -> SolvedState:
         """Return what predictions need of solved instants, see `predictor`."""
         return predictor(self.model.system, self.model.pose_type, known)
 
-    def _wide(
-        self, known: SolvedState, step: Float[np.ndarray, " batch"], instant: Float[np.ndarray, " batch"]
-    ) -> Arrival:
-        if self._native is not None:
-            return self._native((known, step, instant, np.zeros(step.shape, bool)))
-        lots = -(-len(instant) // self.width)
-        given = jax.tree.map(lambda x: _filled(x, lots * self.width, self.together), (known, step, instant))
-        tolerance, refine, _, wanted = self._settings
-        settings, kind = (tolerance, refine, wanted), self.model.pose_type
-        return advance_in_lots(
-            self.model.system, *given, settings, np.asarray(lots), pose_type=kind, order=self.order, width=self.width
-        )
-
-    def relay(
+    def rounds(
         self,
         store: SolvedState,
         step: Float[np.ndarray, " time"],
         instant: Float[np.ndarray, " time"],
         status: Int[np.ndarray, " time"],
         sources: Int[np.ndarray, " time"],
-    ) -> Relay:
-        """Return what solves instants of a grid in rounds of machine code; only where solving `is_compiled`.
+    ) -> Rounds:
+        """Return what solves instants of a grid in rounds.
 
         Parameters
         ----------
@@ -105,9 +91,8 @@ class Solver:
         coordinates, outputs, sign = store
         nothing: dict[str, Any] = dict.fromkeys(Arrival._fields)
         wanted = {"coordinates": coordinates, "outputs": outputs, "status": status, "sign": sign}
-        results, native = Arrival(**(nothing | wanted)), self._native
-        assert native is not None
-        return native.relay((self.needed(store), (step, instant), np.zeros(1, bool)), results, sources)
+        lanes = self.needed(store), (step, instant), np.zeros(1, bool)
+        return self.program.rounds(lanes, Arrival(**(nothing | wanted)), sources)
 
     def leg(self, way: Way, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> Leg:
         """Go on along a way with the next instants of a grid, as far as they fit; see `legs.leg`."""
@@ -129,38 +114,36 @@ class Solver:
         return _way(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant), planned=True)
 
     @property
-    def is_compiled(self) -> bool:
-        """Whether instants of a long grid are solved by machine code, which is there before the first of them."""
-        return self._native is not None
-
-    @cached_property
-    def width(self) -> int:
-        """How many instants of a long grid are solved side by side at least."""
-        return lot_width(self.model.system) if self._native is None else FEWEST_SIDE_BY_SIDE
+    def backend(self) -> str:
+        """What solves the instants of a long grid."""
+        return self.program.backend
 
     @property
-    def lanes(self) -> int:
-        """How many instants the vectors of machine code hold; only where solving `is_compiled`."""
-        assert self._native is not None
-        return self._native.lanes
+    def is_compiled(self) -> bool:
+        """Whether that is there before the first of them, as machine code is."""
+        return isinstance(self.program, OnLlvm)
+
+    @cached_property
+    def from_anchors(self) -> int:
+        """How many instants of a long grid start from anchors at least, unless the cache holds no span of so many."""
+        return FEWEST_FROM_ANCHORS if self.is_compiled else self.program.width
 
     @cached_property
     def longest_stride(self) -> int:
         """How far apart instants of a long grid that start from anchors are at most, so that the cache holds a span."""
-        if self._native is None:
-            return MAX_INSTANTS
-        return 2 ** int(math.log2(max(1, SPAN_ENTRIES // (self._entries * self.lanes))))
+        entries = SPAN_ENTRIES if self.is_compiled else XLA_SPAN_ENTRIES
+        return 2 ** int(math.log2(max(1, entries // (self._entries * self.program.width))))
 
     @cached_property
     def together(self) -> int:
-        """How many instants of a long grid are solved in one call at most."""
-        if self._native is None:
-            return self.width * lots_in_a_call(self.width, self._entries)
-        return max(self.width, min(MOST_SIDE_BY_SIDE, CALL_ENTRIES // self._entries))
+        """How many instants are solved in one call at most, where they are not solved in rounds."""
+        if not self.is_compiled:
+            return SMALL_BATCH  # by the program of legs, which is there
+        return max(FEWEST_FROM_ANCHORS, min(MOST_SIDE_BY_SIDE, CALL_ENTRIES // self._entries))
 
     @cached_property
-    def _native(self) -> Prepared | None:
-        """Machine code of `advance_instant`; None where instants are solved in arrays of XLA."""
+    def program(self) -> OnLlvm | OnXla:
+        """What solves many instants."""
         system, (tolerance, refine, _, wanted) = self.model.system, self._settings
         nothing = np.zeros(1)
         still = {name: np.zeros((self.order + 1, *x.shape)) for name, x in self.model.guess.items()}
@@ -173,7 +156,8 @@ class Solver:
         tables = max(map(np.size, jax.tree.leaves(laws)), default=0) > LARGE
         how = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE, "hasty": self.hasty}
         shared = system, tolerance, refine, wanted
-        return advance_instant.program(shared, instants, **how, pose_type=kind, order=self.order)
+        width = round_width(system)
+        return advance_instant.program(shared, instants, **how, width=width, pose_type=kind, order=self.order)
 
     @cached_property
     def _batches(self) -> int:
@@ -203,7 +187,7 @@ class Solver:
             pose_type=kind,
             order=self.order,
             batches=self._batches,
-            native=None if self._native is None else self._native.name,
+            native=self.program.name if isinstance(self.program, OnLlvm) else None,
         )
 
     def fault(self, arrival: Arrival, lane: int) -> str:

@@ -1,10 +1,10 @@
-"""Spans of a long grid, each solved by machine code from the anchors of a motion alone: in any order, in any thread.
+"""Spans of a long grid, each solved from the anchors of a motion alone: in any order, in any thread.
 
 An instant is predicted from the one whose index is its own with the last binary one set to zero, unless it is a
 multiple of a stride, a power of two, and starts from an anchor; or from the anchor, where that is nearer. So the
 instants from a multiple of the stride up to the next one start from nothing beyond it. A span is as many of these as a
-vector has lanes. Its instants are solved in rounds, of as many as there are lanes, in the memory of a thread, which
-stays in the cache; what is wanted of them is copied out of it.
+round has instants: a vector of machine code, or what XLA solves side by side. They are solved round after round, in the
+memory of a thread, which stays in the cache; what is wanted of them is copied out of it.
 """
 
 import threading
@@ -16,11 +16,15 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.kinematics.kept_memory import arrays_in, borrow, give_back, room_of
+from jounce.execution.kept_memory import arrays_in, borrow, give_back, room_of
+from jounce.kinematics.advance import SolvedState
 from jounce.kinematics.path_following import Anchor, FollowedPath
-from jounce.kinematics.solver import Solver
+from jounce.kinematics.solver import SMALL_BATCH, Solver
 from jounce.mechanism.time import nearest_instants
 
+Indices = Int[np.ndarray, " lane"]
+LONG_GRID = 1024  # instants: from here on in spans
+FEW_BATCHES = 4  # of instants: they all start from anchors
 GROUP = 64  # instants that a lane takes up one after another, once all multiples of so many are solved
 
 
@@ -43,6 +47,25 @@ class Span(NamedTuple):
     def place(self) -> slice:
         """Where they are in arrays of all instants."""
         return slice(self.first, self.first + self.count)
+
+
+def stride_of(solver: Solver, left: int, count: int, anchors: int) -> int:
+    """Return how far apart the instants that start from anchors are, a power of two.
+
+    Parameters
+    ----------
+    solver : Solver
+        What solves them.
+    left, count : int
+        How many of a grid are to be solved, and how many there are.
+    anchors : int
+        From how many. Where few instants are left, they all start from anchors.
+    """
+    width, stride = solver.from_anchors if count > LONG_GRID else SMALL_BATCH, 1
+    if left > FEW_BATCHES * width:
+        while count // (2 * stride) >= max(2 * anchors, width) and 2 * stride <= solver.longest_stride:
+            stride *= 2
+    return stride
 
 
 def spans_of(first: int, count: int, stride: int, width: int) -> list[Span]:
@@ -70,11 +93,15 @@ def rounds(count: int, stride: int, width: int) -> Int[np.ndarray, "round lane"]
     return np.where(whole < count, whole, whole[:, :1])
 
 
-@lru_cache(maxsize=16)
-def _neighbours(count: int, stride: int) -> tuple[Int[np.ndarray, " lane"], Bool[np.ndarray, " lane"]]:
-    """Return the neighbour of each instant of a span, and whether it is solved before."""
-    lanes = np.arange(count)
+def neighbours(lanes: Indices, stride: int) -> tuple[Indices, Bool[np.ndarray, " lane"]]:
+    """Return the neighbour of each of some instants, by index, and whether it is solved before."""
     return lanes & (lanes - 1), lanes & (stride - 1) > 0
+
+
+@lru_cache(maxsize=16)
+def _neighbours(count: int, stride: int) -> tuple[Indices, Bool[np.ndarray, " lane"]]:
+    """Return the neighbour of each instant of a span, and whether it is solved before."""
+    return neighbours(np.arange(count), stride)
 
 
 class _Room:
@@ -83,7 +110,7 @@ class _Room:
     Parameters
     ----------
     solver : Solver
-        Whose machine code solves the instants.
+        What solves the instants.
     like : tuple
         The state of an anchor.
     size, anchors : int
@@ -92,14 +119,17 @@ class _Room:
 
     def __init__(self, solver: Solver, like: Any, size: int, anchors: int):
         leaves, form = jax.tree.flatten(like)
-        shapes = [*((*leaf.shape[:-1], size + anchors) for leaf in leaves), *[(size,)] * 4]
+        room = solver.program.room(size + anchors)
+        shapes = [*((*leaf.shape[:-1], room) for leaf in leaves), *[(room,)] * 4]
         self.block, self._size = borrow(room_of(shapes)), size
         kinds = [*[float] * (len(leaves) + 2), *[int] * 2]
         *state, self._time, self._step, self.status, self._source = arrays_in(self.block, shapes, kinds)
         self.state = jax.tree.unflatten(form, state)
-        self._source[:] = 0
-        self._relay = solver.relay(self.state, self._step, self._time, self.status, self._source)
-        self._rounds = rounds(0, 1, self._relay.width)
+        for part in (self._time, self._step, self.status, self._source):
+            part[:] = 0
+        self._width = solver.program.width
+        self._run = solver.rounds(self.state, self._step, self._time, self.status, self._source)
+        self._rounds = rounds(0, 1, self._width)
 
     def begin(self, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
         """Take up the instants of a span, s, with the anchors around it."""
@@ -115,15 +145,26 @@ class _Room:
         self._time[:count] = time
         self._source[:count] = np.where(near, neighbour, self._size + nearest)
         self._step[:count] = np.where(near, to_neighbour, to_anchor)
-        self._rounds = rounds(count, stride, self._relay.width)
+        self._rounds = rounds(count, stride, self._width)
 
     def solve(self) -> None:
         """Solve the instants that were taken up last."""
-        self._relay(self._rounds)
+        self._run(self._rounds)
 
     def found(self, count: int) -> tuple[Any, Int[np.ndarray, " lane"]]:
         """Return the states and the outcome of so many of them."""
         return jax.tree.map(lambda x: x[..., :count], self.state), self.status[:count]
+
+
+def prepare_spans(solver: Solver, like: SolvedState, count: int) -> None:
+    """Compile what solves a grid of so many instants, unless it is there already; nothing is solved."""
+    if solver.is_compiled:
+        return
+    anchors = SMALL_BATCH  # as many as there are likely to be
+    size = min(count, stride_of(solver, count, count, anchors) * solver.program.width)
+    room = _Room(solver, like, size, anchors)
+    room.solve()
+    give_back(room.block)
 
 
 def solve_spans(
@@ -141,7 +182,7 @@ def solve_spans(
     Parameters
     ----------
     solver : Solver
-        Whose solving `is_compiled`.
+        What solved the path.
     path : FollowedPath
         The motion, followed to all these instants.
     time : array of shape (time,)

@@ -35,6 +35,8 @@ class Stretches:
         When the motion passes a singular position smoothly, s, as those of a `Motion`; known from the start.
     passages : tuple of Passage
         The change points, with how far the motion carries as a Taylor series at each, as those of a `Motion`.
+    backend : str
+        Which arithmetic gives the numbers, as that of a `Motion`.
     derived : dict
         What was computed of the stretches and may be wanted again, by name.
     """
@@ -47,7 +49,9 @@ class Stretches:
         order: int,
         progress: Callable[[int, int], None] | None,
         threads: int,
+        backend: str,
     ):
+        self.backend = backend
         self.mechanism, self.time, self.order = mechanism, time, order
         self.status = np.zeros(len(time), np.int8)  # pages of zeros take no memory
         self.faults: dict[int, str] = {}
@@ -67,8 +71,8 @@ class Stretches:
             failed = np.flatnonzero(part.status != Status.OK)
             self.status[first + failed] = part.status[failed]
             self.faults |= {first + lane: fault for lane, fault in part.faults.items()}
-            outcome = part.status, part.faults, self.passages
-            yield actuated(Motion(self.mechanism, model, part.time, self.order, part.state, *outcome, history))
+            outcome = part.status, part.faults, self.passages, history, self.backend
+            yield actuated(Motion(self.mechanism, model, part.time, self.order, part.state, *outcome))
 
 
 def takes_stretches(mechanism: Mechanism) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.kinematics.mobility_series import FULFILLED, ReducedConstraints
-from jounce.kinematics.quadratic_forms import polarised
+from jounce.linear_algebra.quadratic_forms import polarised
 
 STARTS = 400  # directions from which tangents are sought
 MOST_CURVES = 16

@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jounce.errors import UnsupportedError
+from jounce.execution.compilation import compiled
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.motion import Motion
 from jounce.kinematics.pose_outputs import output_series
 from jounce.kinematics.sensitivities import Solved

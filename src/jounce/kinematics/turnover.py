@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from jounce.jet import Jet
 from jounce.kinematics.factors import Factor, factored
-from jounce.kinematics.frontal import FrontalFactor
+from jounce.linear_algebra.frontal import FrontalFactor
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers, Real

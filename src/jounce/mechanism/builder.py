@@ -14,6 +14,8 @@ from jaxtyping import Float
 from jounce.constraints.base import field_kinds, value_fields
 from jounce.errors import JounceError
 from jounce.jet import Jet
+from jounce.linear_algebra.fronts import Fronts, elimination
+from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism.axis_angles import (
     AttitudeHistory,
     PrescribedAngle,
@@ -24,10 +26,8 @@ from jounce.mechanism.axis_angles import (
     with_datum_of,
     with_datums,
 )
-from jounce.mechanism.fronts import Fronts, elimination
 from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.outputs import AbstractMotionOutput
-from jounce.mechanism.pattern import Pattern
 from jounce.mechanism.resolve import along_instances, resolve, resolved
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, group_elements, holding, law_left_out
 from jounce.modules import unchecked, with_fields

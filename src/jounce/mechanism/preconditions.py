@@ -11,7 +11,7 @@ import numpy as np
 from jax.core import Tracer, eval_context
 
 from jounce.errors import UnsupportedError
-from jounce.interrupts import left_behind
+from jounce.settings import check_process
 from jounce.trajectory import Expression
 from jounce.units.dimensions import Dimension
 
@@ -23,19 +23,6 @@ WHAT_IS_NOT_TRACED = (
     "jn.{} is differentiated by values of the mechanism only: instants, their number, orders, tolerances and names "
     "cannot be traced by jax.jit, jax.grad or jax.vmap; the derivative by an instant is the next time derivative"
 )
-
-
-def check_process() -> None:
-    """Raise UnsupportedError in a process that was forked after JAX had started: it would wait for ever.
-
-    XLA computes in threads, and a fork has none of them, only the locks that they held.
-    """
-    if left_behind():
-        raise UnsupportedError(
-            "this process was forked after JAX had already computed, and would wait forever for threads that a fork "
-            "does not have; start processes by 'spawn' or 'forkserver' (multiprocessing.get_context), or fork "
-            "before the first computation"
-        )
 
 
 def concrete(

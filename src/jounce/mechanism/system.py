@@ -11,8 +11,8 @@ from jaxtyping import Bool, Float
 
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
-from jounce.mechanism.fronts import Fronts
-from jounce.mechanism.pattern import Pattern
+from jounce.linear_algebra.fronts import Fronts
+from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism.resolve import along_instances, group_key, resolve_element, stack_elements
 from jounce.mechanism.user_code import READINGS, readings_of, users_class, with_readings
 from jounce.modules import Module, unchecked, with_fields

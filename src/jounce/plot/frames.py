@@ -13,11 +13,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion
 from jounce.kinematics.assembly import assemble
-from jounce.kinematics.compilation import compiled
 from jounce.kinematics.curves.choice import chosen
 from jounce.mechanism import Mechanism, build, time_grid, with_outputs_held
 from jounce.mechanism.builder import starting_guess

@@ -19,8 +19,8 @@ from jounce.kinematics.assembly import (
     warn_of_parts_turned_over,
 )
 from jounce.kinematics.gauss_newton import put_together
-from jounce.kinematics.host_jacobian import HostJacobian
 from jounce.kinematics.mobility import facts_of, independent, mobility
+from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import with_reference
 from jounce.reporting.summaries import freedom_words

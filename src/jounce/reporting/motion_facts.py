@@ -47,6 +47,7 @@ class MotionFacts(TypedDict):
     equations_of_joints: int
     equations_of_drivers: int
     change_points: list[float]
+    backend: str  # which arithmetic gave the numbers
     coordinates: int
     remarks: list[str]
 
@@ -112,6 +113,7 @@ def motion_facts(motion: Motion | Stretches) -> dict[str, Any]:
         "equations_of_joints": len(rows) - drives,
         "equations_of_drivers": drives,
         "change_points": np.asarray(motion.change_points, float).tolist(),
+        "backend": motion.backend,
         "coordinates": len(mechanism.bodies) * (3 if mechanism.space == "planar" else 6),
         "remarks": _remarks(motion),
     }

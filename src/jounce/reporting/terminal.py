@@ -11,7 +11,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jounce.errors import AssemblyWarning, DamageWarning, RobotWarning, SampleWarning, UnitWarning
+from jounce.errors import AssemblyWarning, DamageWarning, MachineCodeWarning, RobotWarning, SampleWarning, UnitWarning
 from jounce.interrupts import undoing
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 OURS = (
     AssemblyWarning,
     DamageWarning,
+    MachineCodeWarning,
     RobotWarning,
     SampleWarning,
     UnitWarning,

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from jounce.jet import cross
 from jounce.jet.algebra import total
-from jounce.kinematics.linear import DenseFactor
+from jounce.linear_algebra.linear import DenseFactor
 from jounce.modules import Module
 from jounce.robot.tree import Tree
 from jounce.robot.tree_scan import fill_slots, materialised, read_slot, write_slot

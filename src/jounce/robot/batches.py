@@ -1,7 +1,7 @@
-"""How batches of samples go through the algorithms: by machine code made of one sample's program, where there is any.
+"""How batches of samples go through the algorithms: one sample's program, run for many (see `execution.mapped`).
 
-Else in blocks of few sizes, batch last, in chunks for the cache. Machine code is used for a single sample, too: it is
-compiled as fast as one of XLA's programs, of which each size of blocks needs one, and called in a third of the time.
+Machine code is used for a single sample, too: it is compiled as fast as one of XLA's programs, of which each size of
+blocks needs one, and called in a third of the time.
 """
 
 import math
@@ -13,20 +13,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jounce.execution.mapped import SIDE_BY_SIDE, Mapped
+from jounce.execution.threads import thread_count
 from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
-from jounce.kinematics.compilation import Compiled
-from jounce.kinematics.device import on_processor
-from jounce.kinematics.side_by_side import SideBySide
-from jounce.kinematics.threads import Threads, thread_count
-from jounce.mechanism.preconditions import check_process
 from jounce.robot.abstract_robot import AbstractRobot
+from jounce.settings import check_process
 from jounce.shapes import is_traced
 
-CHUNK = 128  # samples that are computed side by side; a GPU computes a block at once
-LEAST_THREADED = 2**12  # samples of a thread that runs machine code: fewer are done before threads are started
+LEAST_THREADED = 2**12  # samples of a thread: fewer are done before threads are started
 MOST_LINES = 40_000  # of machine code's text: it is compiled in four seconds, XLA's programs for all widths in as many
-WIDTHS = (8, CHUNK, 16 * CHUNK)  # sizes of blocks: each compiles once for a kind of robot
-GPU_WIDTHS = (CHUNK, 2**12, 2**17)
+WIDTHS = (8, SIDE_BY_SIDE, 16 * SIDE_BY_SIDE)  # sizes of blocks by XLA: each compiles once for a kind of robot
 
 
 class Batched:
@@ -39,16 +35,15 @@ class Batched:
 
     def __init__(self, function: Callable[..., Any]):
         self.function = function
-        self._on_block = Compiled(self._chunks, ("static",), (Batched._chunks, function))
-        self.machine_code = SideBySide(
-            self._sample, rows=True, made_of=(Batched._sample, function), most_lines=MOST_LINES
+        self.mapped = Mapped(
+            self._sample, rows=True, made_of=(Batched._sample, function), most_lines=MOST_LINES, widths=WIDTHS
         )
         update_wrapper(self, function)
 
     @property
     def jitted(self) -> Any:
         """The function on a block of samples, as `jax.jit` returns it."""
-        return self._on_block.jitted
+        return self.mapped.on_xla.jitted
 
     @cached_property
     def nested(self) -> Any:
@@ -67,53 +62,17 @@ class Batched:
             found = self.nested(robot.tree, flat, constants, static)
             return jax.tree.map(lambda x: jnp.reshape(x, (*lead, *x.shape[1:])), found)
         flat = tuple(np.reshape(np.asarray(x), (count, *x.shape[axes:])) for x in arrays)
-        if (program := self.machine_code.program((robot.tree, constants), flat, static=static)) is not None:
-            found = program(flat, max(1, min(thread_count(), count // LEAST_THREADED)))
-            return jax.tree.map(lambda x: np.reshape(x, (*lead, *x.shape[1:])), found)
-
-        def computed(block: tuple[np.ndarray, ...]) -> Any:
-            return jax.block_until_ready(self._on_block(robot.tree, block, constants, static))
-
-        with Threads(thread_count()) as threads:
-            found = list(threads.map(computed, _blocks(flat)))
-
-        def joined(*parts: Any) -> Any:
-            whole = np.concatenate(parts)  # a copy that its user may write to
-            return np.reshape(whole[:count], (*lead, *whole.shape[1:]))
-
-        return jax.tree.map(joined, *found)
-
-    def _chunks(self, tree: Any, arrays: tuple[Any, ...], constants: Any, static: tuple[Any, ...]) -> Any:
-        width = arrays[0].shape[0]
-        if width <= CHUNK or not on_processor():
-            return self._block(tree, arrays, constants, static)
-        parts = tuple(jnp.reshape(x, (width // CHUNK, CHUNK, *x.shape[1:])) for x in arrays)
-        found = jax.lax.map(lambda part: self._block(tree, part, constants, static), parts)
-        return jax.tree.map(lambda x: jnp.reshape(x, (width, *x.shape[2:])), found)
+        program = self.mapped.program((robot.tree, constants), flat, static=static)
+        found = program(flat, max(1, min(thread_count(), count // LEAST_THREADED)))
+        return jax.tree.map(lambda x: np.reshape(x, (*lead, *x.shape[1:])), found)
 
     def _sample(self, shared: tuple[Any, Any], arrays: tuple[Any, ...], *, static: tuple[Any, ...]) -> Any:
-        """Return plain derivatives for those of one sample, last axes of length one."""
+        """Return plain derivatives for those of samples, which are along the last axis."""
         tree, constants = shared
         found = self.function(tree, tuple(map(taylor_coefficients, arrays)), constants, *static)
         return jax.tree.map(plain_derivatives, found)
 
     def _block(self, tree: Any, arrays: tuple[Any, ...], constants: Any, static: tuple[Any, ...]) -> Any:
-        last = tuple(taylor_coefficients(jnp.moveaxis(jnp.asarray(x), 0, -1)) for x in arrays)
-        found = self.function(tree, last, constants, *static)
-        return jax.tree.map(lambda x: jnp.moveaxis(plain_derivatives(x), -1, 0), found)
-
-
-def _blocks(arrays: tuple[np.ndarray, ...]) -> list[tuple[np.ndarray, ...]]:
-    """Cut arrays of samples into blocks of one of the known widths; the last one is filled up with zeros."""
-    count, start, blocks = len(arrays[0]), 0, []
-    small, middle, large = WIDTHS if on_processor() else GPU_WIDTHS
-    # half of a large block at least is in use, so that no more than twice is computed
-    width = small if count <= small else middle if count <= large // 2 else large
-    while start < count or not blocks:
-        left = count - start
-        taken = tuple(x[start : start + width] for x in arrays)
-        if left < width:
-            taken = tuple(np.concatenate([x, np.zeros((width - left, *x.shape[1:]))]) for x in taken)
-        blocks.append(taken)
-        start += width
-    return blocks
+        last = tuple(jnp.moveaxis(jnp.asarray(x), 0, -1) for x in arrays)
+        found = self._sample((tree, constants), last, static=static)
+        return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), found)

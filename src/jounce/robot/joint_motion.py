@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float
 
 from jounce.errors import RobotError, SingularityError, check_choice
 from jounce.jet.algebra import stacked
-from jounce.kinematics.linear import singular_values
+from jounce.linear_algebra.linear import singular_values
 from jounce.rigid.inertia import finite_numbers
 from jounce.robot.arguments import checked_position, floats
 from jounce.robot.batches import Batched

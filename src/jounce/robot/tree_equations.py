@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import total
-from jounce.kinematics.linear import DenseFactor
+from jounce.linear_algebra.linear import DenseFactor
 from jounce.modules import Module
 from jounce.rigid.spatial import body_axes, quaternion_spins
 from jounce.robot.articulated_bodies import ArticulatedBodies, RigidInertia

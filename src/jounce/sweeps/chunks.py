@@ -13,8 +13,8 @@ import numpy as np
 
 from jounce.design.design_space import Grid, Sobol
 from jounce.errors import JounceError, MechanismFileError, OutputError
+from jounce.execution.threads import thread_count
 from jounce.io.files.reading import recording
-from jounce.kinematics.threads import thread_count
 from jounce.sweeps.layout import axes_of, files_of
 from jounce.sweeps.manifest import check_same_arithmetic
 from jounce.sweeps.problems import Designs, Problem, Quantity
@@ -146,8 +146,8 @@ def _loaded(content: bytes) -> Plan:
     if prepare is not None:
         prepare()
     if user_files:
+        from jounce.execution.store import keep_programs
         from jounce.io.mechanisms.user_classes import import_file
-        from jounce.kinematics.store import keep_programs
 
         keep_programs(None)  # what is compiled may be other than this package says
         for path, digest in user_files.items():

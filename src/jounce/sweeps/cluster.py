@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from jounce.errors import JounceError, UnsupportedError
-from jounce.kinematics.threads import thread_count
+from jounce.execution.threads import thread_count
 from jounce.sweeps.chunks import Plan, compute_on_worker
 from jounce.sweeps.manifest import versions
 

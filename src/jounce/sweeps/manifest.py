@@ -14,8 +14,8 @@ import numpy as np
 from jounce.design.design_space import Grid, Sobol
 from jounce.design.variations import Values
 from jounce.errors import OutputError
-from jounce.kinematics.alone import is_wanted
-from jounce.kinematics.device import on_processor
+from jounce.execution.backends import is_wanted
+from jounce.execution.device import on_processor
 from jounce.sweeps.fingerprints import fingerprint
 
 FORMAT = 3  # of 1, digests told nothing of the sweep and the place of a chunk; of 2, coordinates were compressed

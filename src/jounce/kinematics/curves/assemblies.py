@@ -8,6 +8,7 @@ import numpy as np
 
 from jounce.display import Displayed
 from jounce.errors import AssemblyError, MobilityError
+from jounce.execution.device import resident
 from jounce.kinematics.assembly import (
     check_assembled,
     check_mobility,
@@ -20,7 +21,6 @@ from jounce.kinematics.curves.start import first_instant
 from jounce.kinematics.curves.starts import put_together_side_by_side
 from jounce.kinematics.curves.tracing import check_number, traced
 from jounce.kinematics.curves.walker import Walker
-from jounce.kinematics.device import resident
 from jounce.kinematics.gauss_newton import put_together
 from jounce.kinematics.senses import drawn_senses, senses
 from jounce.mechanism import Mechanism, build, check_mechanism

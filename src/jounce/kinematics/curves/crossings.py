@@ -12,8 +12,8 @@ from jaxtyping import Float
 
 from jounce.errors import SolveError
 from jounce.kinematics.curves.walker import Place, Walker, all_finite
-from jounce.kinematics.quadratic_forms import polarised
 from jounce.kinematics.status import Status
+from jounce.linear_algebra.quadratic_forms import polarised
 
 PASSAGE_ORDER = 8  # of the series that leads through: rounding spoils higher coefficients near a singular place
 NEAR = 0.02  # of the radius of the series: from so near its terms up to that order are good to rounding

@@ -12,11 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.jet.series import Recursion
-from jounce.kinematics.compilation import compiled
-from jounce.kinematics.linear import DenseFactor
+from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.builder import pose_at
 from jounce.mechanism.system import System
 from jounce.rigid import PlanarPose, SpatialPose

@@ -8,10 +8,10 @@ from jaxtyping import Float
 
 from jounce.constraints.base import field_kind, value_fields
 from jounce.errors import MechanismError, MobilityError, SingularityError, check_name
+from jounce.execution.device import resident
 from jounce.jet import Jet
 from jounce.kinematics.assembly import check_assembled, freely_moving, settled
 from jounce.kinematics.curves.walker import Place, Walker
-from jounce.kinematics.device import resident
 from jounce.mechanism import Mechanism, build, time_grid
 from jounce.modules import with_fields
 from jounce.trajectory import ExpressionMotion

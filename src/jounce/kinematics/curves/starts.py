@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.execution.compilation import compiled
 from jounce.jet import Jet
-from jounce.kinematics.compilation import compiled
-from jounce.kinematics.linear import DenseFactor
+from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.builder import pose_at
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from jounce.dynamics.reactions import driver_force
 from jounce.dynamics.trajectories import FollowedTrajectory
 from jounce.errors import MechanismError, RobotError, SampleWarning
-from jounce.kinematics.chunks import in_chunks
+from jounce.execution.chunks import in_chunks
 from jounce.kinematics.solve import solve
 from jounce.mechanism import Mechanism, time_grid
 from jounce.mechanism.driver_outputs import is_turning

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.kinematics.chunks import in_chunks
+from jounce.execution.chunks import in_chunks
 from jounce.trajectory import AbstractMotion, SplineMotion
 from jounce.trajectory.stacking import law_derivatives
 

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from jounce.kinematics.linear import DenseFactor
+from jounce.linear_algebra.linear import DenseFactor
 from jounce.modules import Module
 from jounce.planning.tool_paths.tool_tasks import Tool, columns_of, task_rows
 from jounce.robot.tree import Tree

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.kinematics.compilation import compiled
+from jounce.execution.compilation import compiled
 from jounce.planning.tool_paths.path_equations import PathEquations
 
 ORDER = 6  # of the series from node to node

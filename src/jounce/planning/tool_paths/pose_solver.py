@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.kinematics.linear import DenseFactor, singular_values
+from jounce.linear_algebra.linear import DenseFactor, singular_values
 from jounce.planning.tool_paths.tool_tasks import Goal, columns_of, misses
 from jounce.robot.batches import Batched
 from jounce.robot.tree import Tree

@@ -9,10 +9,10 @@ from jaxtyping import Float, Int
 
 from jounce.display import Displayed
 from jounce.errors import TrajectoryError
+from jounce.execution.chunks import in_chunks
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Status
-from jounce.kinematics.chunks import in_chunks
-from jounce.kinematics.linear import singular_values
+from jounce.linear_algebra.linear import singular_values
 from jounce.planning.tool_paths.joint_laws import followed_closely
 from jounce.planning.tool_paths.path_equations import PathEquations
 from jounce.planning.tool_paths.path_marching import Nodes, predicted

@@ -1,0 +1,63 @@
+"""Which arithmetic computes: machine code made by LLVM, or XLA, which takes its place where there is none."""
+
+import os
+import warnings
+from collections.abc import Iterable
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.errors import MachineCodeWarning
+from jounce.execution.device import device_name, on_processor
+from jounce.execution.llvm import self_test
+
+VARIABLE = "JOUNCE_NATIVE"  # 0 leaves everything to XLA
+LLVM, XLA = "llvm", "xla"
+_told: set[str] = set()
+
+
+def is_wanted() -> bool:
+    """Tell whether there is to be machine code: there is a compiler, and nothing forbids it."""
+    return os.environ.get(VARIABLE, "") != "0" and self_test.is_usable() and on_processor()
+
+
+def xla_backend() -> str:
+    """Return the name of XLA as what computes, with its device unless that is the processor.
+
+    Examples
+    --------
+    >>> from jounce.execution.backends import xla_backend
+    >>> xla_backend()
+    'xla'
+    """
+    return XLA if on_processor() else f"{XLA} on {device_name()}"
+
+
+def backend_of(results: Any) -> str:
+    """Return the name of what has computed results of a compiled function: machine code puts them in NumPy's arrays."""
+    return LLVM if all(isinstance(x, np.ndarray) for x in jax.tree.leaves(results)) else xla_backend()
+
+
+def joined(backends: Iterable[str]) -> str:
+    """Return the names of what has computed parts of a result, each once.
+
+    Examples
+    --------
+    >>> from jounce.execution.backends import joined
+    >>> joined(["xla", "llvm", "xla"])
+    'llvm, xla'
+    """
+    return ", ".join(sorted(set(backends)))
+
+
+def tell_missing(operation: str) -> None:
+    """Warn, once for each operation, that XLA computes what has it, since there is no machine code for it."""
+    if operation in _told:
+        return
+    _told.add(operation)
+    message = (
+        f"there is no machine code for the operation {operation!r} of JAX: XLA computes what has it, with the same "
+        "results in two to six times the time; another form of that operation may be faster"
+    )
+    warnings.warn(message, MachineCodeWarning, stacklevel=2)

@@ -1,0 +1,47 @@
+"""Values at many instants, computed in chunks of a few lengths, so that one program serves grids of any length."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import jax
+import numpy as np
+from jaxtyping import Int
+
+from jounce.execution.threads import Threads, thread_count
+
+Found = TypeVar("Found")
+
+WIDTHS = (256,)  # instants: one program serves a motion, its peaks and a long grid
+
+
+def in_chunks(
+    function: Callable[[Int[np.ndarray, " chunk"]], Found], count: int, widths: tuple[int, ...] = WIDTHS, axis: int = -1
+) -> Found:
+    """Return what a function of indices of instants gives, for all of them; few lengths of chunks are compiled.
+
+    Chunks are computed in several threads at once; the function must let them.
+
+    Parameters
+    ----------
+    function : callable
+        Maps indices to a pytree of arrays with the instants along the axis.
+    count : int
+        How many instants there are, at least one.
+    widths : tuple of int
+        Lengths of chunks, increasing: the first that holds all instants, or else the last. The last chunk is filled up.
+    axis : int, default -1
+        Of the instants in the results.
+    """
+    width = next((width for width in widths if count <= width), widths[-1])
+
+    def computed(first: int) -> Any:
+        return jax.tree.map(np.asarray, function(np.minimum(np.arange(first, first + width), count - 1)))
+
+    with Threads(thread_count()) as threads:
+        parts = list(threads.map(computed, range(0, count, width)))
+
+    def whole(*arrays: np.ndarray) -> np.ndarray:
+        joined = np.concatenate(arrays, axis)
+        return joined[(slice(None),) * (axis % joined.ndim) + (slice(count),)]
+
+    return jax.tree.map(whole, *parts)

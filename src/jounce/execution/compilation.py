@@ -1,0 +1,280 @@
+"""How the solver's functions are compiled, and how what was compiled is kept for other processes.
+
+Where a store is given to `keep_programs`, compiled programs go there, and come from there without the functions being
+traced: half of the time of a first use is Python's. Without one, which is how the package is imported, `jax.jit` does
+everything.
+"""
+
+import inspect
+import io
+import os
+import pickle
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache, cached_property, partial, update_wrapper
+from typing import Any
+
+import jax
+import numpy as np
+from jax.core import Tracer
+from jax.experimental import serialize_executable
+
+from jounce.execution.device import on_processor
+from jounce.execution.store import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
+from jounce.execution.structure import UndescribedError, program_key, settings
+from jounce.execution.translated import Translated
+from jounce.jax_internals import description_reader, runs_at_once, without_sources
+from jounce.settings import check_process, under_own_settings
+
+LARGE = 32  # numbers of an array that stays in memory in machine code of one instant
+_NOTHING = jax.tree.structure(())
+_thread = threading.local()
+
+
+@contextmanager
+def compiling_anew() -> Iterator[None]:
+    """Have this thread compile meanwhile, and take nothing from JAX's own store, which asks `compiles_anew`.
+
+    What XLA has read from bytes it cannot write again: it loses functions on the way.
+    """
+    _thread.anew = True
+    try:
+        yield
+    finally:
+        _thread.anew = False
+
+
+def compiles_anew() -> bool:
+    """Tell whether this thread is to compile, and takes nothing from JAX's own store."""
+    return getattr(_thread, "anew", False)
+
+
+class StoppedError(Exception):
+    """What this thread compiles is of no use any more."""
+
+
+def check_wanted() -> None:
+    """Raise StoppedError where what this thread compiles is of no use any more."""
+    if (enough := getattr(_thread, "enough", None)) is not None and enough.is_set():
+        raise StoppedError
+
+
+@contextmanager
+def stopped_by(event: threading.Event) -> Iterator[None]:
+    """Have this thread raise StoppedError in the place of a program that it wants after an event."""
+    _thread.enough = event
+    try:
+        yield
+    finally:
+        del _thread.enough
+
+
+UNENDING = ("simplify-while-loops", "while-loop-invariant-code-motion", "while-loop-constant-sinking", "reshape-mover")
+"""XLA's passes that undo each other's work, some twenty or thirty times: those over loops, which have nothing for them
+to do here, and one that moves reshapes to where its simplifier does not want them."""
+
+
+def compiler_options(*, narrow: bool = False) -> dict[str, Any] | None:
+    """Return options that halve XLA's compile time of long chains of small operations, without making them slower.
+
+    They are private to XLA: those that a release does not know are left out. There are none on a GPU.
+
+    Parameters
+    ----------
+    narrow : bool, default False
+        Whether arrays are so short that most of the time is that of calling operations: then LLVM need not do more
+        than the first level of its optimisations, a fifth of the time in which a program is compiled.
+    """
+    if not on_processor():
+        return None
+    options = {"xla_cpu_use_fusion_emitters": False, "xla_disable_hlo_passes": ",".join(UNENDING)}
+    if narrow and not _level_is_set():
+        options["xla_backend_optimization_level"] = 1
+    return {name: value for name, value in options.items() if name in _known_options()} or None
+
+
+def _level_is_set() -> bool:
+    """Tell whether the environment says how much LLVM is to optimise."""
+    return "xla_backend_optimization_level" in os.environ.get("XLA_FLAGS", "")
+
+
+@cache
+def _known_options() -> frozenset[str]:
+    """Return which of the options this release of XLA has; JAX 0.11, for one, came without the older emitters."""
+    options = {"xla_cpu_use_fusion_emitters": False, "xla_disable_hlo_passes": "", "xla_backend_optimization_level": 1}
+    if _are_known(options):
+        return frozenset(options)
+    return frozenset(name for name, value in options.items() if _are_known({name: value}))
+
+
+def _are_known(options: dict[str, Any]) -> bool:
+    try:
+        jax.jit(lambda: 0.0, compiler_options=options).lower().compile()
+    except (RuntimeError, ValueError):  # jax.errors.JaxRuntimeError is a RuntimeError
+        return False
+    return True
+
+
+class Compiled:
+    """A function compiled at its first call, as by `jax.jit` with the solver's options.
+
+    Parameters
+    ----------
+    function : callable
+        Of arrays, of pytrees of them, and of static arguments.
+    static : tuple of str
+        Names of the static arguments.
+    made_of : tuple of callable, optional
+        Functions of the package that say what it computes, where it is none of them itself.
+    narrow : bool, optional
+        Whether its arrays are short, as `compiler_options` has it.
+    brief : bool, optional
+        Whether a command calls it so seldom, or has it compute so little, that it waits longer for the compiler: then
+        LLVM optimises nothing where code is wanted soon, in half the time.
+    alone : bool or callable, optional
+        Whether machine code, all in one piece, is better where there is a compiler for it; or what tells that from the
+        arguments.
+    otherwise : mapping of str to object, optional
+        Static arguments where there is none, in the place of those given.
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        static: tuple[str, ...],
+        made_of: tuple[Callable[..., Any], ...] = (),
+        *,
+        narrow: bool = False,
+        brief: bool = False,
+        alone: Callable[..., bool] | bool = False,
+        otherwise: Mapping[str, Any] | None = None,
+    ):
+        self.function, self.static, self.made_of = function, static, made_of or (function,)
+        self.narrow, self.brief = narrow, brief
+        self._programs: dict[Any, Callable[..., Any]] = {}
+        self._suits_alone, self._otherwise = alone, dict(otherwise or {})
+        self.machine_code = Translated(function, self.made_of, alone=True)
+        self._names = tuple(inspect.signature(function).parameters)
+        self._traced = min([self._names.index(name) for name in static], default=len(self._names))
+        update_wrapper(self, function)
+
+    @cached_property
+    def jitted(self) -> Any:
+        """The function as `jax.jit` returns it."""
+        options = compiler_options(narrow=self.narrow)
+        return jax.jit(self.function, static_argnames=self.static, compiler_options=options)
+
+    @cached_property
+    def _within(self) -> Any:
+        """The function within a program of which it is a part: JAX takes options for the whole only."""
+        return jax.jit(self.function, static_argnames=self.static)
+
+    @under_own_settings
+    def __call__(self, *arguments: Any, **keywords: Any) -> Any:
+        """Call the compiled function."""
+        check_process()
+        check_wanted()
+        keywords |= zip(self._names[self._traced :], arguments[self._traced :], strict=False)
+        arguments = arguments[: self._traced]
+        static = {name: keywords.pop(name) for name in self.static if name in keywords}
+        leaves, tree = jax.tree.flatten((arguments, keywords))
+        traced = [leaf for leaf in leaves if isinstance(leaf, Tracer)]
+        suits = self._suits_alone if not traced else False
+        suits = suits if isinstance(suits, bool) else suits(*arguments, **keywords, **static)
+        if suits:
+            arrays = [np.asarray(leaf) for leaf in leaves]
+            hasty = is_wanted_soon()
+            code = self.machine_code.program((arrays, tree), ((), _NOTHING), static, large=LARGE, hasty=hasty)
+            if code is not None:
+                return code(arrays)
+        static |= self._otherwise
+        if traced:
+            whole = self.jitted if all(map(runs_at_once, traced)) else self._within
+            return whole(*arguments, **keywords, **static)
+        if (store := current_store()) is None:
+            return self.jitted(*arguments, **keywords, **static)
+        kinds = tuple(map(_kind, leaves))
+        if None in kinds:
+            return self.jitted(*arguments, **keywords, **static)
+        told = tuple((name, type(value), value) for name, value in static.items())
+        key = tree, kinds, told, self._level(), settings()
+        if (program := self._programs.get(key)) is not None:
+            return program(*arguments, **keywords)
+        self._programs[key], results = self._begun(store, tree, kinds, arguments, keywords, static)
+        return results
+
+    def _level(self) -> int | None:
+        """Return how much LLVM is to optimise, where that is less than it does otherwise."""
+        hasty = self.brief and is_wanted_soon() and on_processor() and not _level_is_set()
+        return 0 if hasty and "xla_backend_optimization_level" in _known_options() else None
+
+    def _begun(
+        self, store: Store, tree: Any, kinds: tuple[Any, ...], arguments: Any, keywords: Any, static: Mapping[str, Any]
+    ) -> tuple[Callable[..., Any], Any]:
+        """Return a program from the store, or one that is compiled, and kept there if it has a name; and its results.
+
+        A program from the store has run to its end before it is trusted.
+        """
+        level = self._level()
+        try:
+            key = program_key(self.made_of, tree, (*kinds, level), static)
+        except UndescribedError:
+            program = partial(self.jitted, **static)
+            return program, program(*arguments, **keywords)
+        if (kept := store.get(key)) is not None:
+            try:
+                program = _unpacked(kept, tree)
+                return program, jax.block_until_ready(program(*arguments, **keywords))
+            except Exception:  # noqa: BLE001 - whatever is wrong with it, it is compiled again
+                store.drop(key)
+        with compiling_anew():
+            lowered = self.jitted.lower(*arguments, **keywords, **static)
+            without_sources(lowered.compiler_ir())
+            program = lowered.compile(None if level is None else {"xla_backend_optimization_level": level})
+        if (content := _packed(program, tree)) is not None:
+            store.put(key, content)
+        return program, program(*arguments, **keywords)
+
+
+def _packed(program: Any, tree: Any) -> bytes | None:
+    """Return a program as bytes; None where it holds what cannot be written: calls into Python, or sorts that have run.
+
+    So a program is written before it is run; one that `jax.jit` has run before it was to be kept may be none.
+    """
+    try:
+        payload, in_tree, out_tree = serialize_executable.serialize(program)
+        content = packed((payload, out_tree))
+    except (RuntimeError, TypeError, ValueError, pickle.PicklingError):  # those of XLA are RuntimeErrors
+        return None
+    return content if in_tree == tree else None
+
+
+def _unpacked(content: bytes, tree: Any) -> Callable[..., Any]:
+    payload, out_tree = unpacked(content)
+    description_reader(Descriptions)(
+        io.BytesIO(payload), jax.devices()[0].client
+    ).load()  # or JAX would run whatever is named there
+    return serialize_executable.deserialize_and_load(payload, tree, out_tree)
+
+
+def _kind(leaf: Any) -> tuple[Any, ...] | None:
+    """Return what JAX compiles for in place of a value; None for what it traces, or what is on another device."""
+    if type(leaf) is np.ndarray or isinstance(leaf, np.generic):
+        return leaf.shape, str(leaf.dtype), False
+    if type(leaf) in (bool, int, float):
+        return (type(leaf).__name__,)
+    if isinstance(leaf, jax.Array) and not isinstance(leaf, Tracer) and leaf.sharding == _home():
+        return leaf.shape, str(leaf.dtype), leaf.weak_type
+    return None
+
+
+@cache
+def _home() -> jax.sharding.Sharding:
+    """Return where arrays are unless they were put elsewhere."""
+    return jax.sharding.SingleDeviceSharding(jax.devices()[0])
+
+
+def compiled(*static: str, **how: Any) -> Callable[[Callable[..., Any]], Compiled]:
+    """Compile the decorated function at its first call, with these static arguments, as `Compiled` has it."""
+    return lambda function: Compiled(function, static, **how)

@@ -1,0 +1,43 @@
+"""Machine code that calls other machine code: a program for many instants as part of one for a single instant."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from jounce.execution.llvm.machine import is_published
+from jounce.execution.llvm.text.code import Code
+from jounce.execution.llvm.text.stored import copied, room_for, stored
+from jounce.execution.llvm.text.values import UnsupportedOperationError, kind_of
+from jounce.execution.llvm.text.views import Array, Stored, contiguous
+
+
+def call(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
+    """Write a call of a program that is published, from JAX's call of a foreign function; its lanes are along axes.
+
+    Raises
+    ------
+    UnsupportedOperationError
+        If another function is called, or lanes would have to share what it does.
+    """
+    name, found = equation.params["target_name"], [variable.aval for variable in equation.outvars]
+    if not (code.alone and is_published(name)):
+        raise UnsupportedOperationError(f"a call of {name}")
+    results: list[Array] = [room_for(code, aval.shape, kind_of(aval.dtype), lanes=False) for aval in found]
+    arrays = [*(_in_one_piece(code, array) for array in given), *results]
+    addresses = code.fresh("m")
+    code.entry.append(f"{addresses} = alloca ptr, i64 {len(arrays)}, align 8")
+    code.memory += 8 * len(arrays)
+    for k, array in enumerate(arrays):
+        place = code.fresh()
+        code.lines.append(f"{place} = getelementptr ptr, ptr {addresses}, i64 {k}")
+        code.lines.append(f"store ptr {array.region.pointer}, ptr {place}, align 8")
+    code.intrinsics.add(f"declare void @{name}(ptr, i64)")
+    code.lines.append(f"call void @{name}(ptr {addresses}, i64 {found[0].shape[-1]})")
+    return results
+
+
+def _in_one_piece(code: Code, array: Array) -> Stored:
+    """Return an array whose numbers lie one after another from the beginning of its memory on."""
+    found = stored(code, array)
+    whole = found.is_same(contiguous(found.region, found.shape)) or not math.prod(found.shape)
+    return found if whole else copied(code, found)

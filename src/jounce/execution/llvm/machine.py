@@ -1,0 +1,131 @@
+"""Text for LLVM as machine code of this computer, in the memory of this process or as bytes for another one."""
+
+import ctypes
+import os
+import subprocess
+import sys
+import threading
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+HASTE = ("-regalloc=fast", "-enable-misched=false")  # options of LLVM
+LONG = 10_000  # lines, for which another process is worth its start
+_lock = threading.Lock()  # LLVM's state is one for the process
+_published: set[str] = set()
+
+
+@lru_cache(maxsize=1)
+def _binding() -> Any:
+    import llvmlite.binding as binding  # here, since most commands need no compiler
+
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    return binding
+
+
+@lru_cache(maxsize=1)
+def processor() -> tuple[str, str, str]:
+    """Return the compiler's release, the processor and what it can do, on which machine code depends."""
+    import llvmlite
+
+    with _lock:
+        binding = _binding()
+        return llvmlite.__version__, binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+
+
+def vector_width() -> int:
+    """Return how many doubles a vector of this processor has."""
+    can = processor()[2].split(",")
+    return 8 if "+avx512f" in can else 4 if "+avx" in can else 2
+
+
+def _target() -> Any:
+    binding = _binding()
+    _, name, features = processor()
+    return binding.Target.from_default_triple().create_target_machine(cpu=name, features=features, opt=1, jit=True)
+
+
+def compiled(text: str, *, hasty: bool = False) -> bytes:
+    """Return the machine code of a module, as an object file.
+
+    Parameters
+    ----------
+    text : str
+        Of the module.
+    hasty : bool, default False
+        Whether a third of the time is worth more than code that is twice as fast. Its results are the same.
+    """
+    elsewhere = hasty or (text.count("\n") > LONG and _cores() > 1)
+    found = _compiled_elsewhere(text, hasty) if elsewhere else None
+    return _compiled_here(text) if found is None else found
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _compiled_here(text: str) -> bytes:
+    processor()
+    with _lock:
+        module = _binding().parse_assembly(text)
+        return _target().emit_object(module)
+
+
+def _compiled_elsewhere(text: str, hasty: bool) -> bytes | None:
+    """Return what another process compiles, None if there can be none.
+
+    So this one need not wait for LLVM's lock; and LLVM's options are those of a process.
+    """
+    if not Path(sys.executable or "").name.startswith("python"):  # it may be an application that has Python within
+        return None
+    # by its file, as by its name it would import JAX; -P: nothing of the folder that this file is in
+    words = [sys.executable, "-P", __file__, *(HASTE if hasty else ())]
+    try:
+        return subprocess.run(words, input=text.encode(), capture_output=True, check=True).stdout
+    except (OSError, subprocess.SubprocessError):
+        return None
+
+
+def is_published(name: str) -> bool:
+    """Tell whether machine code that calls a function of this name finds it."""
+    return name in _published
+
+
+class MachineCode:
+    """The functions `run` and `relay` of an object file, in memory.
+
+    Parameters
+    ----------
+    binary : bytes
+        The object file, made by `compiled` on a processor like this one.
+    """
+
+    def __init__(self, binary: bytes):
+        processor()
+        with _lock:
+            binding = _binding()
+            self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target())
+            self._engine.add_object_file(binding.object_file.ObjectFileRef.from_data(binary))
+            self._engine.finalize_object()
+            address, relay = map(self._engine.get_function_address, ("run", "relay"))
+        self._address = address
+        self._run = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64)(address)
+        addresses, numbers = [ctypes.c_void_p] * 2, [ctypes.c_int64] * 3
+        self.relay = ctypes.CFUNCTYPE(None, *addresses, *numbers, *addresses, ctypes.c_int64)(relay)
+
+    def publish(self, name: str) -> None:
+        """Let machine code that is loaded from here on call `run` by a name, as long as this one is kept."""
+        with _lock:
+            _binding().add_symbol(name, self._address)
+            _published.add(name)
+
+    def __call__(self, addresses: Any, lanes: int) -> None:
+        """Run it: without Python's lock, so in several threads at once."""
+        self._run(addresses, lanes)
+
+
+if __name__ == "__main__":
+    for option in sys.argv[1:]:
+        _binding().set_option("", option)
+    sys.stdout.buffer.write(_compiled_here(sys.stdin.read()))

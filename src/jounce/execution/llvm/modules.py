@@ -1,0 +1,207 @@
+"""The module of LLVM that computes a function of JAX: its text, and its machine code."""
+
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.execution.llvm import rows as rows_
+from jounce.execution.llvm.machine import compiled, vector_width
+from jounce.execution.llvm.relays import relay_text
+from jounce.execution.llvm.text.arrays import constants
+from jounce.execution.llvm.text.code import Code, flat
+from jounce.execution.llvm.text.scalars import MOST_LINES
+from jounce.execution.llvm.text.stored import is_large, put, values_of
+from jounce.execution.llvm.text.values import Region, UnsupportedOperationError, kind_of
+from jounce.execution.llvm.text.views import Array, Stored, contiguous
+from jounce.execution.llvm.translation import translate
+from jounce.jax_internals import is_tried
+
+MOST_MEMORY = 2**20  # bytes of the stack: threads have little
+MOST_HEAP = 2**30  # bytes elsewhere
+_thread = threading.local()
+ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
+attributes #2 = { nounwind willreturn memory(none) "min-legal-vector-width"="512" "prefer-vector-width"="512" }
+attributes #1 = { nounwind "min-legal-vector-width"="512" "prefer-vector-width"="512" }
+!0 = !{}"""
+
+
+def object_file(
+    function: Callable[..., Any],
+    shared: Any,
+    lanes: Any,
+    known: Mapping[int, np.ndarray],
+    *,
+    rows: bool = False,
+    most_lines: int = MOST_LINES,
+    large: int | None = None,
+    alone: bool = False,
+    hasty: bool = False,
+) -> tuple[bytes, Any]:
+    """Return the machine code of a function of one instant, as an object file, and the form of its results.
+
+    Parameters
+    ----------
+    function : callable
+        Of two pytrees of arrays, those that all instants share and those of the instant; their last axis is of length
+        one, as is that of all results.
+    shared, lanes : pytree
+        Of arrays, or of what has the shape and type of one.
+    known : mapping
+        Leaves of `shared`, by their numbers, whose values are part of the program.
+    rows : bool, default False
+        Whether arrays of many instants, those given and the results, have the instants along their first axis.
+    most_lines : int, optional
+        Of LLVM's text.
+    large : int, optional
+        Arrays of more numbers stay in memory, and operations on them are loops: shorter code that takes longer. None
+        unless given.
+    alone : bool, default False
+        Whether there is one instant only, all of whose arrays are in `shared`.
+    hasty : bool, default False
+        As `compiled` has it.
+
+    Raises
+    ------
+    UnsupportedOperationError
+        Where there is no code for it, or too much; or a release of JAX that was not tried writes it otherwise.
+    """
+    count, options = len(jax.tree.leaves(shared)), {"most_lines": most_lines, "large": large, "alone": alone}
+    closed, results = jax.make_jaxpr(function, return_shape=True)(shared, lanes)
+    try:
+        text = _text(closed, count, known, vector_width(), rows=rows, **options)
+    except (AttributeError, KeyError, TypeError) as failure:  # of what JAX says of an operation, under another name
+        if is_tried():
+            raise
+        raise UnsupportedOperationError(f"JAX {jax.__version__}, which was not tried: {failure!r}") from failure
+    getattr(_thread, "written", lambda: None)()
+    return compiled(text, hasty=hasty), results
+
+
+@contextmanager
+def telling(written: Callable[[], None]) -> Iterator[None]:
+    """Call a function whenever this thread has written a module, which LLVM then compiles without Python's lock."""
+    _thread.written = written
+    try:
+        yield
+    finally:
+        del _thread.written
+
+
+def _text(
+    closed: Any,
+    shared: int,
+    known: Mapping[int, np.ndarray],
+    width: int,
+    *,
+    rows: bool = False,
+    most_lines: int = MOST_LINES,
+    large: int | None = None,
+    alone: bool = False,
+) -> str:
+    """Return the text of a module with a function `run` of the addresses of all arrays and the number of lanes."""
+    code, given = Code(width, most_lines, large=large, alone=alone), []
+    for number, variable in enumerate(closed.jaxpr.invars):
+        if number in known:
+            given.append(constants(code, known[number]))
+            continue
+        region = _region(code, number, kind_of(variable.aval.dtype), lanes=number >= shared and not alone)
+        shape = variable.aval.shape
+        if is_large(code, variable.aval) and not (rows and region.lanes):
+            given.append(contiguous(region, shape))
+            continue
+        array = np.empty(shape, object)
+        if rows and region.lanes:
+            array.ravel()[:] = rows_.read(code, region.pointer, array.size, region.kind)
+        else:
+            array.ravel()[:] = [code.load(region, k) for k in range(array.size)]
+        given.append(array)
+    results = translate(code, closed.jaxpr, [constants(code, number) for number in closed.consts], given)
+    for number, array in enumerate(results, len(given)):
+        _write(code, number, array, rows=rows)
+    if code.memory > MOST_MEMORY or code.heap > MOST_HEAP:
+        raise UnsupportedOperationError(f"{code.memory} bytes of the stack, and {code.heap} elsewhere")
+    borrowed, returned = [], []
+    if code.heap:
+        borrowed, returned = (
+            [
+                f"%block = call noalias ptr @malloc(i64 {code.heap + 64})",
+                "%begun = ptrtoint ptr %block to i64",
+                "%before = sub i64 0, %begun",
+                "%gap = and i64 %before, 63",
+                "%heap = getelementptr i8, ptr %block, i64 %gap",
+            ],
+            ["call void @free(ptr %block)"],
+        )
+    loop = [
+        f"%most = sub i64 %total, {width}",
+        "br label %lanes",
+        "lanes:",
+        "%done = phi i64 [0, %begin], [%next, %more]",
+        "%lane = call i64 @llvm.smin.i64(i64 %done, i64 %most)",  # the last vectors may share lanes
+        *code.lines,
+        "br label %more",
+        "more:",
+        f"%next = add i64 %done, {width}",
+        "%over = icmp sge i64 %next, %total",
+        "br i1 %over, label %end, label %lanes",
+        "end:",
+    ]
+    lines = [
+        *code.constants,
+        "define void @run(ptr noalias %arguments, i64 %total) #1 {",
+        "begin:",
+        *borrowed,
+        *code.entry,
+        *(code.lines if alone else loop),
+        *returned,
+        "ret void",
+        "}",
+        "declare noalias ptr @malloc(i64)",
+        "declare void @free(ptr)",
+        *sorted(code.intrinsics | {"declare i64 @llvm.smin.i64(i64, i64)"}),
+    ]
+    for name, count in sorted(code.functions):
+        lines += [f"declare double @{name}({', '.join(['double'] * count)}) #0", _lane_by_lane(name, count, width)]
+    if not alone:
+        lines.append(relay_text(width))
+    return "\n".join([*lines, ATTRIBUTES])
+
+
+def _region(code: Code, number: int, kind: str, *, lanes: bool) -> Region:
+    """Return the memory of an argument or a result."""
+    code.entry.append(f"%q{number} = getelementptr ptr, ptr %arguments, i64 {number}")
+    code.entry.append(f"%a{number} = load ptr, ptr %q{number}, align 8, !invariant.load !0")
+    return Region(f"%a{number}", kind, lanes, given=True)
+
+
+def _write(code: Code, number: int, array: Array, *, rows: bool) -> None:
+    if not array.size:
+        return
+    if isinstance(array, Stored) and not rows:
+        put(code, contiguous(_region(code, number, array.kind, lanes=not code.alone), array.shape), array)
+        return
+    values = flat(values_of(code, array))
+    region = _region(code, number, values[0].kind, lanes=not code.alone)
+    if rows:
+        rows_.write(code, region.pointer, values)
+        return
+    for k, value in enumerate(values):
+        code.store(region, k, value)
+
+
+def _lane_by_lane(name: str, count: int, width: int) -> str:
+    """Return the text of a function of C's library for a vector."""
+    vector, lines = f"<{width} x double>", []
+    for lane in range(width):
+        lines += [f"%e{lane}_{k} = extractelement {vector} %a{k}, i64 {lane}" for k in range(count)]
+        given = ", ".join(f"double %e{lane}_{k}" for k in range(count))
+        lines.append(f"%r{lane} = call double @{name}({given})")
+        before = "poison" if lane == 0 else f"%s{lane - 1}"
+        lines.append(f"%s{lane} = insertelement {vector} {before}, double %r{lane}, i64 {lane}")
+    listed = ", ".join(f"{vector} %a{k}" for k in range(count))
+    body = "\n".join([*lines, f"ret {vector} %s{width - 1}"])
+    return f"define internal {vector} @{name}_of_lanes({listed}) noinline #2 {{\n{body}\n}}"

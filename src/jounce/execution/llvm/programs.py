@@ -1,0 +1,223 @@
+"""A function of one instant as a program that runs it for many side by side."""
+
+import ctypes
+import hashlib
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.execution.llvm.machine import MachineCode, vector_width
+from jounce.execution.llvm.relays import Column, Relay
+
+
+class Layout:
+    """Where arrays are in one piece of memory: NumPy takes long to tell the address of an array.
+
+    Parameters
+    ----------
+    kinds : sequence of tuple
+        Shapes and types of the arrays.
+    begin : int, default 0
+        Bytes before them.
+
+    Attributes
+    ----------
+    places : array of int
+        Of the arrays, in bytes.
+    end : int
+        Of them all.
+    """
+
+    def __init__(self, kinds: Sequence[tuple[tuple[int, ...], Any]], begin: int = 0):
+        self._kinds = [(shape, np.dtype(dtype)) for shape, dtype in kinds]
+        self.places, self.end, self._groups = np.empty(len(kinds), np.int64), begin, []
+        by_type = sorted(range(len(kinds)), key=lambda k: self._kinds[k][1].str)
+        for _, group in itertools.groupby(by_type, key=lambda k: self._kinds[k][1].str):
+            members, first = list(group), -(-self.end // 64) * 64
+            dtype, sizes = self._kinds[members[0]][1], [math.prod(self._kinds[k][0]) for k in members]
+            ends = first + dtype.itemsize * np.cumsum([0, *sizes])
+            self.places[members], self.end = ends[:-1], int(ends[-1])
+            self._groups.append((members, slice(first, self.end), dtype))
+
+    def put(self, memory: np.ndarray, arrays: Sequence[np.ndarray]) -> None:
+        """Copy arrays of these shapes and types to their places in a memory of bytes."""
+        for members, place, dtype in self._groups:
+            np.concatenate([arrays[k] for k in members], axis=None, out=memory[place].view(dtype), casting="no")
+
+    def views(self, memory: np.ndarray) -> list[np.ndarray]:
+        """Return the arrays in a memory of bytes."""
+        return [np.ndarray(*kind, memory, place) for kind, place in zip(self._kinds, self.places, strict=True)]
+
+
+class Single:
+    """Machine code of a function of one instant, for it alone.
+
+    Parameters
+    ----------
+    binary : bytes
+        From `modules.object_file`, with `alone`.
+    given, results : pytree
+        Of what has the shapes and types of the arguments and of the results.
+    """
+
+    def __init__(self, binary: bytes, given: Any, results: Any):
+        self._run = MachineCode(binary)
+        leaves, (found, self._structure) = jax.tree.leaves(given), jax.tree.flatten(results)
+        self._addresses = 8 * (len(leaves) + len(found))  # bytes
+        self._given = Layout([(x.shape, x.dtype) for x in leaves], self._addresses)
+        self._results = Layout([(x.shape, x.dtype) for x in found], self._given.end)
+        self._places = np.concatenate([self._given.places, self._results.places])
+
+    def __call__(self, given: Sequence[np.ndarray]) -> Any:
+        """Return the results, for the leaves of the arguments, of the shapes and types that the program is for."""
+        memory = np.empty(self._results.end, np.uint8)
+        first = _address(memory)
+        np.add(self._places, first, out=memory[: self._addresses].view(np.int64))
+        self._given.put(memory, given)
+        self._run(first, 1)
+        return jax.tree.unflatten(self._structure, self._results.views(memory))
+
+
+class Program:
+    """Machine code that runs a function of one instant for many.
+
+    Parameters
+    ----------
+    binary : bytes
+        From `modules.object_file`.
+    given, results : pytree
+        Of what has the shapes and types of the arguments, shared and of an instant, and of the results for an instant.
+    rows : bool, default False
+        As for `object_file`.
+    """
+
+    def __init__(self, binary: bytes, given: tuple[Any, Any], results: Any, *, rows: bool = False):
+        self._run = MachineCode(binary)
+        self.name = f"jounce_{hashlib.sha256(binary).hexdigest()[:32]}"
+        shared, lanes = map(jax.tree.leaves, given)
+        self._shared = [(x.shape, x.dtype) for x in shared]
+        self._layout = Layout(self._shared)
+        self._lanes = [(x.shape[:-1], x.dtype) for x in lanes]
+        leaves, self._structure = jax.tree.flatten(results)
+        self._results = [(leaf.shape[:-1], leaf.dtype) for leaf in leaves]
+        self.width, self._rows = vector_width(), rows
+
+    def __call__(
+        self, shared: Sequence[np.ndarray], lanes: Sequence[np.ndarray], parts: int = 1, each: Callable[..., Any] = map
+    ) -> Any:
+        """Return the results.
+
+        Parameters
+        ----------
+        shared, lanes : sequence of array
+            Leaves of the arguments; instants along the last axis, or along the first.
+        parts : int, default 1
+            Among how many calls of the machine code the instants are shared, where they lie along the first axis.
+        each : callable, optional
+            What makes these calls, in the manner of `map`; the machine code may run in several threads.
+        """
+        axis = 0 if self._rows else -1
+        count = lanes[0].shape[axis]
+        total = max(count, self.width)
+        self._check(shared, lanes, count)
+        if total > count:
+            lanes = [_filled(x, total, axis) for x in lanes]
+        given = [np.ascontiguousarray(x) for x in lanes]
+        shapes = [((total, *shape) if self._rows else (*shape, total), dtype) for shape, dtype in self._results]
+        found = [np.empty(*shape) for shape in shapes]
+        memory = np.empty(self._layout.end, np.uint8)
+        self._layout.put(memory, shared)
+        arrays = [*given, *found]
+        addresses = [*(self._layout.places + _address(memory)).tolist(), *map(_address, arrays)]
+        if not self._rows or (vectors := total // self.width) < 2 or parts == 1:
+            self._run((ctypes.c_void_p * len(addresses))(*addresses), total)
+        else:
+            steps = [0] * len(shared) + [x.strides[0] for x in arrays]
+            ends = [vectors * k // parts * self.width for k in range(parts)] + [total]
+
+            def run(part: int) -> None:
+                start, stop = ends[part : part + 2]
+                if start < stop:
+                    here = [address + start * step for address, step in zip(addresses, steps, strict=True)]
+                    self._run((ctypes.c_void_p * len(here))(*here), stop - start)
+
+            list(each(run, range(parts)))
+        return jax.tree.unflatten(self._structure, [x[:count] if self._rows else x[..., :count] for x in found])
+
+    def relay(
+        self,
+        shared: Sequence[np.ndarray],
+        lanes: Sequence[Sequence[np.ndarray]],
+        results: Sequence[np.ndarray | None],
+        sources: np.ndarray,
+    ) -> Relay:
+        """Return what solves instants in rounds, of which later ones start from the results of earlier ones.
+
+        Parameters
+        ----------
+        shared : sequence of array
+            Leaves of what all instants share.
+        lanes : three sequences of array
+            Leaves of the arguments of an instant: those that it takes from its source, those that are its own, and
+            those that all have the same; see `Relay`.
+        results : sequence of array
+            Where the leaves of the results go; None for those that nobody wants.
+        sources : array of int
+            Index of the source of each instant.
+        """
+        if self._rows:
+            raise ValueError("instants are along the first axis")
+        _agree(shared, self._shared)
+        columns = [Column(*kind, x) for kind, x in zip(self._lanes, itertools.chain(*lanes), strict=True)]
+        first, second = itertools.accumulate(map(len, lanes[:2]))
+        kept = [Column(*kind, x) for kind, x in zip(self._results, results, strict=True)]
+        groups = columns[:first], columns[first:second], columns[second:], kept
+        return Relay(self._run.relay, shared, *groups, sources, self.width)
+
+    def publish(self) -> None:
+        """Make it known by its name to machine code, for `in_program`."""
+        if self._rows:
+            raise ValueError("instants are along the first axis")
+        self._run.publish(self.name)
+
+    def in_program(self, shared: Sequence[Any], lanes: Sequence[Any]) -> Any:
+        """Return the results as part of a program that becomes machine code, for arguments as in a call.
+
+        There is at least a vector of lanes. JAX's own call of foreign functions stands for this one (see
+        `calls.call`); XLA does not know the name.
+        """
+        count = lanes[0].shape[-1]
+        if count < self.width:
+            raise ValueError(f"{count} lanes, where a vector has {self.width}")
+        self._check(shared, lanes, count)
+        shapes = [jax.ShapeDtypeStruct((*shape, count), dtype) for shape, dtype in self._results]
+        return jax.tree.unflatten(self._structure, jax.ffi.ffi_call(self.name, shapes)(*shared, *lanes))
+
+    def _check(self, shared: Sequence[Any], lanes: Sequence[Any], count: int) -> None:
+        """Raise ValueError unless arrays of so many instants are of the shapes and types that the code reads."""
+        many = [((count, *shape) if self._rows else (*shape, count), dtype) for shape, dtype in self._lanes]
+        _agree([*shared, *lanes], [*self._shared, *many])
+
+
+def _address(array: np.ndarray) -> int:
+    return array.__array_interface__["data"][0]
+
+
+def _agree(arrays: Sequence[Any], wanted: Sequence[tuple[tuple[int, ...], Any]]) -> None:
+    """Raise ValueError unless arrays are of the shapes and types wanted."""
+    found = [(x.shape, x.dtype) for x in arrays]
+    if found != wanted:
+        raise ValueError(f"arrays of {found}, where the program was made for {wanted}")
+
+
+def _filled(x: np.ndarray, total: int, axis: int) -> np.ndarray:
+    """Repeat the last instant until there are so many; zeros where there is none."""
+    x = np.moveaxis(x, axis, 0)
+    found = np.zeros((total, *x.shape[1:]), x.dtype)
+    if len(x):
+        found[: len(x)], found[len(x) :] = x, x[-1]
+    return np.moveaxis(found, 0, axis)

@@ -1,0 +1,109 @@
+"""Arrays of many instants in which the numbers of each instant lie one after another: the layout of users' arrays.
+
+A vector wants one number of several instants. So many rows as a vector has lanes are read, as wide as a vector, and
+transposed in the registers; NumPy takes a third as long for it as the torque of an arm.
+"""
+
+from collections.abc import Sequence
+
+from jounce.execution.llvm.text.code import Code
+from jounce.execution.llvm.text.values import IN_MEMORY, Value
+
+
+def read(code: Code, pointer: str, size: int, kind: str) -> list[Value]:
+    """Return the numbers of the instants from `%lane` on, so many as each has."""
+    if size == 0:
+        return []
+    rows, of, hint = _rows(code, pointer, size, kind), f"<{code.width} x {IN_MEMORY[kind]}>", "!invariant.load !0"
+    found: list[str | None] = [None] * size
+    if size < code.width:
+        for k in range(size):
+            found[k] = "poison"
+            for lane, row in enumerate(rows):
+                one, more = code.fresh(), code.fresh()
+                place = _place(code, row, k, kind)
+                code.lines.append(f"{one} = load {IN_MEMORY[kind]}, ptr {place}, align {_align(kind)}, {hint}")
+                code.lines.append(f"{more} = insertelement {of} {found[k]}, {IN_MEMORY[kind]} {one}, i64 {lane}")
+                found[k] = more
+    for start in _starts(size, code.width):
+        block = []
+        for row in rows:
+            block.append(code.fresh())
+            place = _place(code, row, start, kind)
+            code.lines.append(f"{block[-1]} = load {of}, ptr {place}, align {_align(kind)}, {hint}")
+        found[start : start + code.width] = _transposed(code, block, kind)
+    return [Value(_truth(code, str(name)) if kind == "b" else str(name), kind, lanes=True) for name in found]
+
+
+def write(code: Code, pointer: str, values: Sequence[Value]) -> None:
+    """Put the numbers of the instants from `%lane` on, those of each one after another."""
+    size, kind = len(values), values[0].kind
+    rows, of = _rows(code, pointer, size, kind), f"<{code.width} x {IN_MEMORY[kind]}>"
+    names = [code.operand(value, lanes=True) for value in values]
+    if kind == "b":
+        names = [_wide(code, name) for name in names]
+    if size < code.width:
+        for k, name in enumerate(names):
+            for lane, row in enumerate(rows):
+                one, place = code.fresh(), _place(code, row, k, kind)
+                code.lines.append(f"{one} = extractelement {of} {name}, i64 {lane}")
+                code.lines.append(f"store {IN_MEMORY[kind]} {one}, ptr {place}, align {_align(kind)}")
+    for start in _starts(size, code.width):
+        block = _transposed(code, names[start : start + code.width], kind)
+        for row, name in zip(rows, block, strict=True):
+            place = _place(code, row, start, kind)
+            code.lines.append(f"store {of} {name}, ptr {place}, align {_align(kind)}")
+
+
+def _starts(size: int, width: int) -> list[int]:
+    """Return where blocks of columns begin; the last two may share some."""
+    return [] if size < width else [*range(0, size - width, width), size - width]
+
+
+def _rows(code: Code, pointer: str, size: int, kind: str) -> list[str]:
+    """Return where the numbers of each of the instants begin."""
+    first = code.fresh()
+    code.lines.append(f"{first} = mul i64 %lane, {size}")
+    start = _place(code, pointer, first, kind)
+    return [_place(code, start, lane * size, kind) for lane in range(code.width)]
+
+
+def _place(code: Code, pointer: str, index: int | str, kind: str) -> str:
+    name = code.fresh("p")
+    code.lines.append(f"{name} = getelementptr {IN_MEMORY[kind]}, ptr {pointer}, i64 {index}")
+    return name
+
+
+def _transposed(code: Code, block: Sequence[str], kind: str) -> list[str]:
+    """Return the columns of a square of numbers, of which the rows are given: bit after bit of the places changes."""
+    width, found = code.width, list(block)
+    of, bit = f"<{width} x {IN_MEMORY[kind]}>", 1
+    while bit < width:
+        low = [k if not k & bit else width + k - bit for k in range(width)]
+        high = [k + bit if not k & bit else width + k for k in range(width)]
+        for i in range(width):
+            if i & bit:
+                continue
+            pair = found[i], found[i + bit]
+            for place, picked in ((i, low), (i + bit, high)):
+                name, mask = code.fresh(), ", ".join(f"i32 {k}" for k in picked)
+                code.lines.append(f"{name} = shufflevector {of} {pair[0]}, {of} {pair[1]}, <{width} x i32> <{mask}>")
+                found[place] = name
+        bit *= 2
+    return found
+
+
+def _truth(code: Code, name: str) -> str:
+    found = code.fresh()
+    code.lines.append(f"{found} = trunc <{code.width} x i8> {name} to <{code.width} x i1>")
+    return found
+
+
+def _wide(code: Code, name: str) -> str:
+    found = code.fresh()
+    code.lines.append(f"{found} = zext <{code.width} x i1> {name} to <{code.width} x i8>")
+    return found
+
+
+def _align(kind: str) -> int:
+    return {"b": 1, "i": 4}.get(kind, 8)

@@ -1,0 +1,141 @@
+"""Operations along axes of arrays: sums, products, extremes, and products of matrices."""
+
+import itertools
+from collections.abc import Callable, Sequence
+from functools import partial, reduce
+from typing import Any
+
+import numpy as np
+
+from jounce.execution.llvm.text.arrays import Rule, Values, each
+from jounce.execution.llvm.text.code import Code, flat
+from jounce.execution.llvm.text.values import DTYPES, UnsupportedOperationError, Value, kind_of
+
+MOST_SORTED = 16  # numbers
+
+
+def nothing(operation: str, kind: str) -> Any:
+    """Return what an operation gives of no numbers."""
+    if operation in ("add", "mul"):
+        return operation == "mul"
+    if operation in ("and", "or"):
+        return 0 if operation == "or" else True if kind == "b" else -1
+    if kind == "b":
+        return operation == "min"
+    limits = (-np.inf, np.inf) if kind == "f" else (np.iinfo(DTYPES[kind]).min, np.iinfo(DTYPES[kind]).max)
+    return limits[operation == "min"]
+
+
+def combination(code: Code, operation: str) -> Callable[[Value, Value], Value]:
+    """Return what combines two numbers to their sum, product, or the like."""
+    return partial(code.logic if operation in ("and", "or") else code.arithmetic, operation)
+
+
+def _combined(code: Code, operation: str, values: Sequence[Value], kind: str) -> Value:
+    """Return the sum, product, or the like of numbers of one kind."""
+    if not values:
+        return code.constant(nothing(operation, kind), kind)
+    return reduce(combination(code, operation), values)
+
+
+def reduction(operation: str) -> Rule:
+    """Return the rule for an operation on all numbers along some axes."""
+
+    def rule(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+        axes, array = equation.params["axes"], given[0]
+        kept = [axis for axis in range(array.ndim) if axis not in axes]
+        together = int(np.prod([array.shape[axis] for axis in axes]))
+        rows = array.transpose(*kept, *axes).reshape(*(array.shape[axis] for axis in kept), together)
+        found, kind = np.empty(rows.shape[:-1], object), kind_of(equation.outvars[0].aval.dtype)
+        for place in np.ndindex(found.shape):
+            found[place] = _combined(code, operation, flat(rows[place]), kind)
+        return [found]
+
+    return rule
+
+
+def extreme(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return where the largest or smallest number along an axis is, the first of equals; NaN before all."""
+    (axis,) = equation.params["axes"]
+    kind, rows = kind_of(equation.params["index_dtype"]), np.moveaxis(given[0], axis, -1)
+    found = np.empty(rows.shape[:-1], object)
+    for place in np.ndindex(found.shape):
+        best, at = rows[place][0], code.constant(0, kind)
+        for k, value in enumerate(flat(rows[place])[1:], 1):
+            better = is_better(code, equation.primitive.name, value, best)
+            best = code.select(better, value, best)
+            at = code.select(better, code.constant(k, kind), at)
+        found[place] = at
+    return [found]
+
+
+def is_better(code: Code, operation: str, value: Value, best: Value) -> Value:
+    """Tell whether a number is rather what `argmax` or `argmin` looks for than the best before: NaN before all."""
+    better = code.compare("gt" if operation == "argmax" else "lt", value, best)
+    if value.kind != "f":
+        return better
+    nan, known = code.compare("ne", value, value), code.compare("eq", best, best)
+    return code.logic("or", better, code.logic("and", nan, known))
+
+
+def cumulative(operation: str) -> Rule:
+    """Return the rule for an operation on each number along an axis and all before it."""
+
+    def rule(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+        axis, backward = equation.params["axis"], equation.params["reverse"]
+        rows = np.moveaxis(given[0], axis, 0)
+        rows = rows[::-1] if backward else rows
+        parts = itertools.accumulate(
+            (rows[k, ...] for k in range(len(rows))),
+            lambda a, b: each(lambda p, q: code.arithmetic(operation, p, q), a, b),
+        )
+        found = np.empty(rows.shape, object)
+        for k, part in enumerate(parts):
+            found[k, ...] = part
+        return [np.moveaxis(found[::-1] if backward else found, 0, axis)]
+
+    return rule
+
+
+def sorting(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Sort arrays by the first of them, NaN last: neighbours change places until all are in order."""
+    arrays = [np.moveaxis(array, equation.params["dimension"], -1).copy() for array in given]
+    size = arrays[0].shape[-1]
+    if equation.params["num_keys"] != 1 or size > MOST_SORTED:
+        raise UnsupportedOperationError(f"sorting {size} numbers by {equation.params['num_keys']} keys")
+    for place in np.ndindex(arrays[0].shape[:-1]):
+        rows = [array[place] for array in arrays]
+        for turn in range(size):
+            for k in range(turn % 2, size - 1, 2):
+                change = _beyond(code, *rows[0][k : k + 2].tolist())
+                for row in rows:
+                    x, y = row[k : k + 2].tolist()
+                    row[k], row[k + 1] = code.select(change, y, x), code.select(change, x, y)
+    return [np.moveaxis(array, -1, equation.params["dimension"]) for array in arrays]
+
+
+def _beyond(code: Code, a: Value, b: Value) -> Value:
+    """Tell whether the first of two numbers belongs behind the second."""
+    larger = code.compare("lt", b, a)
+    if a.kind != "f":
+        return larger
+    return code.logic("or", larger, code.logic("and", code.compare("ne", a, a), code.compare("eq", b, b)))
+
+
+def dot(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return products of matrices: sums over some axes, for each place along those that are joined."""
+    (left_sum, right_sum), (left_batch, right_batch) = equation.params["dimension_numbers"]
+    kind = kind_of(equation.outvars[0].aval.dtype)
+    left, right = (each(lambda value: code.converted(value, kind), array) for array in given)
+
+    def ordered(array: Values, batch: Sequence[int], summed: Sequence[int]) -> Values:
+        free = [axis for axis in range(array.ndim) if axis not in (*batch, *summed)]
+        sizes = [int(np.prod([array.shape[axis] for axis in part])) for part in (batch, free, summed)]
+        return array.transpose(*batch, *free, *summed).reshape(sizes)
+
+    a, b = ordered(left, left_batch, left_sum), ordered(right, right_batch, right_sum)
+    found = np.empty((len(a), a.shape[1], b.shape[1]), object)
+    for k, i, j in np.ndindex(found.shape):
+        products = [code.arithmetic("mul", p, q) for p, q in zip(flat(a[k, i]), flat(b[k, j]), strict=True)]
+        found[k, i, j] = _combined(code, "add", products, kind)
+    return [found.reshape(equation.outvars[0].aval.shape)]

@@ -1,0 +1,129 @@
+"""Loops along axes of arrays that stay in memory: sums, products, extremes, and products of matrices."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from jounce.execution.llvm.rules.axes import combination, is_better, nothing
+from jounce.execution.llvm.text.code import Code
+from jounce.execution.llvm.text.stored import counted, fill, nest, put, room_for, room_of, stored
+from jounce.execution.llvm.text.values import Value
+from jounce.execution.llvm.text.views import Array, Deferred, Stored, as_read, between, spread, transposed
+
+ORDERLESS = ("max", "min", "and", "or")  # operations that give the same in any order
+StoredRule = Callable[[Code, Any, Sequence[Array]], Sequence[Array]]
+
+
+def reduction(operation: str) -> StoredRule:
+    """Return the rule for sums, products and the like along some axes."""
+
+    def rule(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+        array, axes = given[0], equation.params["axes"]
+        if not isinstance(array, Deferred):
+            array = as_read(stored(code, array))
+        kept = [axis for axis in range(array.ndim) if axis not in axes]
+        found = room_of(code, equation, [array])
+        fill(code, found, code.constant(nothing(operation, found.kind), found.kind))
+        if code.alone and operation in ORDERLESS and found.size == 1:
+            for part in _in_vectors(code, operation, array):
+                _gathered(code, operation, spread(replace(found, shape=(), strides=()), part.shape, ()), part)
+            return [found]
+        _gathered(code, operation, spread(found, array.shape, kept), array)
+        return [found]
+
+    return rule
+
+
+def _gathered(code: Code, operation: str, total: Stored, array: Deferred) -> None:
+    """Write a loop that combines each number of an array with what there is of the total."""
+    combine = combination(code, operation)
+
+    def body(values: Sequence[Value]) -> Sequence[Value]:
+        return [combine(values[0], array.body(values[1:]))]
+
+    nest(code, [total, *array.given], [total], body, adds=True)
+
+
+def _in_vectors(code: Code, operation: str, array: Deferred) -> list[Deferred]:
+    """Return a vector that combines the numbers of an array as far as whole vectors go, and what is left of it.
+
+    Where the order does not matter, a vector at a time takes less time than a number at a time.
+    """
+    row = array.in_shape((array.size,))
+    if row is None or row.size < 2 * code.width:
+        return [array]
+    left = row.size % code.width
+    whole = (row.size // code.width, code.width)
+    rows = row.viewed(lambda x: between(code, x, 0, 0, row.size - left)).in_shape(whole)
+    rest = row.viewed(lambda x: between(code, x, 0, row.size - left, left))
+    if rows is None:
+        return [array]
+    most = room_for(code, (code.width,), row.kind, lanes=False)
+    fill(code, most, code.constant(nothing(operation, row.kind), row.kind))
+    _gathered(code, operation, spread(most, whole, (1,)), rows)
+    return [as_read(most), rest]
+
+
+REDUCTIONS = {
+    "reduce_sum": reduction("add"),
+    "reduce_prod": reduction("mul"),
+    "reduce_max": reduction("max"),
+    "reduce_min": reduction("min"),
+    "reduce_and": reduction("and"),
+    "reduce_or": reduction("or"),
+}
+
+
+def extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Return where the largest or smallest number along an axis is, the first of equals; NaN before all."""
+    array, found, word = stored(code, given[0]), room_of(code, equation, given), equation.primitive.name
+    (axis,) = map(int, equation.params["axes"])
+    rows = transposed(array, [k for k in range(array.ndim) if k != axis] + [axis])
+    best = room_for(code, found.shape, array.kind, lanes=array.lanes)
+    first = between(code, rows, rows.ndim - 1, 0, 1)
+    put(code, best, replace(first, shape=first.shape[:-1], strides=first.strides[:-1]))
+    fill(code, found, code.constant(0, found.kind))
+
+    def look(k: int | Value) -> None:
+        index = code.converted(k, found.kind) if isinstance(k, Value) else code.constant(k, found.kind)
+        part = between(code, rows, rows.ndim - 1, k, 1)
+        part = replace(part, shape=part.shape[:-1], strides=part.strides[:-1])
+
+        def body(values: Sequence[Value]) -> Sequence[Value]:
+            value, largest, place = values
+            better = is_better(code, word, value, largest)
+            return code.select(better, value, largest), code.select(better, index, place)
+
+        nest(code, [part, best, found], [best, found], body, adds=True)
+
+    counted(code, rows.shape[-1], look)
+    return [found]
+
+
+def dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Return products of matrices: sums of products over some axes, for each place along those that are joined."""
+    (left_sum, right_sum), (left_batch, right_batch) = equation.params["dimension_numbers"]
+    found = room_of(code, equation, given)
+    fill(code, found, code.constant(0, found.kind))
+    left, right = (stored(code, array) for array in given)
+    left_free, right_free = (
+        [axis for axis in range(x.ndim) if axis not in (*batch, *summed)]
+        for x, batch, summed in ((left, left_batch, left_sum), (right, right_batch, right_sum))
+    )
+    left, right = (
+        transposed(left, (*left_batch, *left_free, *left_sum)),
+        transposed(right, (*right_batch, *right_free, *right_sum)),
+    )
+    batch, summed = len(left_batch), len(left_sum)
+    shape = (*found.shape, *left.shape[left.ndim - summed :])
+    after, end = batch + len(left_free), len(shape) - summed
+    a = spread(left, shape, [*range(after), *range(end, len(shape))])
+    b = spread(right, shape, [*range(batch), *range(after, len(shape))])
+    total = spread(found, shape, range(end))
+
+    def body(values: Sequence[Value]) -> Sequence[Value]:
+        known, p, q = (code.converted(value, found.kind) for value in values)
+        return [code.arithmetic("add", known, code.arithmetic("mul", p, q))]
+
+    nest(code, [total, a, b], [total], body, adds=True)
+    return [found]

@@ -1,0 +1,175 @@
+"""What each of JAX's operations is in scalar operations: those of each element here, with a table of all."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.execution.llvm.rules import axes, places
+from jounce.execution.llvm.text.arrays import Rule, Values, each
+from jounce.execution.llvm.text.code import Code
+from jounce.execution.llvm.text.values import UnsupportedOperationError, Value, kind_of
+
+FUNCTIONS = {  # of C's library, by the names that JAX has for them, which are the same
+    "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh",
+    "exp", "exp2", "expm1", "log", "log1p", "cbrt", "erf", "erfc",
+}  # fmt: skip
+
+
+def _arithmetic(operation: str) -> Rule:
+    return lambda code, _, given: [each(lambda a, b: code.arithmetic(operation, a, b), *given)]
+
+
+def _compare(operation: str) -> Rule:
+    return lambda code, _, given: [each(lambda a, b: code.compare(operation, a, b), *given)]
+
+
+def _logic(operation: str) -> Rule:
+    return lambda code, _, given: [each(lambda a, b: code.logic(operation, a, b), *given)]
+
+
+def _intrinsic(operation: str) -> Rule:
+    return lambda code, _, given: [each(lambda a: code.intrinsic(operation, a), given[0])]
+
+
+def _function(name: str) -> Rule:
+    return lambda code, _, given: [each(lambda *a: code.call(name, *a), *given)]
+
+
+def _unary(function: Callable[[Code, Value], Value]) -> Rule:
+    return lambda code, _, given: [each(lambda a: function(code, a), given[0])]
+
+
+def _absolute(code: Code, a: Value) -> Value:
+    return code.intrinsic("fabs", a) if a.kind == "f" else code.arithmetic("max", a, code.negated(a))
+
+
+def _sign(code: Code, a: Value) -> Value:
+    zero = code.constant(0, a.kind)
+    below = code.select(code.compare("lt", a, zero), code.constant(-1, a.kind), a)  # NaN and signed zeros stay
+    return code.select(code.compare("gt", a, zero), code.constant(1, a.kind), below)
+
+
+def _square(code: Code, a: Value) -> Value:
+    return code.arithmetic("mul", a, a)
+
+
+def _finite(code: Code, a: Value) -> Value:
+    return code.compare("lt", code.intrinsic("fabs", a), code.constant(np.inf))
+
+
+def _integer_power(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    exponent = equation.params["y"]
+
+    def power(a: Value) -> Value:
+        squared, result = a, code.constant(1, a.kind)
+        for place, digit in enumerate(reversed(f"{abs(exponent):b}")):
+            squared = squared if place == 0 else _square(code, squared)
+            result = code.arithmetic("mul", result, squared) if digit == "1" else result
+        return result if exponent >= 0 else code.arithmetic("div", code.constant(1, a.kind), result)
+
+    return [each(power, given[0])]
+
+
+def _power(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
+    def power(a: Value, b: Value) -> Value:
+        if a.kind != "f":
+            raise UnsupportedOperationError("whole numbers to a power that is not known")
+        return code.call("pow", a, code.converted(b, "f"))
+
+    return [each(power, *given)]
+
+
+def _round(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    away = equation.params["rounding_method"] == jax.lax.RoundingMethod.AWAY_FROM_ZERO
+    return [each(lambda a: code.intrinsic("round" if away else "roundeven", a), given[0])]
+
+
+def _convert(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    kind = kind_of(equation.params["new_dtype"])
+    return [each(lambda a: code.converted(a, kind), given[0])]
+
+
+def _select(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
+    def choose(which: Value, *cases: Value) -> Value:
+        if which.kind == "b":
+            return code.select(which, cases[-1], cases[0])
+        found = cases[-1]
+        for k in reversed(range(len(cases) - 1)):
+            found = code.select(code.compare("le", which, code.constant(k, which.kind)), cases[k], found)
+        return found
+
+    return [each(choose, *given)]
+
+
+def _clamp(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
+    def clamp(least: Value, value: Value, most: Value) -> Value:
+        return code.arithmetic("min", code.arithmetic("max", least, value), most)
+
+    return [each(clamp, *given)]
+
+
+def _same(_: Code, __: Any, given: Sequence[Values]) -> Sequence[Values]:
+    return given
+
+
+ELEMENTWISE: Mapping[str, Rule] = {
+    **{name: _arithmetic(name) for name in ("add", "sub", "mul", "div", "max", "min", "rem")},
+    **{name: _compare(name) for name in ("eq", "ne", "lt", "le", "gt", "ge")},
+    **{name: _logic(name) for name in ("and", "or", "xor")},
+    **{name: _intrinsic(name) for name in ("sqrt", "floor", "ceil")},
+    **{name: _function(name) for name in FUNCTIONS},
+    "add_any": _arithmetic("add"),
+    "neg": _unary(Code.negated),
+    "not": _unary(Code.inverted),
+    "abs": _unary(_absolute),
+    "sign": _unary(_sign),
+    "square": _unary(_square),
+    "is_finite": _unary(_finite),
+    "integer_pow": _integer_power,
+    "pow": _power,
+    "round": _round,
+    "convert_element_type": _convert,
+    "select_n": _select,
+    "clamp": _clamp,
+}
+"""Of each number, or of the numbers at one place of some arrays."""
+
+RULES: Mapping[str, Rule] = {
+    **ELEMENTWISE,
+    **dict.fromkeys(("copy", "stop_gradient", "optimization_barrier"), _same),
+    "reduce_sum": axes.reduction("add"),
+    "reduce_prod": axes.reduction("mul"),
+    "reduce_max": axes.reduction("max"),
+    "reduce_min": axes.reduction("min"),
+    "reduce_and": axes.reduction("and"),
+    "reduce_or": axes.reduction("or"),
+    "argmax": axes.extreme,
+    "argmin": axes.extreme,
+    "sort": axes.sorting,
+    "cumsum": axes.cumulative("add"),
+    "cumprod": axes.cumulative("mul"),
+    "cummax": axes.cumulative("max"),
+    "cummin": axes.cumulative("min"),
+    "dot_general": axes.dot,
+    "slice": places.part,
+    "broadcast_in_dim": places.broadcast,
+    "tile": places.tile,
+    "reshape": places.reshape,
+    "squeeze": places.reshape,
+    "expand_dims": places.reshape,
+    "concatenate": places.concatenate,
+    "stack": places.stack,
+    "unstack": places.unstack,
+    "transpose": places.transpose,
+    "rev": places.reverse,
+    "pad": places.pad,
+    "iota": places.iota,
+    "split": places.split,
+    "dynamic_slice": places.dynamic_slice,
+    "dynamic_update_slice": places.dynamic_update_slice,
+    "gather": places.gather,
+    "scatter": places.scatter,
+    "scatter-add": places.scatter,
+}

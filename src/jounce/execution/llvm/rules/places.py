@@ -1,0 +1,307 @@
+"""Operations that move elements of arrays, and those that take or put them at indices found by the program."""
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jax.lax import GatherScatterMode
+
+from jounce.execution.llvm.text.arrays import Values, constants, each, filled, in_memory
+from jounce.execution.llvm.text.code import Code, flat
+from jounce.execution.llvm.text.values import DTYPES, Region, UnsupportedOperationError, Value, kind_of
+
+MOST_CANDIDATES = 64  # places of an array among which a number is picked by comparing, and not from memory
+
+# -- at places that are known -----------------------------------------------------------------------------------------
+
+
+def part(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return elements between bounds."""
+    p = equation.params
+    strides = p["strides"] or (1,) * given[0].ndim
+    return [given[0][(*map(slice, p["start_indices"], p["limit_indices"], strides), ...)]]
+
+
+def broadcast(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return an array repeated along new axes and those of length one."""
+    shape, axes = equation.params["shape"], equation.params["broadcast_dimensions"]
+    placed = [1] * len(shape)
+    for axis, size in zip(axes, given[0].shape, strict=True):
+        placed[axis] = size
+    return [np.broadcast_to(given[0].reshape(placed), shape)]
+
+
+def tile(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return an array repeated along its axes."""
+    return [np.tile(given[0], equation.params["reps"])]
+
+
+def reshape(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return the same elements in another shape."""
+    return [given[0].reshape(equation.outvars[0].aval.shape)]
+
+
+def concatenate(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return arrays one after another."""
+    return [np.concatenate(given, equation.params["dimension"])]
+
+
+def stack(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return arrays side by side along a new axis."""
+    return [np.stack(given, equation.params["axis"])]
+
+
+def unstack(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return the parts of an array along an axis, without it."""
+    rows = np.moveaxis(given[0], equation.params["axis"], 0)
+    return [rows[k, ...] for k in range(len(rows))]
+
+
+def transpose(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return an array with its axes in another order."""
+    return [given[0].transpose(equation.params["permutation"])]
+
+
+def reverse(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return an array backwards along some axes."""
+    return [np.flip(given[0], equation.params["dimensions"])]
+
+
+def pad(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return an array with a number before, after and between its elements; some are cut off where less than none."""
+    array, filler = given
+    found = np.full(equation.outvars[0].aval.shape, filler.item(), object)
+    places, taken = [], []
+    for size, whole, (low, _high, between) in zip(
+        array.shape, found.shape, equation.params["padding_config"], strict=True
+    ):
+        at = low + np.arange(size) * (between + 1)
+        inside = np.flatnonzero((at >= 0) & (at < whole))
+        places.append(at[inside])
+        taken.append(inside)
+    found[np.ix_(*places)] = array[np.ix_(*taken)]
+    return [found]
+
+
+def iota(code: Code, equation: Any, _: Sequence[Values]) -> Sequence[Values]:
+    """Return whole numbers that count along an axis."""
+    p = equation.params
+    numbers = np.arange(p["shape"][p["dimension"]]).astype(DTYPES[kind_of(p["dtype"])])
+    line = numbers.reshape([-1 if axis == p["dimension"] else 1 for axis in range(len(p["shape"]))])
+    return [np.broadcast_to(constants(code, line), p["shape"])]
+
+
+def split(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return the parts of an array along an axis."""
+    return np.split(given[0], np.cumsum(equation.params["sizes"])[:-1], axis=equation.params["axis"])
+
+
+# -- at indices -------------------------------------------------------------------------------------------------------
+
+
+def _element(code: Code, values: Sequence[Value], index: Value) -> Value:
+    """Return the number at an index, which is in bounds: from memory, or picked by comparing."""
+    if index.constant is not None:
+        return values[int(index.constant)]
+    if len(values) > (MOST_CANDIDATES if index.lanes else 2):
+        region, first = in_memory(code, values)
+        place = code.arithmetic("add", code.converted(index, "l"), code.constant(first, "l"))
+        return code.load(region, place)
+    found = values[-1]
+    for k in reversed(range(len(values) - 1)):
+        found = code.select(code.compare("eq", index, code.constant(k, index.kind)), values[k], found)
+    return found
+
+
+def _row(code: Code, home: tuple[Region, int], index: Value, shape: Sequence[int], more: int = 0) -> Values:
+    """Return an array of some in memory, `more` after that at an index in bounds, which is one for all lanes."""
+    region, first = home
+    size = int(np.prod(shape))
+    start = code.arithmetic("mul", code.converted(index, "l"), code.constant(size, "l"))
+    offsets = range(first + more * size, first + (more + 1) * size)
+    return filled(
+        shape, [code.load(region, code.arithmetic("add", start, code.constant(offset, "l"))) for offset in offsets]
+    )
+
+
+def within(code: Code, index: Value, least: int, most: int) -> Value:
+    """Return an index within bounds."""
+    below = code.arithmetic("min", index, code.constant(most, index.kind))
+    return code.arithmetic("max", below, code.constant(least, index.kind))
+
+
+def kept_inside(code: Code, shape: Sequence[int], sizes: Sequence[int], starts: Sequence[Values]) -> list[Value]:
+    """Return where a part of an array begins along each axis, moved so that all of it is in bounds."""
+    return [
+        within(code, start.item(), 0, whole - size) for whole, size, start in zip(shape, sizes, starts, strict=True)
+    ]
+
+
+def dynamic_slice(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return a part of an array that starts at indices, moved so that all of it is in bounds."""
+    array, *starts = given
+    for axis, (start, size) in enumerate(zip(starts, equation.params["slice_sizes"], strict=True)):
+        rows = np.moveaxis(array, axis, 0)
+        index, shape = within(code, start.item(), 0, len(rows) - size), (size, *rows.shape[1:])
+        if index.constant is not None:
+            found = rows[int(index.constant) :][:size]
+        elif not np.prod(shape):
+            found = np.empty(shape, object)
+        elif not index.lanes:
+            home = in_memory(code, flat(rows))
+            found = np.stack([_row(code, home, index, shape[1:], k) for k in range(size)])
+        else:
+            pick = _picked(code, index)
+            windows = [rows[k : len(rows) - size + 1 + k] for k in range(size)]
+            found = np.stack([each(pick, *(window[k, ...] for k in range(len(window)))) for window in windows])
+        array = np.moveaxis(found, 0, axis)
+    return [array]
+
+
+def _picked(code: Code, index: Value) -> Callable[..., Value]:
+    return lambda *values: _element(code, values, index)
+
+
+def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return an array with a part of it changed that starts at indices, moved so that all of it is in bounds."""
+    array, new, *starts = given
+    rooms = [whole - size for whole, size in zip(array.shape, new.shape, strict=True)]
+    indices = kept_inside(code, array.shape, new.shape, starts)
+    moving = [axis for axis, index in enumerate(indices) if index.constant is None]
+    firsts = [
+        range(most + 1) if index.constant is None else (int(index.constant),)
+        for index, most in zip(indices, rooms, strict=True)
+    ]
+    found = array.copy()
+    for first in itertools.product(*firsts):
+        here = code.constant(True)
+        for axis in moving:
+            number = code.constant(first[axis], indices[axis].kind)
+            here = code.logic("and", here, code.compare("eq", indices[axis], number))
+        for offset in np.ndindex(new.shape):
+            place = tuple(a + b for a, b in zip(first, offset, strict=True))
+            found[place] = code.select(here, new.item(offset), found.item(place))
+    return [found]
+
+
+def _places(
+    indices: np.ndarray,
+    shape: Sequence[int],
+    named: Sequence[Any],
+    beside: Mapping[Any, Any],
+    sizes: Sequence[int],
+    *,
+    drop: bool,
+) -> np.ndarray:
+    """Return which elements of an array are in windows of it, -1 for those of a window that is not inside.
+
+    Parameters
+    ----------
+    indices : array of shape (windows..., index)
+        Where windows start.
+    shape : sequence of int
+        Of the array.
+    named : sequence of int
+        The axes of the array that the indices are of.
+    beside : mapping
+        Axes of the array along which there is a window of length one for each element, and the axes of the windows
+        that count them.
+    sizes : sequence of int
+        Of a window.
+    drop : bool
+        Whether windows that are not inside have no elements; otherwise they are moved.
+
+    Returns
+    -------
+    array of shape (windows..., sizes...)
+    """
+    batch = indices.shape[:-1]
+    starts = np.zeros((*batch, len(shape)), int)
+    starts[..., list(named)] = indices
+    for axis, which in beside.items():
+        starts[..., axis] = np.arange(shape[axis]).reshape([-1 if k == which else 1 for k in range(len(batch))])
+    inside = starts.clip(0, np.subtract(shape, sizes))
+    strides = np.array([int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))], int)
+    offsets = np.tensordot(strides, np.indices(sizes), 1)
+    found = (inside @ strides)[(..., *[None] * len(sizes))] + offsets
+    fits = (inside == starts).all(axis=-1)[(..., *[None] * len(sizes))]
+    return np.where(fits, found, -1) if drop else found
+
+
+def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Return parts of an array at indices."""
+    array, indices = given
+    p, numbers, dtype = equation.params, equation.params["dimension_numbers"], equation.outvars[0].aval.dtype
+    known = np.vectorize(lambda value: 0 if value.constant is None else int(value.constant), otypes=[int])(indices)
+    moving = [k for k in range(indices.shape[-1]) if any(value.constant is None for value in flat(indices[..., k]))]
+    if len(moving) > 1:
+        raise UnsupportedOperationError("indices of which more than one are not known")
+    drop, batches = p["mode"] == GatherScatterMode.FILL_OR_DROP, indices.ndim - 1
+    beside = dict(zip(numbers.operand_batching_dims, numbers.start_indices_batching_dims, strict=True))
+    left_out = tuple(batches + axis for axis in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims))
+
+    def at(table: np.ndarray) -> np.ndarray:
+        found = _places(table, array.shape, numbers.start_index_map, beside, p["slice_sizes"], drop=drop)
+        found = found.squeeze(left_out)
+        return np.moveaxis(found, range(batches, found.ndim), numbers.offset_dims)
+
+    values = [*flat(array), code.constant(filler(p, dtype), kind_of(dtype))]
+    if not moving:
+        return [_taken(values, at(known))]
+    (axis,) = moving
+    along = numbers.start_index_map[axis]
+    size, width = array.shape[along], p["slice_sizes"][along]
+    # one beyond each end, too; or while all of a part is inside, so that numbers in memory need not be copied
+    least, most = (-1, size) if drop else (0, size - width)
+    tables = []
+    for k in range(least, most + 1):
+        known[..., axis] = k
+        tables.append(at(known))
+    found = np.empty(tables[0].shape, object)
+    which = [k for k in range(found.ndim) if k not in numbers.offset_dims]
+    for place in np.ndindex(found.shape):
+        index = within(code, indices[(*(place[k] for k in which), axis)], least, most)
+        index = code.arithmetic("add", index, code.constant(-least, index.kind))
+        found[place] = _element(code, [values[table[place]] for table in tables], index)
+    return [found]
+
+
+def _taken(values: Sequence[Value], table: np.ndarray) -> Values:
+    return filled(table.shape, [values[place] for place in table.ravel()])
+
+
+def filler(params: Mapping[str, Any], dtype: Any) -> Any:
+    """Return what stands where an index points beyond an array."""
+    if params["mode"] != GatherScatterMode.FILL_OR_DROP:
+        return 0
+    if params["fill_value"] is not None:
+        return params["fill_value"]
+    if np.issubdtype(dtype, np.floating):
+        return np.nan
+    return True if np.dtype(dtype).kind == "b" else np.iinfo(dtype).min
+
+
+def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
+    """Put numbers at indices, or add them to what is there."""
+    array, indices, updates = given
+    if any(value.constant is None for value in flat(indices)):
+        raise UnsupportedOperationError("changing an array at indices that are not known")
+    if not updates.size or not array.size:
+        return [array]
+    p, add = equation.params, equation.primitive.name == "scatter-add"
+    numbers, windows, batches = p["dimension_numbers"], p["dimension_numbers"].update_window_dims, indices.ndim - 1
+    beside = dict(zip(numbers.operand_batching_dims, numbers.scatter_indices_batching_dims, strict=True))
+    left_out = (*numbers.inserted_window_dims, *numbers.operand_batching_dims)
+    kept = dict(zip((axis for axis in range(array.ndim) if axis not in left_out), windows, strict=True))
+    sizes = [updates.shape[kept[axis]] if axis in kept else 1 for axis in range(array.ndim)]
+    table = np.vectorize(lambda value: int(value.constant), otypes=[int])(indices)
+    drop = p["mode"] == GatherScatterMode.FILL_OR_DROP
+    places = _places(table, array.shape, numbers.scatter_dims_to_operand_dims, beside, sizes, drop=drop)
+    places = places.squeeze(tuple(batches + axis for axis in left_out))
+    places = np.moveaxis(places, range(batches, places.ndim), windows)
+    found = flat(array)
+    for place, value in zip(places.ravel().tolist(), flat(updates), strict=True):
+        if place >= 0:
+            found[place] = code.arithmetic("add", found[place], value) if add else value
+    return [filled(array.shape, found)]

@@ -1,0 +1,90 @@
+"""Whether machine code is used here: a small program beside XLA's decides, on systems where none was tried.
+
+Code may ask there for functions that LLVM does not find, and then it ends the process: so it is another one.
+"""
+
+import subprocess
+import sys
+import warnings
+from functools import lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+
+from jounce.errors import MachineCodeWarning
+
+TRIED = ("linux",)
+HOME = Path(__file__).parents[3]  # the folder that this package is imported from
+LONGEST = 120.0  # s
+CALL = f"import sys; sys.path.insert(0, {str(HOME)!r}); from jounce.execution.llvm import self_test; self_test.check()"
+
+
+@lru_cache(maxsize=1)
+def is_usable() -> bool:
+    """Tell whether there is a compiler, and its code has been tried on this system, or passes a test here."""
+    if find_spec("llvmlite") is None:  # from an installation that leaves out what this package depends on
+        return False
+    return sys.platform in TRIED or passes()
+
+
+@lru_cache(maxsize=1)
+def passes() -> bool:
+    """Tell whether machine code gives what XLA does on this system; if not, one warning says why."""
+    if not Path(sys.executable or "").name.startswith("python"):  # it may be an application that has Python within
+        reason = f"{sys.executable!r} is no Python that could be asked to try it"
+    else:
+        try:
+            subprocess.run([sys.executable, "-P", "-c", CALL], capture_output=True, check=True, timeout=LONGEST)
+        except subprocess.CalledProcessError as error:
+            last = error.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+            reason = last or f"the process that tried it ended with status {error.returncode}"
+        except (OSError, subprocess.TimeoutExpired) as error:
+            reason = f"the process that was to try it: {type(error).__name__}"
+        else:
+            return True
+    message = (
+        f"machine code was not tried on {sys.platform}, and a small program does not run here as it does in XLA "
+        f"({reason}); XLA computes in its place, with the same results in two to six times the time; "
+        "JOUNCE_NATIVE=0 in the environment asks for that without this message"
+    )
+    warnings.warn(message, MachineCodeWarning, stacklevel=2)
+    return False
+
+
+def check() -> None:
+    """Raise AssertionError unless machine code for instants side by side gives what XLA does.
+
+    The program has what asks for something outside of it: functions of C's library, memory, loops.
+    """
+    import jax
+    import jax.numpy as jnp
+    import numpy as np
+
+    from jounce.execution.llvm.modules import object_file
+    from jounce.execution.llvm.programs import Program
+    from jounce.settings import own_settings
+
+    size, count = 40, 21
+
+    def function(shared, lanes):
+        (matrix,), (x,) = shared, lanes
+
+        def turn(k, y):
+            return jnp.sin(jnp.sum(matrix[:, :, None] * y[None], axis=1)) + jnp.cos(y * (k + 1.0))
+
+        y = jax.lax.fori_loop(0, 3, turn, jnp.broadcast_to(x, (size, 1)))
+        y = jax.lax.while_loop(lambda y: jnp.max(y) > 0.5, lambda y: 0.5 * y, y)
+        square = x * x
+        own = [jnp.exp(x), jnp.log1p(square), jnp.arctan2(x, 1.0 + square), jnp.tanh(x), jnp.power(1.0 + square, x)]
+        return y, jnp.concatenate([*own, jnp.sqrt(square), jnp.floor(x)])
+
+    with own_settings():
+        shared = (np.linspace(-0.1, 0.1, size * size).reshape(size, size),)
+        lanes = (np.linspace(-2.0, 2.0, count)[None],)
+        one = (jax.ShapeDtypeStruct((1, 1), float),)
+        expected = jax.vmap(lambda x: function(shared, (x[:, None],)), in_axes=1, out_axes=-1)(*lanes)
+        for large in (None, 8):
+            binary, results = object_file(function, shared, one, {}, large=large)
+            found = Program(binary, (shared, one), results)(list(shared), list(lanes))
+            for mine, theirs in zip(found, expected, strict=True):
+                if not np.allclose(mine, theirs[:, 0], rtol=1e-12, atol=1e-14):
+                    raise AssertionError("the numbers are others")

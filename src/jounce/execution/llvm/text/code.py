@@ -1,0 +1,247 @@
+"""A program as text for LLVM: operations on numbers, and the memory in which arrays are."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from jounce.execution.llvm.text.scalars import Scalars
+from jounce.execution.llvm.text.values import DTYPES, IN_MEMORY, Region, Value, literal
+
+MOST_ON_STACK = 4096  # bytes of an array
+
+
+@dataclass
+class Code(Scalars):
+    """A program that is written.
+
+    Attributes
+    ----------
+    entry : list of str
+        Text of what is run before the first vector of lanes.
+    memory, heap : int
+        Bytes that are taken there, of the stack and elsewhere.
+    large : int or None
+        Arrays of more numbers stay in memory, and operations on them are loops; None for none.
+    alone : bool
+        Whether there is one instant only, so that vectors are numbers of an array that lie one after another.
+    constants : list of str
+        Text of arrays of constants in memory.
+    changeable : set of Region
+        Memory of one array alone, which may be changed where nobody reads it any more.
+    held : list of Region
+        Memory of what loops carry that are being written, which is not given back.
+    taken : list of Region
+        All memory that was taken, in that order.
+    plans : dict
+        Of programs to how they are written, as `plans.plan_of` has it.
+    """
+
+    entry: list[str] = field(default_factory=list)
+    memory: int = 0
+    heap: int = 0
+    large: int | None = None
+    alone: bool = False
+    constants: list[str] = field(default_factory=list)
+    changeable: set[Region] = field(default_factory=set)
+    held: list[Region] = field(default_factory=list)
+    taken: list[Region] = field(default_factory=list)
+    plans: dict[Any, Any] = field(default_factory=dict)
+    _rooms: dict[tuple[int, str, bool], list[Region]] = field(default_factory=dict)  # that nobody uses any more
+    _taken: dict[Region, tuple[int, str, bool]] = field(default_factory=dict)  # that somebody may, by what they hold
+    _tables: dict[tuple[str, bytes], Region] = field(default_factory=dict)
+    _users: list[Callable[[Region], bool]] = field(default_factory=list)  # tell whether memory is wanted further on
+
+    def room(self, size: int, kind: str, *, lanes: bool) -> Region:
+        """Return memory for numbers of one kind."""
+        name, count = self.fresh("m"), max(1, size)
+        taken = count * (self.width if lanes else 1) * DTYPES[kind].itemsize
+        if taken > MOST_ON_STACK:
+            self.entry.append(f"{name} = getelementptr i8, ptr %heap, i64 {self.heap}")
+            self.heap += -(-taken // 64) * 64
+        else:
+            of = f"<{self.width} x {IN_MEMORY[kind]}>" if lanes else IN_MEMORY[kind]
+            self.entry.append(f"{name} = alloca {of}, i64 {count}, align 64")
+            self.memory += taken
+        return Region(name, kind, lanes)
+
+    def taken_room(self, size: int, kind: str, *, lanes: bool) -> Region:
+        """Return memory that can be given back, some that was if there is any."""
+        key = max(1, size), kind, lanes
+        free = self._rooms.get(key)
+        region = free.pop() if free else self.room(size, kind, lanes=lanes)
+        self._taken[region] = key
+        self.changeable.add(region)
+        self.taken.append(region)
+        return region
+
+    def give_back(self, region: Region) -> None:
+        """Let memory be used again, if it can be given back."""
+        if region not in self.held and (key := self._taken.pop(region, None)) is not None:
+            self._rooms.setdefault(key, []).append(region)
+
+    @contextmanager
+    def used(self, wants: Callable[[Region], bool]) -> Iterator[None]:
+        """Keep memory meanwhile that a function says is wanted further on."""
+        self._users.append(wants)
+        try:
+            yield
+        finally:
+            self._users.pop()
+
+    def is_unshared(self, region: Region) -> bool:
+        """Tell whether what is in memory is wanted no more."""
+        return not any(wants(region) for wants in self._users)
+
+    def constants_region(self, numbers: Sequence[Any], kind: str) -> Region:
+        """Return where constants are in memory."""
+        table = np.array(numbers, DTYPES[kind])
+        key = kind, table.tobytes()
+        if (region := self._tables.get(key)) is None:
+            one, name = IN_MEMORY[kind], f"@c{len(self._tables)}"
+            texts = (literal(self.constant(number)) for number in table)
+            listed = ", ".join(f"{one} {str(int(text == 'true')) if kind == 'b' else text}" for text in texts)
+            self.constants.append(f"{name} = private constant [{table.size} x {one}] [{listed}], align 64")
+            region = self._tables[key] = Region(name, kind, False)
+        return region
+
+    def load_along(self, region: Region, index: int | Value) -> Value:
+        """Return a vector of numbers that lie one after another from a place of memory on."""
+        one, place = IN_MEMORY[region.kind], self._address(region, index)
+        name, of = self.fresh(), f"<{self.width} x {one}>"
+        hint = ", !invariant.load !0" if region.given else ""
+        self.lines.append(f"{name} = load {of}, ptr {place}, align {DTYPES[region.kind].itemsize}{hint}")
+        if region.kind == "b":
+            byte, name = name, self.fresh()
+            self.lines.append(f"{name} = trunc {of} {byte} to {self.type_of('b', lanes=True)}")
+        return Value(name, region.kind, True)
+
+    def store_along(self, region: Region, index: int | Value, value: Value) -> None:
+        """Put a vector of numbers one after another from a place of memory on."""
+        one, place, operand = IN_MEMORY[region.kind], self._address(region, index), self.operand(value, lanes=True)
+        of = f"<{self.width} x {one}>"
+        if region.kind == "b":
+            truth = self.type_of("b", lanes=True)
+            operand = self._found(f"zext {truth} {operand} to {of}", "b", lanes=True).name
+        self.lines.append(f"store {of} {operand}, ptr {place}, align {DTYPES[region.kind].itemsize}")
+
+    def _address(self, region: Region, index: int | Value) -> str:
+        place = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
+        address = f"getelementptr {IN_MEMORY[region.kind]}, ptr {region.pointer}, i64 {place}"
+        return self._found(address, "l", lanes=False).name
+
+    def load(self, region: Region, index: int | Value) -> Value:
+        """Return the number at a place of memory, which must be one of its own."""
+        if isinstance(index, Value) and index.lanes:
+            return self._gathered(region, index)
+        place = self._place(region, index)
+        hint = ", !invariant.load !0" if region.given else ""
+        name, home = self.fresh(), (region, index) if isinstance(index, int) else None
+        if region.kind == "b":
+            byte, of = self.fresh(), f"<{self.width} x i8>" if region.lanes else "i8"
+            self.lines += [
+                f"{byte} = load {place}{hint}",
+                f"{name} = trunc {of} {byte} to {self.type_of('b', lanes=region.lanes)}",
+            ]
+        else:
+            self.lines.append(f"{name} = load {place}{hint}")
+        return Value(name, region.kind, region.lanes, home=home)
+
+    def store(self, region: Region, index: int | Value, value: Value) -> None:
+        """Put a number at a place of memory, which must be one of its own."""
+        if isinstance(index, Value) and index.lanes:
+            self._scatter(region, index, value)
+            return
+        operand = self.operand(value, lanes=region.lanes)
+        if region.kind == "b":
+            of = f"<{self.width} x i8>" if region.lanes else "i8"
+            operand = self._found(
+                f"zext {self.type_of('b', lanes=region.lanes)} {operand} to {of}", "b", lanes=True
+            ).name
+        of, rest = self._place(region, index).split(", ", 1)
+        self.lines.append(f"store {of} {operand}, {rest}")
+
+    def _gathered(self, region: Region, index: Value) -> Value:
+        """Return numbers at a place of memory that differs from lane to lane."""
+        places, of, kinds = self._places(region, index)
+        name, every = self.fresh(), self.operand(self.constant(True), lanes=True)
+        function = f"@llvm.masked.gather.{kinds}.v{self.width}p0"
+        self.intrinsics.add(f"declare {of} {function}(<{self.width} x ptr>, i32, <{self.width} x i1>, {of})")
+        align = DTYPES[region.kind].itemsize
+        given = f"<{self.width} x ptr> {places}, i32 {align}, <{self.width} x i1> {every}, {of} poison"
+        self.lines.append(f"{name} = call {of} {function}({given})")
+        if region.kind == "b":
+            byte, name = name, self.fresh()
+            self.lines.append(f"{name} = trunc {of} {byte} to {self.type_of('b', lanes=True)}")
+        return Value(name, region.kind, True)
+
+    def _scatter(self, region: Region, index: Value, value: Value) -> None:
+        """Put numbers at a place of memory that differs from lane to lane: each lane has places of its own."""
+        places, of, kinds = self._places(region, index)
+        operand, every = self.operand(value, lanes=True), self.operand(self.constant(True), lanes=True)
+        if region.kind == "b":
+            truth = self.type_of("b", lanes=True)
+            operand = self._found(f"zext {truth} {operand} to {of}", "b", lanes=True).name
+        function = f"@llvm.masked.scatter.{kinds}.v{self.width}p0"
+        self.intrinsics.add(f"declare void {function}({of}, <{self.width} x ptr>, i32, <{self.width} x i1>)")
+        align = DTYPES[region.kind].itemsize
+        given = f"{of} {operand}, <{self.width} x ptr> {places}, i32 {align}, <{self.width} x i1> {every}"
+        self.lines.append(f"call void {function}({given})")
+
+    def _places(self, region: Region, index: Value) -> tuple[str, str, str]:
+        """Return the addresses of numbers at places that differ from lane to lane, their type, and its short name."""
+        one = IN_MEMORY[region.kind]
+        if region.lanes:
+            apart = Value("%total", "l", False) if region.given else self.constant(self.width, "l")
+            counts = ", ".join(f"i64 {k}" for k in range(self.width))
+            lane = Value(f"<{counts}>", "l", True)
+            index = self.arithmetic("add", self.arithmetic("mul", index, apart), lane)
+            if region.given:
+                index = self.arithmetic("add", index, Value("%lane", "l", False))
+        vector = self.operand(index, lanes=True)
+        address = f"getelementptr {one}, ptr {region.pointer}, <{self.width} x i64> {vector}"
+        short = f"v{self.width}{'f64' if region.kind == 'f' else one}"
+        return self._found(address, "l", lanes=True).name, f"<{self.width} x {one}>", short
+
+    def _place(self, region: Region, index: int | Value) -> str:
+        """Return the type of a number in memory, its address, and of what this is a multiple."""
+        one = IN_MEMORY[region.kind]
+        of = f"<{self.width} x {one}>" if region.lanes else one
+        place = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
+        if region.given and region.lanes:
+            first = self._found(f"mul i64 {place}, %total", "l", lanes=False).name
+            place = self._found(f"add i64 {first}, %lane", "l", lanes=False).name
+        address = f"getelementptr {one if region.given else of}, ptr {region.pointer}, i64 {place}"
+        name = self._found(address, "l", lanes=False).name
+        return f"{of}, ptr {name}, align {DTYPES[region.kind].itemsize}"
+
+    # -- attempts -----------------------------------------------------------------------------------------------------
+
+    def mark(self) -> tuple[Any, ...]:
+        """Return how far the text has come, for `back_to`."""
+        rooms = {key: list(regions) for key, regions in self._rooms.items()}
+        return (
+            len(self.lines),
+            len(self.entry),
+            len(self._known[-1]),
+            self.memory,
+            self.heap,
+            rooms,
+            dict(self._taken),
+            len(self.taken),
+        )
+
+    def back_to(self, mark: tuple[Any, ...]) -> None:
+        """Take back what was written since a mark in the same scope."""
+        lines, entry, known, self.memory, self.heap, rooms, taken, count = mark
+        self._rooms, self._taken = {key: list(regions) for key, regions in rooms.items()}, dict(taken)
+        del self.lines[lines:], self.entry[entry:], self.taken[count:]
+        while len(self._known[-1]) > known:
+            self._known[-1].popitem()
+
+
+def flat(array: np.ndarray) -> list[Value]:
+    """Return the values of an array, the last axis fastest."""
+    return array.ravel().tolist()

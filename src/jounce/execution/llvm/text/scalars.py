@@ -1,0 +1,318 @@
+"""Operations on numbers as text for LLVM, each on one number or side by side on a vector of lanes."""
+
+import math
+import operator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from jounce.execution.llvm.text import values
+from jounce.execution.llvm.text.values import DTYPES, SCALARS, UnsupportedOperationError, Value, kind_of, literal
+
+MOST_LINES = 120_000  # of text: LLVM makes some 20,000 of them into machine code in a second
+DOUBLES: dict[str, tuple[str, Any]] = {  # in LLVM, in Python
+    "add": ("fadd contract", operator.add),
+    "sub": ("fsub contract", operator.sub),
+    "mul": ("fmul contract", operator.mul),
+    "div": ("fdiv", np.divide),
+    "rem": ("", np.fmod),
+    "max": ("maximum", np.maximum),
+    "min": ("minimum", np.minimum),
+}
+INTEGERS: dict[str, tuple[str, Any]] = {
+    "add": ("add", operator.add),
+    "sub": ("sub", operator.sub),
+    "mul": ("mul", operator.mul),
+    "div": ("sdiv", values.quotient),
+    "rem": ("srem", values.remainder),
+    "max": ("smax", max),
+    "min": ("smin", min),
+}
+BOOLEANS = {"add": "or", "max": "or", "mul": "and", "min": "and"}
+COMMUTATIVE = frozenset("add mul max min".split())
+NEUTRAL = {"add": 0, "sub": 0, "mul": 1, "div": 1}
+COMPARISONS: dict[str, tuple[str, str, str, Any]] = {  # of doubles, of whole numbers, of truth values, in Python
+    "eq": ("oeq", "eq", "eq", operator.eq),
+    "ne": ("une", "ne", "ne", operator.ne),
+    "lt": ("olt", "slt", "ult", operator.lt),
+    "le": ("ole", "sle", "ule", operator.le),
+    "gt": ("ogt", "sgt", "ugt", operator.gt),
+    "ge": ("oge", "sge", "uge", operator.ge),
+}
+LOGIC = {"and": operator.and_, "or": operator.or_, "xor": operator.xor}
+CONVERSIONS = {"lf": "sitofp", "if": "sitofp", "bf": "uitofp", "li": "trunc", "il": "sext", "bi": "zext", "bl": "zext"}
+
+
+@dataclass
+class Scalars:
+    """Operations in the order in which they run, no two of them the same within a block and those around it.
+
+    Attributes
+    ----------
+    width : int
+        Lanes of a vector.
+    most : int
+        Lines that there may be.
+    lines : list of str
+        Text of what is run for each vector of lanes.
+    functions : set
+        Names and numbers of arguments of the functions of C's library that are called.
+    intrinsics : set of str
+        Declarations of the functions of LLVM that are called.
+    here : Value or None
+        In which lanes what is written now is asked for; None for all.
+    """
+
+    width: int
+    most: int = MOST_LINES
+    lines: list[str] = field(default_factory=list)
+    functions: set[tuple[str, int]] = field(default_factory=set)
+    intrinsics: set[str] = field(default_factory=set)
+    here: Value | None = None
+    _count: int = 0
+    _known: list[dict[str, Value]] = field(default_factory=lambda: [{}])
+    _vectors: dict[tuple[str, str], str] = field(default_factory=dict)
+
+    def __post_init__(self):
+        self._types = {(kind, False): of for kind, of in SCALARS.items()}
+        self._types |= {(kind, True): f"<{self.width} x {of}>" for kind, of in SCALARS.items()}
+
+    # -- text ---------------------------------------------------------------------------------------------------------
+
+    def fresh(self, letter: str = "v") -> str:
+        """Return a name that nothing has."""
+        self._count += 1
+        return f"%{letter}{self._count}"
+
+    def type_of(self, kind: str, *, lanes: bool) -> str:
+        """Return the type of a number."""
+        return self._types[kind, lanes]
+
+    def operand(self, value: Value, *, lanes: bool) -> str:
+        """Return a value as an operand, the same in all lanes where it is one number and a vector is wanted."""
+        if value.constant is not None:
+            text = literal(value)
+            return self._repeated(value.kind, text) if lanes else text
+        if not lanes or value.lanes:
+            return value.name
+        vector, one = self.type_of(value.kind, lanes=True), SCALARS[value.kind]
+        first = self._found(f"insertelement {vector} poison, {one} {value.name}, i64 0", value.kind, lanes=True).name
+        places = f"<{self.width} x i32> zeroinitializer"
+        return self._found(f"shufflevector {vector} {first}, {vector} poison, {places}", value.kind, lanes=True).name
+
+    def _repeated(self, kind: str, text: str) -> str:
+        if (vector := self._vectors.get((kind, text))) is None:
+            vector = self._vectors[kind, text] = f"<{', '.join([f'{SCALARS[kind]} {text}'] * self.width)}>"
+        return vector
+
+    def _found(self, instruction: str, kind: str, *, lanes: bool) -> Value:
+        """Return what an instruction without effects gives, written only if it has not been before."""
+        for known in reversed(self._known):
+            if (value := known.get(instruction)) is not None:
+                return value
+        if len(self.lines) > self.most:
+            raise UnsupportedOperationError(f"more than {self.most} lines")
+        name = self.fresh()
+        self.lines.append(f"{name} = {instruction}")
+        value = self._known[-1][instruction] = Value(name, kind, lanes)
+        return value
+
+    def _called(self, name: str, result: str, kinds: str, given: Sequence[str], *, lanes: bool) -> Value:
+        """Return what a function of LLVM gives, whose name ends in the types of `kinds`."""
+        sizes = "".join(f".{f'v{self.width}' if lanes else ''}{'f64' if k == 'f' else SCALARS[k]}" for k in kinds)
+        of, found = self.type_of(kinds[-1], lanes=lanes), self.type_of(result, lanes=lanes)
+        self.intrinsics.add(f"declare {found} @llvm.{name}{sizes}({', '.join([of] * len(given))})")
+        listed = ", ".join(f"{of} {operand}" for operand in given)
+        return self._found(f"call {found} @llvm.{name}{sizes}({listed})", result, lanes=lanes)
+
+    @contextmanager
+    def scope(self, here: Value | None = None) -> Iterator[None]:
+        """Forget afterwards what was found meanwhile: it is not found on every way on.
+
+        Parameters
+        ----------
+        here : Value or None
+            In which lanes what is written meanwhile is asked for, if it differs from what is so around it.
+        """
+        around = self.here
+        self.here = around if here is None else here
+        self._known.append({})
+        try:
+            yield
+        finally:
+            self._known.pop()
+            self.here = around
+
+    def among_here(self, choice: Value) -> Value:
+        """Return a truth value that differs from lane to lane, false where what is written now is not asked for."""
+        return choice if self.here is None or not choice.lanes else self.logic("and", choice, self.here)
+
+    def constant(self, number: Any, kind: str | None = None) -> Value:
+        """Return a constant, of the kind of its type unless one is given."""
+        scalar = np.asarray(number, None if kind is None else DTYPES[kind])[()]
+        return Value("", kind or kind_of(scalar.dtype), False, scalar)
+
+    # -- operations ---------------------------------------------------------------------------------------------------
+
+    def arithmetic(self, operation: str, a: Value, b: Value) -> Value:
+        """Return the sum, difference, product, quotient, remainder, larger or smaller of two numbers."""
+        if a.kind == "b":
+            if operation not in BOOLEANS:
+                raise UnsupportedOperationError(f"{operation} of truth values")
+            return self.logic(BOOLEANS[operation], a, b)
+        word, python = (DOUBLES if a.kind == "f" else INTEGERS)[operation]
+        if a.constant is not None and b.constant is not None:
+            with np.errstate(all="ignore"):
+                return self.constant(python(a.constant, b.constant), a.kind)
+        if (same := _neutral(operation, a, b)) is not None:
+            return same
+        if operation in COMMUTATIVE and a.name > b.name:
+            a, b = b, a
+        if operation == "rem" and a.kind == "f":
+            return self.call("fmod", a, b)
+        if operation in ("div", "rem") and a.kind != "f":
+            return self._division(operation, word, a, b)
+        return self._pair(word, a, b)
+
+    def _pair(self, word: str, a: Value, b: Value) -> Value:
+        lanes = a.lanes or b.lanes
+        left, right = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes)
+        if word in ("maximum", "minimum", "smax", "smin"):
+            return self._called(word, a.kind, a.kind, (left, right), lanes=lanes)
+        return self._found(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", a.kind, lanes=lanes)
+
+    def _division(self, operation: str, word: str, a: Value, b: Value) -> Value:
+        """Return a quotient or remainder of whole numbers as XLA has it, by divisors that do not end the process."""
+        one, least = self.constant(1, a.kind), self.constant(np.iinfo(DTYPES[a.kind]).min, a.kind)
+        if b.constant is None:  # of a lane that has not come here, it may be what LLVM takes for another one each time
+            frozen = f"freeze {self.type_of(b.kind, lanes=b.lanes)} {b.name}"
+            b = self._found(frozen, b.kind, lanes=b.lanes)
+        beyond = self.logic("and", self.compare("eq", a, least), self.compare("eq", b, self.constant(-1, a.kind)))
+        nothing = self.compare("eq", b, self.constant(0, a.kind))
+        found = self._pair(word, a, self.select(self.logic("or", nothing, beyond), one, b))
+        return self.select(nothing, self.constant(-1, a.kind) if operation == "div" else a, found)
+
+    def compare(self, operation: str, a: Value, b: Value) -> Value:
+        """Return whether a comparison of two numbers holds."""
+        of_doubles, of_integers, of_booleans, python = COMPARISONS[operation]
+        if a.constant is not None and b.constant is not None:
+            return self.constant(python(a.constant, b.constant), "b")
+        word = {"f": f"fcmp {of_doubles}", "b": f"icmp {of_booleans}"}.get(a.kind, f"icmp {of_integers}")
+        lanes = a.lanes or b.lanes
+        left, right = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes)
+        return self._found(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", "b", lanes=lanes)
+
+    def logic(self, operation: str, a: Value, b: Value) -> Value:
+        """Return `and`, `or` or `xor` of two truth values, or of the digits of two whole numbers."""
+        if a.constant is not None and b.constant is not None:
+            return self.constant(LOGIC[operation](a.constant, b.constant), a.kind)
+        for one, other in ((a, b), (b, a)):
+            if one.constant is not None and one.kind == "b":
+                if operation == "xor":
+                    return self.inverted(other) if one.constant else other
+                return other if bool(one.constant) == (operation == "and") else one
+        if a.name == b.name and operation != "xor":
+            return a
+        return self._pair(operation, a, b)
+
+    def negated(self, a: Value) -> Value:
+        """Return a number with the other sign."""
+        if a.kind != "f":
+            return self.arithmetic("sub", self.constant(0, a.kind), a)
+        if a.constant is not None:
+            return self.constant(-a.constant)
+        return self._found(f"fneg {self.type_of('f', lanes=a.lanes)} {a.name}", "f", lanes=a.lanes)
+
+    def inverted(self, a: Value) -> Value:
+        """Return the opposite of a truth value, or of each digit of a whole number."""
+        if a.constant is not None:
+            return self.constant(np.invert(a.constant))
+        return self._pair("xor", a, self.constant(True if a.kind == "b" else -1, a.kind))
+
+    def select(self, choice: Value, a: Value, b: Value) -> Value:
+        """Return the first of two numbers where a truth value holds, the second elsewhere."""
+        if choice.constant is not None:
+            return a if choice.constant else b
+        if a is b or (a.name and a.name == b.name) or _same(a.constant, b.constant):
+            return a
+        lanes = choice.lanes or a.lanes or b.lanes
+        which, on = self.operand(choice, lanes=lanes), self.type_of("b", lanes=lanes)
+        left, right, kind = (
+            self.operand(a, lanes=lanes),
+            self.operand(b, lanes=lanes),
+            self.type_of(a.kind, lanes=lanes),
+        )
+        return self._found(f"select {on} {which}, {kind} {left}, {kind} {right}", a.kind, lanes=lanes)
+
+    def intrinsic(self, operation: str, a: Value) -> Value:
+        """Return a function of one double that LLVM knows to have an instruction for."""
+        return self._called(operation, "f", "f", (self.operand(a, lanes=a.lanes),), lanes=a.lanes)
+
+    def call(self, function: str, *given: Value) -> Value:
+        """Return a function of doubles of C's library, one call for each lane."""
+        lanes = any(value.lanes for value in given)
+        operands, kind = [self.operand(value, lanes=lanes) for value in given], self.type_of("f", lanes=lanes)
+        self.functions.add((function, len(given)))
+        called = f"@{function}_of_lanes" if lanes else f"@{function}"
+        listed = ", ".join(f"{kind} {operand}" for operand in operands)
+        return self._found(f"call {kind} {called}({listed})", "f", lanes=lanes)
+
+    def converted(self, a: Value, to: str) -> Value:
+        """Return a number as one of another kind, the nearest whole number where a double is beyond all."""
+        if a.kind == to:
+            return a
+        if a.constant is not None:
+            exact = a.kind != "f" or to not in "li"
+            return self.constant(a.constant.astype(DTYPES[to]) if exact else values.nearest(a.constant, DTYPES[to]), to)
+        if to == "b":
+            return self.compare("ne", a, self.constant(0, a.kind))
+        if a.kind == "f":  # `fptosi` gives poison where a number does not fit
+            return self._called("fptosi.sat", to, to + "f", (a.name,), lanes=a.lanes)
+        kind, wanted = self.type_of(a.kind, lanes=a.lanes), self.type_of(to, lanes=a.lanes)
+        return self._found(f"{CONVERSIONS[a.kind + to]} {kind} {a.name} to {wanted}", to, lanes=a.lanes)
+
+    def anywhere(self, a: Value) -> str:
+        """Return the name of a truth value that holds where one holds in some lane."""
+        if not a.lanes:
+            return self.operand(a, lanes=False)
+        of, called = self.type_of("b", lanes=True), f"@llvm.vector.reduce.or.v{self.width}i1"
+        self.intrinsics.add(f"declare i1 {called}({of})")
+        return self._found(f"call i1 {called}({of} {a.name})", "b", lanes=False).name
+
+    # -- order --------------------------------------------------------------------------------------------------------
+
+    def label(self) -> str:
+        """Return a name for a block."""
+        return self.fresh("b")[1:]
+
+    def begin(self, label: str) -> None:
+        """Begin a block."""
+        self.lines.append(f"{label}:")
+
+    def jump(self, label: str) -> None:
+        """End a block, and go on with another."""
+        self.lines.append(f"br label %{label}")
+
+    def branch(self, choice: str, then: str, otherwise: str) -> None:
+        """End a block, and go on with one of two."""
+        self.lines.append(f"br i1 {choice}, label %{then}, label %{otherwise}")
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Tell whether two constants are one, which zeros of different signs are not."""
+    return a is not None and b is not None and bool(a == b) and math.copysign(1, a) == math.copysign(1, b)
+
+
+def _neutral(operation: str, a: Value, b: Value) -> Value | None:
+    """Return the operand that an operation leaves as it is, if the other says so: one as a factor, zero in a sum.
+
+    The sign of -0 + 0 is not asked for, as XLA does not.
+    """
+    if (nothing := NEUTRAL.get(operation)) is None:
+        return None
+    if b.constant is not None and b.constant == nothing:
+        return a
+    return b if operation in COMMUTATIVE and a.constant is not None and a.constant == nothing else None

@@ -1,0 +1,295 @@
+"""How numbers go to arrays in memory and come from there, and loops over such arrays.
+
+A loop takes a number of each array, or as many as a vector has where they lie one after another.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from jounce.execution.llvm.text.arrays import Values, filled, in_memory
+from jounce.execution.llvm.text.code import Code, flat
+from jounce.execution.llvm.text.values import Region, Value, kind_of
+from jounce.execution.llvm.text.views import (
+    Array,
+    Deferred,
+    InMemory,
+    Stored,
+    as_read,
+    between,
+    contiguous,
+    further,
+    in_shape,
+    merged,
+    spread,
+)
+
+
+def room_for(code: Code, shape: Sequence[int], kind: str, *, lanes: bool) -> Stored:
+    """Return an array of which nothing is known yet."""
+    return contiguous(code.taken_room(math.prod(shape), kind, lanes=lanes), shape)
+
+
+def is_own(code: Code, array: Stored) -> bool:
+    """Tell whether an array may be changed in its place: it is all that is there, and nobody else reads it."""
+    return (
+        array.region in code.changeable
+        and array.is_same(contiguous(array.region, array.shape))
+        and code.is_unshared(array.region)
+    )
+
+
+def is_large(code: Code, array: Any) -> bool:
+    """Tell whether an array belongs in memory."""
+    return code.large is not None and math.prod(array.shape) > code.large
+
+
+def any_lanes(arrays: Sequence[Array]) -> bool:
+    """Tell whether numbers of some array differ from lane to lane."""
+    return any(x.lanes if isinstance(x, InMemory) else any(v.lanes for v in flat(x)) for x in arrays)
+
+
+def kind_in(array: Array) -> str:
+    """Return the kind of the numbers of an array that has some."""
+    return array.kind if isinstance(array, InMemory) else flat(array)[0].kind
+
+
+def room_of(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
+    """Return room for the result of an operation."""
+    aval = equation.outvars[0].aval
+    return room_for(code, aval.shape, kind_of(aval.dtype), lanes=any_lanes(given))
+
+
+# -- views ------------------------------------------------------------------------------------------------------------
+
+
+def row(code: Code, array: Array, index: int | Value) -> Array:
+    """Return the part of an array at an index of its first axis: an index that is not known wants a stored one."""
+    if isinstance(array, np.ndarray):
+        assert isinstance(index, int)
+        return array[index, ...]
+    part = between(code, stored(code, array), 0, index, 1)
+    return settled(code, replace(part, shape=part.shape[1:], strides=part.strides[1:]))
+
+
+def reshaped(code: Code, array: Stored, shape: Sequence[int]) -> Stored:
+    """Return the same numbers in another shape, copied where no strides tell it."""
+    found = in_shape(array, shape)
+    return contiguous(copied(code, array).region, shape) if found is None else found
+
+
+# -- numbers and memory -----------------------------------------------------------------------------------------------
+
+
+def values_of(code: Code, array: Array) -> Values:
+    """Return an array as single values."""
+    if isinstance(array, Deferred):
+        parts = [flat(values_of(code, part)) for part in array.given]
+        return filled(array.shape, [array.body(numbers) for numbers in zip(*parts, strict=True)])
+    if not isinstance(array, Stored):
+        return array
+    places = [
+        further(code, array.first, int(np.dot(index, array.strides)), 1) if array.ndim else array.first
+        for index in np.ndindex(*array.shape)
+    ]
+    return filled(array.shape, [without_home(code.load(array.region, place)) for place in places])
+
+
+def without_home(value: Value) -> Value:
+    """Return a value that is not taken to be where it came from: that may change."""
+    value.home = None
+    return value
+
+
+def stored(code: Code, array: Array) -> Stored:
+    """Return an array in memory, put there if it is not yet; what is repeated is put there once."""
+    if isinstance(array, Stored):
+        return array
+    if isinstance(array, Deferred):
+        return copied(code, array)
+    if not array.size:
+        return contiguous(Region("null", "f", False), array.shape)
+    repeated = [size > 1 and stride == 0 for size, stride in zip(array.shape, array.strides, strict=True)]
+    part = array[(*(slice(0, 1) if r else slice(None) for r in repeated), ...)]
+    values = flat(part)
+    if all(value.constant is not None for value in values):
+        table = np.array([value.constant for value in values])
+        if len(values) > 1 and len({number.tobytes() for number in table}) == 1:
+            one = contiguous(code.constants_region([table[0]], values[0].kind), ())
+            return spread(one, array.shape, ())
+        region, first = code.constants_region([v.constant for v in values], values[0].kind), 0
+    else:
+        region, first = in_memory(code, values)
+    return spread(contiguous(region, part.shape, first), array.shape, range(array.ndim))
+
+
+def settled(code: Code, array: Array) -> Array:
+    """Return an array as single values where it is small."""
+    return array if is_large(code, array) else values_of(code, array)
+
+
+def copied(code: Code, array: Array) -> Stored:
+    """Return an array with a place of its own, its numbers one after another."""
+    found = room_for(code, array.shape, kind_in(array), lanes=any_lanes([array]))
+    put(code, found, array)
+    return found
+
+
+def put(code: Code, target: Stored, array: Array) -> None:
+    """Write an array where another one is: it reads nothing there but the number in whose place one is put."""
+    if not target.size:
+        return
+    if not isinstance(array, InMemory) and is_large(code, array):
+        array = stored(code, array)
+    if isinstance(array, InMemory):
+        read = array if isinstance(array, Deferred) else as_read(array)
+        in_place = any(part.region == target.region for part in read.given)  # then each number once
+        nest(code, read.given, [target], lambda values: [read.body(values)], adds=in_place)
+        return
+    for index, value in zip(np.ndindex(*target.shape), flat(array), strict=True):
+        place = further(code, target.first, int(np.dot(index, target.strides)), 1) if target.ndim else target.first
+        code.store(target.region, place, value)
+
+
+def fill(code: Code, target: Stored, number: Value) -> None:
+    """Write a number wherever an array is."""
+    put(code, target, spread(stored(code, filled((), [number])), target.shape, ()))
+
+
+# -- loops ------------------------------------------------------------------------------------------------------------
+
+Body = Callable[[list[Value]], Sequence[Value]]
+Visit = Callable[[int | Value], None]  # of the number from which on something is done
+
+
+def counted(code: Code, count: int, body: Callable[[int | Value], None]) -> None:
+    """Write a loop that runs so many times."""
+    if count <= 1:
+        if count:
+            body(0)
+        return
+    before, head, latch, end = (code.label() for _ in range(4))
+    index, following = code.fresh("i"), code.fresh("i")
+    code.jump(before)
+    code.begin(before)
+    code.jump(head)
+    code.begin(head)
+    code.lines.append(f"{index} = phi i64 [0, %{before}], [{following}, %{latch}]")
+    with code.scope():
+        body(Value(index, "l", False))
+    code.jump(latch)
+    code.begin(latch)
+    over = code.fresh()
+    code.lines.append(f"{following} = add nuw nsw i64 {index}, 1")
+    code.lines.append(f"{over} = icmp eq i64 {following}, {count}")
+    code.branch(over, end, head)
+    code.begin(end)
+
+
+def nest(code: Code, given: Sequence[Stored], found: Sequence[Stored], body: Body, *, adds: bool = False) -> None:
+    """Write loops over arrays of one shape.
+
+    Parameters
+    ----------
+    code : Code
+    given, found : sequence of Stored
+        What is read and written.
+    body : callable
+        Maps numbers of the arrays read to those written.
+    adds : bool, default False
+        Whether what is written depends on what was there, so that no place may be visited twice.
+    """
+    arrays = [*given, *found]
+    shape, strides = merged(arrays[0].shape, [array.strides for array in arrays])
+    if 0 in shape:
+        return
+
+    def run(axes: Sequence[int], places: Sequence[int | Value]) -> None:
+        if not axes:
+            _visit(code, given, found, body, places)
+            return
+        axis, *rest = axes
+        size, steps = shape[axis], [s[axis] for s in strides]
+
+        def moved(k: int | Value) -> list[int | Value]:
+            return [further(code, place, k, step) for place, step in zip(places, steps, strict=True)]
+
+        if rest or not code.alone or size < code.width or not _is_along(steps, len(given)):
+            counted(code, size, lambda k: run(rest, moved(k)))
+            return
+        along = [step == 1 for step in steps]
+        single = (lambda k: _visit(code, given, found, body, moved(k))) if adds else None
+        _in_vectors(code, size, lambda k: _visit(code, given, found, body, moved(k), along), single)
+
+    run(_order(shape, strides, len(given)), [array.first for array in arrays])
+
+
+def _visit(
+    code: Code,
+    given: Sequence[Stored],
+    found: Sequence[Stored],
+    body: Body,
+    places: Sequence[int | Value],
+    along: Sequence[bool] | None = None,
+) -> None:
+    """Write what is done at one place of each array, or for a vector of numbers from there on of some."""
+    along = [False] * len(places) if along is None else along
+    read = [
+        code.load_along(array.region, place) if vector else without_home(code.load(array.region, place))
+        for array, place, vector in zip(given, places, along, strict=False)
+    ]
+    first = len(given)
+    for array, place, vector, value in zip(found, places[first:], along[first:], body(read), strict=True):
+        (code.store_along if vector else code.store)(array.region, place, value)
+
+
+def _in_vectors(code: Code, size: int, vector: Visit, single: Visit | None) -> None:
+    """Write a loop of vectors over at least as many numbers as one has.
+
+    Parameters
+    ----------
+    code : Code
+    size : int
+        Of the numbers.
+    vector : callable
+        Writes what is done for a vector of numbers, from one on.
+    single : callable or None
+        Writes what is done for each number that is left after whole vectors; None if the last vector may have some in
+        common with the one before.
+    """
+    whole, left = divmod(size, code.width)
+    if left and single is None:
+
+        def last(k: int | Value) -> None:
+            start, most = further(code, 0, k, code.width), size - code.width
+            if isinstance(start, Value):
+                vector(code.arithmetic("min", start, code.constant(most, "l")))
+            else:
+                vector(min(start, most))
+
+        counted(code, whole + 1, last)
+        return
+    counted(code, whole, lambda k: vector(further(code, 0, k, code.width)))
+    if single is not None:
+        counted(code, left, lambda k: single(further(code, whole * code.width, k, 1)))
+
+
+def _is_along(steps: Sequence[int], given: int) -> bool:
+    """Tell whether the numbers along an axis, or one of an array that is only read, make a vector."""
+    return set(steps) <= {0, 1} and 0 not in steps[given:]
+
+
+def _order(shape: Sequence[int], strides: Sequence[Sequence[int]], given: int) -> list[int]:
+    """Return the axes, the one of the innermost loop last: where numbers make vectors, and what is written moves on."""
+    if not shape:
+        return []
+
+    def rank(axis: int) -> tuple[bool, bool, int]:
+        steps = [s[axis] for s in strides]
+        return _is_along(steps, given), 0 not in steps[given:], axis
+
+    inner = max(range(len(shape)), key=rank)
+    return [*(axis for axis in range(len(shape)) if axis != inner), inner]

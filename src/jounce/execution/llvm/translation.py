@@ -1,0 +1,403 @@
+"""A program of JAX for one instant as code for a vector of lanes, each with a way of its own through it.
+
+Where lanes part, all ways that some lane takes are run, and each keeps what its own one gives; a loop runs until the
+last lane that is in it has left. So the results of a lane depend on no other.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from jax.extend.core import Literal, jaxprs_in_params
+
+from jounce.execution.llvm.calls import call
+from jounce.execution.llvm.carried import Carried
+from jounce.execution.llvm.plans import plan_of
+from jounce.execution.llvm.rules.loops import DEFERRED, READING, STORED
+from jounce.execution.llvm.rules.operations import RULES
+from jounce.execution.llvm.text.arrays import constants, each, filled
+from jounce.execution.llvm.text.code import Code
+from jounce.execution.llvm.text.stored import (
+    any_lanes,
+    is_large,
+    kind_in,
+    put,
+    room_for,
+    row,
+    settled,
+    stored,
+    values_of,
+)
+from jounce.execution.llvm.text.values import NoRuleError, Region, UnsupportedOperationError, Value, kind_of
+from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored, as_read, contiguous, further
+from jounce.jax_internals import sizes_of_scan
+
+MOST_UNROLLED = 4_000  # lines of a loop of known length that is written turn after turn
+MOST_UNROLLED_IN_MEMORY = 1_000  # where arrays may stay in memory
+HOPE = 8  # times as many lines as in a later turn may be in one of the first, which later ones have in common with it
+
+
+def translate(
+    code: Code, program: Any, constants_: Sequence[Array], given: Sequence[Array], *, late: bool = False
+) -> list[Array]:
+    """Write the operations of a program, and return its results.
+
+    Parameters
+    ----------
+    code : Code
+        What is written to.
+    program : Jaxpr
+    constants_, given : sequence of arrays of Value
+        Its constants and arguments.
+    late : bool, default False
+        Whether numbers of the results may be computed by who wants them next.
+
+    Raises
+    ------
+    UnsupportedOperationError
+        Where there is no code for an operation.
+    """
+    plan = code.plans.get(program)
+    if plan is None:
+        plan = code.plans[program] = plan_of(program, *((DEFERRED, READING) if code.large is not None else ((), ())))
+    known: dict[Any, Array] = {}
+    read_last: dict[Region, int] = {}  # by which operation, what is in the memory of arrays
+    now = 0
+
+    def noted(variable: Any, array: Array) -> None:
+        known[variable] = array
+        for region in _regions([array]):
+            read_last[region] = max(read_last.get(region, -1), plan.last.get(variable, -1))
+
+    def read(variable: Any) -> Array:
+        if isinstance(variable, Literal):
+            aval: Any = variable.aval
+            return constants(code, np.asarray(variable.val, aval.dtype))
+        return known[variable]
+
+    for variable, array in zip((*program.constvars, *program.invars), (*constants_, *given), strict=True):
+        noted(variable, array)
+    for variable, value in plan.constants.items():
+        noted(variable, constants(code, value))
+    with code.used(lambda region: read_last.get(region, -1) > now):
+        for now, operation in enumerate(plan.operations):
+            inputs = [read(variable) for variable in operation.invars]
+            before = len(code.taken)
+            found = _results(code, operation, inputs, delayed=now in plan.delayed)
+            for variable, values in zip(operation.outvars, found, strict=True):
+                noted(variable, _checked(values, variable.aval))
+            if code.large is not None:
+                _give_back_but(code, code.taken[before:], found)
+                _let_go(code, known, plan.ends.get(now, ()))
+        results = [read(variable) for variable in plan.results]
+        return results if late else [stored(code, x) if isinstance(x, Deferred) else x for x in results]
+
+
+def _let_go(code: Code, known: dict[Any, Array], variables: Sequence[Any]) -> None:
+    """Forget variables that nobody reads any more, and give back what memory only they had."""
+    gone = [known.pop(variable, None) for variable in variables]
+    _give_back(code, [array for array in gone if array is not None])
+
+
+def _give_back(code: Code, arrays: Sequence[Array]) -> None:
+    """Give back the memory of arrays that nobody reads any more, where nobody reads it by another one."""
+    for region in _regions(arrays):
+        if code.is_unshared(region):
+            code.give_back(region)
+
+
+def _give_back_but(code: Code, taken: Sequence[Region], arrays: Sequence[Array]) -> None:
+    """Give back memory that was taken, but that of arrays."""
+    wanted = _regions(arrays)
+    for region in dict.fromkeys(taken):
+        if region not in wanted:
+            code.give_back(region)
+
+
+def _results(code: Code, equation: Any, given: Sequence[Array], *, delayed: bool) -> Sequence[Array]:
+    """Return the results of an operation: by single values, or by loops where an array is large."""
+    name = equation.primitive.name
+    if name not in DEFERRED and name not in READING:
+        given = [stored(code, array) if isinstance(array, Deferred) else array for array in given]
+    if (control := _CONTROL.get(name)) is not None:
+        return control(code, equation, given)
+    large = any(is_large(code, variable.aval) for variable in equation.outvars)
+    if (large or any(isinstance(array, InMemory) for array in given)) and (rule := STORED.get(name)) is not None:
+        found = [settled(code, array) for array in rule(code, equation, given)]
+        return [stored(code, x) if isinstance(x, Deferred) and not delayed else x for x in found]
+    if (rule := RULES.get(name)) is None:
+        raise NoRuleError(name)
+    return rule(code, equation, [values_of(code, array) for array in given])
+
+
+def _checked(values: Any, aval: Any) -> Array:
+    """Return values as an array, as NumPy does not for a lone one: of the shape and the kind that JAX has for it."""
+    array = values if isinstance(values, np.ndarray | InMemory) else filled((), [values])
+    if array.shape != aval.shape:
+        raise AssertionError(f"an array of shape {array.shape} where one of {aval.shape} belongs")
+    kind = kind_of(aval.dtype)
+    if isinstance(array, InMemory):
+        if array.kind != kind:
+            raise UnsupportedOperationError(f"an array of {array.kind} where one of {kind} belongs")
+        return array
+    if array.size and array.item(0).kind != kind:
+        raise UnsupportedOperationError(f"an array of {array.item(0).kind} where one of {kind} belongs")
+    return array
+
+
+def _linear_solve(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
+    """Write what solves linear equations, of whose derivatives JAX was told more."""
+    lengths = equation.params["const_lengths"]
+    first = lengths.matvec + lengths.vecmat
+    return _closed(code, equation.params["jaxprs"].solve, given[first : first + lengths.solve], given[sum(lengths) :])
+
+
+def _number(code: Code, array: Array) -> Value:
+    return values_of(code, array).item()
+
+
+def _closed(code: Code, closed: Any, *given: Sequence[Array], late: bool = False) -> list[Array]:
+    numbers = [constants(code, number) for number in closed.consts]
+    return translate(code, closed.jaxpr, numbers, [array for some in given for array in some], late=late)
+
+
+def _until_settled(code: Code, lanes: list[bool], attempt: Callable[[list[bool]], tuple[list[bool], Any]]) -> Any:
+    """Return what an attempt gives that knows of each array whether its numbers differ from lane to lane.
+
+    Parameters
+    ----------
+    lanes : list of bool
+        What is known of the arrays before.
+    attempt : callable
+        Writes code, and returns which arrays differ, more than it was told if it has found so, and its results.
+    """
+    while True:
+        mark = code.mark()
+        found, results = attempt(lanes)
+        if found == lanes:
+            return results
+        code.back_to(mark)
+        lanes = found
+
+
+def _in_lanes(arrays: Sequence[Array], already: Sequence[bool] | None = None) -> list[bool]:
+    """Tell which arrays have numbers that differ from lane to lane, or did already."""
+    already = [False] * len(arrays) if already is None else already
+    return [before or any_lanes([array]) for before, array in zip(already, arrays, strict=True)]
+
+
+def _likely(code: Code, arrays: Sequence[Array], avals: Sequence[Any]) -> list[bool]:
+    """Tell which arrays that a loop changes are taken to differ from lane to lane: all but counts that do not yet."""
+    return [a or b for a, b in zip(_in_lanes(arrays), _likely_made(code, avals), strict=True)]
+
+
+def _likely_made(code: Code, avals: Sequence[Any]) -> list[bool]:
+    """Tell which arrays that are made are taken to differ from lane to lane."""
+    return [kind_of(aval.dtype) == "f" and not code.alone for aval in avals]
+
+
+def _chosen(code: Code, choice: Value, new: Sequence[Array], old: Sequence[Array]) -> list[Array]:
+    def chosen(x: Array, y: Array) -> Array:
+        if not isinstance(x, InMemory) and not isinstance(y, InMemory):
+            return each(lambda a, b: code.select(choice, a, b), x, y)
+        a, b = (array if isinstance(array, Deferred) else as_read(stored(code, array)) for array in (x, y))
+        if a.given[0].is_same(b.given[0]) and not isinstance(x, Deferred) and not isinstance(y, Deferred):
+            return a.given[0]
+        count = len(a.given)
+
+        def body(values: Sequence[Value]) -> Value:
+            return code.select(choice, a.body(values[:count]), b.body(values[count:]))
+
+        return Deferred((*a.given, *b.given), a.kind, body, choice.lanes)
+
+    return [chosen(x, y) for x, y in zip(new, old, strict=True)]
+
+
+def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
+    """Write a loop that each lane leaves when its condition no longer holds."""
+    p = equation.params
+    split = p["cond_nconsts"], p["cond_nconsts"] + p["body_nconsts"]
+    asked, needed, start = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
+
+    def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
+        carried = Carried(code, [variable.aval for variable in equation.outvars], lanes)
+        carried.store(start)
+        head, body, end = code.label(), code.label(), code.label()
+        code.jump(head)
+        code.begin(head)
+        with code.scope(), carried.held():
+            before = carried.load()
+            with code.used(_among([*asked, *needed, *before])):
+                goes = code.among_here(_number(code, _closed(code, p["cond_jaxpr"], asked, before)[0]))
+            if goes.lanes and not all(lanes):  # what a lane keeps that has left differs
+                return [True] * len(lanes), []
+            code.branch(code.anywhere(goes), body, end)
+            code.begin(body)
+            kept = [*asked, *needed, *(before if goes.lanes else ())]
+            with code.scope(goes if goes.lanes else None), code.used(_among(kept)):
+                after = _closed(code, p["body_jaxpr"], needed, before, late=True)
+                if goes.lanes:
+                    after = _chosen(code, goes, after, before)
+                carried.store(after)
+                _give_back(code, after)
+            code.jump(head)
+        code.begin(end)
+        return _in_lanes(after, lanes), carried.load()
+
+    return _until_settled(code, _likely(code, start, [variable.aval for variable in equation.outvars]), attempt)
+
+
+def _among(arrays: Sequence[Array]) -> Callable[[Region], bool]:
+    """Return what tells the memory of some arrays."""
+    return _regions(arrays).__contains__
+
+
+def _regions(arrays: Sequence[Array]) -> dict[Region, None]:
+    """Return the memory of arrays, and of what they are computed from: each once, in their order.
+
+    A set has another order in each process, and memory that is given back in another order is taken so: then the same
+    program has another text, and another name in the store.
+    """
+    parts = [array.given if isinstance(array, Deferred) else [array] for array in arrays]
+    return dict.fromkeys(part.region for some in parts for part in some if isinstance(part, Stored))
+
+
+def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
+    """Write a loop of known length over the first axis of arrays."""
+    p = equation.params
+    fixed, carried = sizes_of_scan(equation)
+    needed, start, rows = given[:fixed], given[fixed : fixed + carried], given[fixed + carried :]
+    made = [variable.aval for variable in equation.outvars[len(start) :]]
+    if p["length"] == 0:
+        return [*start, *(np.empty(aval.shape, object) for aval in made)]
+    most = MOST_UNROLLED if code.large is None else MOST_UNROLLED_IN_MEMORY
+    if code.large is None and _needs_known_places(p["jaxpr"].jaxpr):
+        most = code.most
+    if (unrolled := _unrolled(code, equation, needed, start, rows, most)) is not None:
+        return unrolled
+    mark = code.mark()
+    try:
+        return _rolled(code, equation, needed, start, rows)
+    except UnsupportedOperationError:  # of places that change from turn to turn
+        code.back_to(mark)
+        if (unrolled := _unrolled(code, equation, needed, start, rows, code.most)) is None:
+            raise
+        return unrolled
+
+
+def _needs_known_places(program: Any) -> bool:
+    """Tell whether a program has operations for which there is code only where their indices are known."""
+    return any(
+        equation.primitive.name.startswith("scatter")
+        or any(map(_needs_known_places, jaxprs_in_params(equation.params)))
+        for equation in program.eqns
+    )
+
+
+def _rolled(
+    code: Code, equation: Any, needed: Sequence[Array], start: Sequence[Array], rows: Sequence[Array]
+) -> list[Array]:
+    """Write a loop of known length as one."""
+    p, size = equation.params, len(start)
+    made = [variable.aval for variable in equation.outvars[size:]]
+    last = code.constant(p["length"] - 1, "l")
+
+    def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
+        carried = Carried(code, [variable.aval for variable in equation.outvars[:size]], lanes[:size])
+        written, counter = Carried(code, made, lanes[size:]), code.room(1, "l", lanes=False)
+        carried.store(start)
+        code.store(counter, 0, code.constant(0, "l"))
+        homes = [stored(code, array) if array.size else array for array in rows]
+        body, end = code.label(), code.label()
+        code.jump(body)
+        code.begin(body)
+        with code.scope(), code.used(_among([*needed, *homes])), carried.held(), written.held():
+            count = code.load(counter, 0)
+            at = code.arithmetic("sub", last, count) if p["reverse"] else count
+            taken = [row(code, array, at) if array.size else np.empty(array.shape[1:], object) for array in homes]
+            results = _closed(code, p["jaxpr"], needed, carried.load(), taken, late=True)
+            for region, array in zip(written.regions, results[size:], strict=True):
+                if array.size:
+                    put(code, contiguous(region, array.shape, further(code, 0, at, array.size)), array)
+            carried.store(results[:size])  # after what may be a part of what was carried
+            _give_back(code, results)
+            code.store(counter, 0, code.arithmetic("add", count, code.constant(1, "l")))
+            code.branch(code.operand(code.compare("lt", count, last), lanes=False), body, end)
+        code.begin(end)
+        return _in_lanes(results, lanes), [*carried.load(), *written.load()]
+
+    likely = [*_likely(code, start, [variable.aval for variable in equation.outvars[:size]]), *_likely_made(code, made)]
+    return _until_settled(code, likely, attempt)
+
+
+def _unrolled(
+    code: Code, equation: Any, needed: Sequence[Array], start: Sequence[Array], rows: Sequence[Array], most: int
+) -> list[Array] | None:
+    """Return the results of a loop turn after turn; None where that takes more lines than `most`.
+
+    It is given up early where the turns so far, of which the first are longer than the others, leave no hope.
+    """
+    p, mark, before = equation.params, code.mark(), len(code.lines)
+    size, found, kept = len(start), {}, _regions([*needed, *rows])
+    for k in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
+        with code.used(kept.__contains__):
+            results = _closed(code, p["jaxpr"], needed, start, [row(code, array, k) for array in rows])
+        start, found[k] = results[:size], results[size:]
+        kept |= _regions(found[k])
+        lines, left = len(code.lines) - before, p["length"] - len(found)
+        if p["length"] > 1 and lines + lines / len(found) / HOPE * left > most:
+            code.back_to(mark)
+            return None
+    made = [[found[k][place] for k in range(p["length"])] for place in range(len(equation.outvars) - size)]
+    return [*start, *(_stacked(code, parts) for parts in made)]
+
+
+def _stacked(code: Code, parts: Sequence[Array]) -> Array:
+    single = [part for part in parts if isinstance(part, np.ndarray)]
+    if len(single) == len(parts) and (code.large is None or len(parts) * parts[0].size <= code.large):
+        return np.stack(single)
+    found = room_for(code, (len(parts), *parts[0].shape), kind_in(parts[0]), lanes=any_lanes(parts))
+    for k, part in enumerate(parts):
+        put(code, contiguous(found.region, part.shape, k * part.size), part)
+    return found
+
+
+def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
+    """Write ways of which each lane takes one: all that some lane takes are run."""
+    ways, which, inputs = equation.params["branches"], _number(code, given[0]), given[1:]
+    which = code.converted(which, "i") if which.kind == "b" else which
+    if len(ways) == 1 or which.constant is not None:
+        return _closed(code, ways[min(max(int(which.constant or 0), 0), len(ways) - 1)], inputs)
+
+    def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
+        results, found = Carried(code, [variable.aval for variable in equation.outvars], lanes), lanes
+        for k, way in enumerate(ways):
+            word = "le" if k == 0 else "ge" if k == len(ways) - 1 else "eq"
+            here = code.among_here(code.compare(word, which, code.constant(k, which.kind)))
+            begin, end = code.label(), code.label()
+            code.branch(code.anywhere(here), begin, end)
+            code.begin(begin)
+            with (
+                code.scope(here if here.lanes else None),
+                code.used(_among(inputs if k < len(ways) - 1 or here.lanes else [])),
+            ):
+                made = _closed(code, way, inputs)
+                found = _in_lanes(made, found)
+                if which.lanes and k > 0:
+                    made = _chosen(code, here, made, results.load())
+                results.store(made)
+            code.jump(end)
+            code.begin(end)
+        return found, results.load()
+
+    avals = [variable.aval for variable in equation.outvars]
+    return _until_settled(code, [which.lanes or likely for likely in _likely_made(code, avals)], attempt)
+
+
+_CONTROL = {
+    "while": _while,
+    "scan": _scan,
+    "cond": _cond,
+    "custom_linear_solve": _linear_solve,
+    "ffi_call": call,
+}

@@ -1,0 +1,288 @@
+"""A function of one instant, run for many: by machine code, or by XLA where there is none; the same calls for both.
+
+XLA calls one operation on arrays after another, and each goes through memory. In machine code all operations on an
+instant follow one another in the registers of the processor, several instants at a time (`jounce.execution.llvm`).
+Instants may start from the results of others: they are solved in rounds, each of as many instants as go side by side.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Int
+
+from jounce.execution.backends import LLVM, xla_backend
+from jounce.execution.compilation import Compiled
+from jounce.execution.device import on_processor
+from jounce.execution.llvm.programs import Program
+from jounce.execution.llvm.text.scalars import MOST_LINES
+from jounce.execution.threads import Threads
+from jounce.execution.translated import Translated
+from jounce.settings import under_own_settings
+from jounce.shapes import is_traced
+
+WIDTHS = (8, 256)  # instants that XLA's programs are for: each compiles once
+GPU_WIDTH = 2**15  # the same on a GPU, which they have to fill
+SIDE_BY_SIDE = 128  # samples along the first axis that XLA computes side by side, so that the cache holds them
+Rounds = Callable[[Int[np.ndarray, "round lane"]], None]
+_published: dict[str, Program] = {}  # by the names under which other machine code calls them
+
+
+@dataclasses.dataclass(frozen=True)
+class OnLlvm:
+    """Machine code of a function of one instant, with what all instants share."""
+
+    machine_code: Program
+    shared: Sequence[np.ndarray]
+
+    @property
+    def backend(self) -> str:
+        """What it computes by."""
+        return LLVM
+
+    def __call__(self, lanes: Any, threads: int = 1) -> Any:
+        """Return the results for many instants, which are shared among threads where they lie along the first axis."""
+        leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(lanes)]
+        if threads == 1:
+            return self.machine_code(self.shared, leaves)
+        with Threads(threads, compiled=True) as pool:
+            parts = 4 * threads  # none is to wait long for another
+            return self.machine_code(self.shared, leaves, parts, pool.map)
+
+    def rounds(self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"]) -> Rounds:
+        """Return what solves instants in rounds, of which later ones start from the results of earlier ones.
+
+        Parameters
+        ----------
+        lanes : tuple
+            The arguments of an instant in three parts, instants last: those that it takes from its source, those that
+            are its own, and those that all have the same, of one instant. They are read as they are in each round.
+        results : pytree
+            Arrays that the results are written to, those of the first part among them; None for what nobody wants.
+        sources : array of int, shape (time,)
+            Index of the source of each instant.
+        """
+        leaves: Any = [[np.asarray(leaf) for leaf in jax.tree.leaves(group)] for group in lanes]
+        kept = jax.tree.leaves(results, is_leaf=lambda x: x is None)
+        return self.machine_code.relay(self.shared, leaves, kept, sources)
+
+    @property
+    def width(self) -> int:
+        """How many instants a round has: as many as a vector holds."""
+        return self.machine_code.width
+
+    def room(self, count: int) -> int:
+        """Return of how many instants the arrays of rounds are to be, where so many are solved."""
+        return count
+
+    @cached_property
+    def name(self) -> str:
+        """Name by which other machine code calls it, as `called` has it."""
+        name = self.machine_code.name
+        if name not in _published:
+            self.machine_code.publish()
+            _published[name] = self.machine_code
+        return name
+
+
+def called(name: str, shared: Any, lanes: Any) -> Any:
+    """Return the results of machine code as part of a program that becomes machine code, too."""
+    return _published[name].in_program(jax.tree.leaves(shared), jax.tree.leaves(lanes))
+
+
+@dataclasses.dataclass(frozen=True)
+class OnXla:
+    """XLA's programs of a function of one instant, for instants side by side, with what all of them share.
+
+    Parameters
+    ----------
+    mapped : Mapped
+        The function.
+    shared : pytree
+    form : PyTreeDef
+        Structure of the arguments of an instant.
+    how : tuple
+        Static arguments, by name.
+    width : int
+        How many instants a round has.
+    """
+
+    mapped: "Mapped"
+    shared: Any
+    form: Any
+    how: tuple[tuple[str, Any], ...]
+    width: int
+
+    @property
+    def backend(self) -> str:
+        """What it computes by."""
+        return xla_backend()
+
+    def __call__(self, lanes: Any, threads: int = 1) -> Any:
+        """Return the results for many instants, which are computed in blocks of few sizes, shared among threads."""
+        axis = 0 if self.mapped.rows else -1
+        lanes = jax.tree.map(np.asarray, lanes)
+        count = jax.tree.leaves(lanes)[0].shape[axis]
+        small, *middle, large = self.mapped.widths if on_processor() else (SIDE_BY_SIDE, GPU_WIDTH)
+        # half of a large block at least is in use, so that no more than twice is computed
+        width = small if count <= small else middle[0] if middle and count <= large // 2 else large
+
+        def computed(first: int) -> Any:
+            places = np.minimum(np.arange(first, first + width), count - 1)
+            block = jax.tree.map(lambda x: _taken(x, places, axis), lanes)
+            return jax.tree.map(np.asarray, self.mapped.on_xla(self.shared, block, self.how))
+
+        with Threads(threads) as pool:
+            parts = list(pool.map(computed, range(0, max(count, 1), width)))
+
+        def whole(*arrays: np.ndarray) -> np.ndarray:
+            joined = np.concatenate(arrays, axis)  # a copy that its user may write to
+            return joined[:count] if axis == 0 else joined[..., :count]
+
+        return jax.tree.map(whole, *parts)
+
+    def room(self, count: int) -> int:
+        """Return of how many instants the arrays of rounds are to be, where so many are solved: one of few numbers.
+
+        Each of them compiles once.
+        """
+        room = 2 * self.width
+        while room < count:
+            room *= 4
+        return room
+
+    def rounds(self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"]) -> Rounds:
+        """Return what solves instants in rounds, as that of `OnLlvm`; the arrays are written when all are solved."""
+        linked, own, held = map(jax.tree.leaves, lanes)
+        kept = jax.tree.leaves(results, is_leaf=lambda x: x is None)
+        wanted = tuple(k for k, whole in enumerate(kept) if whole is not None)
+        wholes = [kept[k] for k in wanted]
+        links = tuple(next(k for k, whole in enumerate(wholes) if whole is part) for part in linked)
+
+        def run(targets: Int[np.ndarray, "round lane"]) -> None:
+            end, turns, room = targets.max(initial=-1) + 1, np.asarray(len(targets)), -(-len(sources) // self.width)
+            targets = np.concatenate([targets, np.zeros((max(0, room - len(targets)), self.width), np.int64)])
+            how = (links, wanted, self.form, self.how)
+            found = self.mapped.in_rounds(self.shared, wholes, (own, held), (sources, targets, turns), how)
+            for whole, part in zip(wholes, found, strict=True):
+                whole[..., :end] = np.asarray(part)[..., :end]
+
+        return run
+
+
+def _taken(array: np.ndarray, places: Int[np.ndarray, " lane"], axis: int) -> np.ndarray:
+    """Return some instants of an array; zeros where it has none."""
+    if array.shape[axis]:
+        return np.take(array, places, axis)
+    return np.zeros((len(places), *array.shape[1:]) if axis == 0 else (*array.shape[:-1], len(places)), array.dtype)
+
+
+class Mapped:
+    """A function of one instant, of which `program` makes what runs it for many.
+
+    Parameters
+    ----------
+    function : callable
+        Of two pytrees of arrays, shared by all instants and of instants, which are along the last axis, as of its
+        results; and of static arguments by name. Machine code is made of it with one instant.
+    by_xla : callable, optional
+        The same for many instants, where another form suits XLA better.
+    rows : bool, default False
+        Whether arrays of many instants, those given and the results, have the instants along their first axis.
+    made_of : tuple of callable, optional
+        Functions of the package that say what it computes, where it is none of them itself.
+    most_lines : int, optional
+        Of machine code's text: what is longer takes too long to compile for what it gains.
+    widths : tuple of int, optional
+        Instants that XLA's programs are for, increasing.
+    narrow : bool, default False
+        Whether the arrays are short in XLA's programs, as `Compiled` has it.
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        *,
+        by_xla: Callable[..., Any] | None = None,
+        rows: bool = False,
+        made_of: tuple[Callable[..., Any], ...] = (),
+        most_lines: int = MOST_LINES,
+        widths: tuple[int, ...] = WIDTHS,
+        narrow: bool = False,
+    ):
+        self.function, self.rows, self.widths = function, rows, widths
+        self._many, made_of = by_xla or function, made_of or (function,)
+        self.machine_code = Translated(function, made_of, rows=rows, most_lines=most_lines)
+        of_many = made_of if by_xla is None else (*made_of, by_xla)
+        block = Mapped._block_of_rows if rows else Mapped._block
+        self.on_xla = Compiled(block.__get__(self), ("how",), (block, *of_many), narrow=narrow)
+        self.in_rounds = Compiled(self._in_rounds, ("how",), (Mapped._in_rounds, *of_many))
+        self.__wrapped__, self.__doc__ = function, function.__doc__  # by which a name in the package is known as its
+
+    @under_own_settings
+    def program(
+        self, shared: Any, lanes: Any, *, large: int | None = None, hasty: bool = False, width: int = 1, **static: Any
+    ) -> OnLlvm | OnXla:
+        """Return what runs it for arguments of a structure; `lanes` are an example of these.
+
+        Parameters
+        ----------
+        shared, lanes : pytree
+            Of arrays, as the function has them.
+        large : int, optional
+            Arrays of more numbers are in memory in machine code, as `object_file` has it.
+        hasty : bool, default False
+            Whether machine code is to be there soon rather than fast.
+        width : int, optional
+            Instants of a round of XLA.
+        **static
+            Further arguments of the function.
+        """
+        leaves, structure = jax.tree.flatten(shared)
+        few, form = jax.tree.flatten(lanes)
+        if not is_traced([*leaves, *few]):
+            arrays, parts = [np.asarray(leaf) for leaf in leaves], [np.asarray(leaf) for leaf in few]
+            code = self.machine_code.program((arrays, structure), (parts, form), static, large=large, hasty=hasty)
+            if code is not None:
+                return OnLlvm(code, arrays)
+        return OnXla(self, shared, form, tuple(static.items()), width)
+
+    def _block(self, shared: Any, lanes: Any, how: tuple[tuple[str, Any], ...]) -> Any:
+        return self._many(shared, lanes, **dict(how))
+
+    def _block_of_rows(self, shared: Any, lanes: Any, how: tuple[tuple[str, Any], ...]) -> Any:
+        def block(lanes: Any) -> Any:
+            last = jax.tree.map(lambda x: jnp.moveaxis(jnp.asarray(x), 0, -1), lanes)
+            return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), self._many(shared, last, **dict(how)))
+
+        count = jax.tree.leaves(lanes)[0].shape[0]
+        if count <= SIDE_BY_SIDE or not on_processor():
+            return block(lanes)
+        parts = jax.tree.map(lambda x: jnp.reshape(x, (count // SIDE_BY_SIDE, SIDE_BY_SIDE, *x.shape[1:])), lanes)
+        return jax.tree.map(lambda x: jnp.reshape(x, (count, *x.shape[2:])), jax.lax.map(block, parts))
+
+    def _in_rounds(
+        self, shared: Any, wholes: Sequence[Any], others: tuple[Any, Any], order: tuple[Any, Any, Any], how: Any
+    ) -> Any:
+        """Return the arrays of all instants after rounds of some of them; see `OnXla.rounds`."""
+        (own, held), (sources, targets, turns), (links, wanted, form, static) = others, order, how
+
+        def go_on(turn: Any, wholes: list[Any]) -> list[Any]:
+            here = targets[turn]
+            source = sources[here]
+            given = [jnp.take(wholes[k], source, axis=-1) for k in links] + [jnp.take(x, here, axis=-1) for x in own]
+            given += [jnp.broadcast_to(jnp.asarray(x), (*x.shape[:-1], len(here))) for x in held]
+            found = jax.tree.leaves(self._many(shared, jax.tree.unflatten(form, given), **dict(static)))
+            parts = zip(wholes, (found[k] for k in wanted), strict=True)
+            return [whole.at[..., here].set(part) for whole, part in parts]
+
+        return jax.lax.fori_loop(0, turns, go_on, [jnp.asarray(x) for x in wholes])
+
+
+def mapped(**how: Any) -> Callable[[Callable[..., Any]], Mapped]:
+    """Make a `Mapped` of the decorated function."""
+    return lambda function: Mapped(function, **how)

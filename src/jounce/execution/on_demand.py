@@ -1,0 +1,68 @@
+"""Arrays by name, each computed when it is first asked for."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+import jax
+
+from jounce.settings import under_own_settings
+
+
+class OnDemand(Mapping[str, Any]):
+    """A mapping whose values are computed when they are first asked for, and kept. To JAX it is a tree of them all.
+
+    Parameters
+    ----------
+    names : iterable of str
+        In their order.
+    compute : callable
+        Returns the value of a name, and those that are found with it, by their names.
+    known : dict, optional
+        Where they are kept.
+
+    Examples
+    --------
+    >>> from jounce.execution.on_demand import OnDemand
+    >>> doubles = OnDemand("abc", lambda name: {name: 2 * name})
+    >>> doubles["b"], list(doubles), len(doubles)
+    ('bb', ['a', 'b', 'c'], 3)
+    """
+
+    def __init__(
+        self, names: Iterable[str], compute: Callable[[str], Mapping[str, Any]], known: dict[str, Any] | None = None
+    ):
+        self._names, self._compute = dict.fromkeys(names), compute
+        self._known = {} if known is None else known
+
+    @under_own_settings
+    def __getitem__(self, name: str) -> Any:
+        """Return the value of a name."""
+        if name not in self._known:
+            if name not in self._names:
+                raise KeyError(name)
+            self._known.update(self._compute(name))
+        return self._known[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Tell whether a name is among them; nothing is computed."""
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self._names)
+
+    def __repr__(self) -> str:
+        """Show all values, as a dictionary does."""
+        return repr(dict(self))
+
+
+def _of_values(names: tuple[str, ...], values: Iterable[Any]) -> OnDemand:
+    known = dict(zip(names, values, strict=True))
+    return OnDemand(names, lambda _: known)
+
+
+jax.tree_util.register_pytree_node(OnDemand, lambda tree: (tuple(tree.values()), tuple(tree)), _of_values)

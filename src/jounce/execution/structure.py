@@ -1,0 +1,167 @@
+"""What a program is compiled for, told in words that stay the same from one process to the next.
+
+Two descriptions may be equal only where the programs are: a wrong program would give wrong numbers without a sign of
+it. So every kind of value that may make a difference is known here, and what is not known has no description: functions
+and classes that users wrote, above all, whose text nobody can tell from their names.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import hashlib
+import os
+import platform
+import sys
+import types
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.jax_internals import is_missing, trace_settings as settings
+
+PACKAGE = Path(__file__).parents[1]
+LIBRARIES = ("equinox", "jax", "jaxlib", "numpy")  # whose releases decide what is traced and compiled
+CONTAINERS = (tuple, list, dict, type(None))
+
+
+class UndescribedError(Exception):
+    """Something has no description that stays the same."""
+
+
+def description(value: Any) -> str:
+    """Return what tells a static value from others that are not equal to it.
+
+    Raises
+    ------
+    UndescribedError
+        Nothing does that would be known in another process too.
+    """
+    kind = type(value)
+    if value is None or kind in (bool, int, float, complex, str, bytes):
+        return f"{kind.__name__} {value!r}"
+    if kind in (tuple, list):
+        return f"{kind.__name__}({_several(value)})"
+    if kind is frozenset:
+        return f"frozenset({', '.join(sorted(map(description, value)))})"
+    if kind is dict:
+        return f"dict({_several(value)}; {_several(value.values())})"
+    if isinstance(value, np.ndarray | np.generic) and value.dtype.kind in "biufc":
+        digest = hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()
+        return f"{kind.__name__} {value.dtype.str} {value.shape} {digest}"
+    if isinstance(value, type | types.FunctionType):
+        return _own(value)
+    if isinstance(value, jax.tree_util.PyTreeDef):
+        return tree_description(value)
+    if isinstance(value, enum.Enum):
+        return f"{_own(kind)}.{value.name}"
+    if dataclasses.is_dataclass(value):  # by the fields by which it is compared, as `jax.jit` compares it too
+        compared = [field.name for field in dataclasses.fields(value) if field.compare]
+        return f"{_own(kind)}({', '.join(f'{name}={description(getattr(value, name))}' for name in compared)})"
+    if is_missing(value):
+        return "missing"
+    raise UndescribedError(f"{kind.__module__}.{kind.__qualname__}")
+
+
+def _several(values: Any) -> str:
+    return ", ".join(map(description, values))
+
+
+def _own(thing: type | types.FunctionType) -> str:
+    """Return the name of a class or a function of this package, by which the same one is found."""
+    found: Any = sys.modules.get(thing.__module__)
+    origin = getattr(getattr(found, "__spec__", None), "origin", None)
+    inside = origin is not None and Path(origin).is_relative_to(PACKAGE)
+    for part in thing.__qualname__.split("."):
+        found = getattr(found, part, None)
+    if not inside or thing not in (found, getattr(found, "__wrapped__", None)):  # or what a decorator made of it
+        raise UndescribedError(f"{thing.__module__}.{thing.__qualname__}")
+    return f"{thing.__module__}.{thing.__qualname__}"
+
+
+def tree_description(tree: Any) -> str:
+    """Return what tells a tree of JAX from others, as `description` does a value.
+
+    Parameters
+    ----------
+    tree : PyTreeDef
+        With static values in its nodes.
+    """
+    node = tree.node_data()
+    if node is None:
+        return "leaf" if tree.num_leaves else "none"
+    kind, static = node
+    name = kind.__name__ if kind in CONTAINERS else _own(kind)
+    if issubclass(kind, tuple):
+        static = None  # its class, once more
+    return f"{name}<{description(static)}>({', '.join(map(tree_description, tree.children()))})"
+
+
+def program_key(
+    functions: tuple[Callable[..., Any], ...], tree: Any, leaves: Sequence[Any], static: Mapping[str, Any]
+) -> str:
+    """Return the name of the program of functions for arguments of a structure, on this machine.
+
+    Parameters
+    ----------
+    functions : tuple of callable
+        Of this package.
+    tree, leaves
+        Of its arguments; of each leaf, what JAX compiles for: its shape and its type.
+    static : mapping
+        Arguments that are compiled in.
+
+    Raises
+    ------
+    UndescribedError
+        The structure holds something of a user's own.
+    """
+    told = [
+        description(functions),
+        tree_description(tree),
+        description(tuple(leaves)),
+        description(dict(static)),
+        _described_settings(),
+        _surroundings(),
+    ]
+    return hashlib.sha256("\n".join(told).encode()).hexdigest()
+
+
+def _described_settings() -> str:
+    told = [repr(x) for x in settings() if type(x).__name__ != "AxisEnv"]  # of arrays that JAX traces: there are none
+    if any(" at 0x" in x for x in told):
+        raise UndescribedError("a setting of JAX")
+    return ", ".join(told)
+
+
+@lru_cache(maxsize=1)
+def _surroundings() -> str:
+    """Return what all programs of this process depend on: this package's text, the libraries, the machine."""
+    text = hashlib.sha256()
+    for file in sorted(PACKAGE.rglob("*.py")):
+        text.update(f"{file.relative_to(PACKAGE).as_posix()} {file.stat().st_size}\n".encode())
+        text.update(file.read_bytes())
+    releases = [f"{name} {version(name)}" for name in LIBRARIES]
+    flags = [os.environ.get(name, "") for name in ("XLA_FLAGS", "JAX_PLATFORMS")]
+    devices = [f"{device.platform} {device.device_kind}" for device in jax.devices()]
+    return "\n".join([text.hexdigest(), sys.version, *releases, *flags, *devices, _processor()])
+
+
+def _processor() -> str:
+    """Return what tells this kind of processor from others: code is compiled for all that it can do."""
+    told = [platform.machine(), platform.processor(), platform.system(), str(os.cpu_count())]
+    listing = Path("/proc/cpuinfo")
+    if listing.exists():
+        first, _, _ = listing.read_text(encoding="utf-8", errors="replace").partition("\n\n")
+        kinds = ("vendor_id", "cpu family", "model", "flags", "Features", "CPU")
+        told += [line for line in first.splitlines() if line.startswith(kinds)]
+    elif sys.platform == "darwin":
+        import subprocess
+
+        told.append(subprocess.check_output(["/usr/sbin/sysctl", "-n", "machdep.cpu.brand_string"], text=True))
+    return "\n".join(told)

@@ -1,0 +1,154 @@
+"""Functions of JAX as machine code: for one instant alone, or for many side by side; made once for each structure.
+
+XLA makes a program of calls, one for each operation on arrays, and each takes longer than the arithmetic on a few
+numbers. Here one sequence of machine code does all of it (see `jounce.execution.llvm`): of one instant, single values
+are in registers, and loops go over what is larger; of many, the registers hold several instants at a time.
+"""
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from functools import partial
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.execution.backends import is_wanted, tell_missing
+from jounce.execution.llvm import machine
+from jounce.execution.llvm.modules import object_file
+from jounce.execution.llvm.programs import Program, Single
+from jounce.execution.llvm.text.scalars import MOST_LINES
+from jounce.execution.llvm.text.values import NoRuleError, UnsupportedOperationError
+from jounce.execution.store import current_store, made_or_kept
+from jounce.execution.structure import UndescribedError, program_key, settings
+
+Group = tuple[Sequence[np.ndarray], Any]  # the leaves of a tree, and its structure
+_thread = threading.local()
+
+
+def is_traced_alone() -> bool:
+    """Tell whether what this thread traces becomes machine code of one instant, with loops instead of their turns."""
+    return getattr(_thread, "tracing", False)
+
+
+class Translated:
+    """A function of arrays, of which `program` makes machine code.
+
+    Parameters
+    ----------
+    function : callable
+        Of two pytrees of arrays, shared by all instants and of the instant, with a last axis of length one, as its
+        results have; and of static arguments. Alone, of the arguments and keywords that are in the first.
+    made_of : tuple of callable
+        Functions of the package that say what it computes.
+    alone : bool, default False
+        Whether there is one instant only.
+    rows : bool, default False
+        Whether arrays of many instants, those given and the results, have the instants along their first axis.
+    most_lines : int, optional
+        Of LLVM's text: what is longer takes too long to compile for what it gains.
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        made_of: tuple[Callable[..., Any], ...],
+        *,
+        alone: bool = False,
+        rows: bool = False,
+        most_lines: int = MOST_LINES,
+    ):
+        self.function, self.made_of = function, made_of
+        self._alone, self._rows, self._most_lines = alone, rows, most_lines
+        self._programs: dict[Any, Single | Program | str | None] = {}
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        """How many programs were wanted, those that there is no code for included."""
+        return len(self._programs)
+
+    def program(
+        self, shared: Group, lanes: Group, static: Mapping[str, Any], *, large: int | None = None, hasty: bool = False
+    ) -> Any:
+        """Return the machine code, `Single` or `Program`; None where there is none: no compiler, or no code for it.
+
+        Whole numbers among what many instants share, which say what is joined to what, are part of the program.
+
+        Parameters
+        ----------
+        shared, lanes : tuple
+            The leaves of what is given, and its structure.
+        static : mapping
+            Further arguments of the function.
+        large : int, optional
+            Arrays of more numbers are in memory, as `object_file` has it.
+        hasty : bool, default False
+            Whether it is to be there soon rather than fast.
+        """
+        if not is_wanted():
+            return None
+        (arrays, structure), (few, form) = shared, lanes
+        kinds = tuple([(x.shape, x.dtype) for x in arrays])
+        ones = tuple([(self._one(x.shape), x.dtype) for x in few])
+        places = {} if self._alone else {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
+        known = tuple([x.tobytes() for x in places.values()])
+        told = tuple([(name, type(value), value) for name, value in static.items()])
+        key = structure, form, kinds, ones, known, large, hasty, told, settings()
+        if key not in self._programs:
+            with self._lock:
+                if key not in self._programs:
+                    parts = zip((structure, form), (kinds, ones), strict=True)
+                    given = [jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(*x) for x in its]) for tree, its in parts]
+                    how = {"large": large, "hasty": hasty}
+                    self._programs[key] = self._made((given[0], given[1]), places, how, static)
+        program = self._programs[key]
+        if isinstance(program, str):
+            tell_missing(program)
+            return None
+        return program
+
+    def _one(self, shape: tuple[int, ...]) -> tuple[int, ...]:
+        """Return the shape of an instant's part of an array."""
+        return (*(shape[1:] if self._rows else shape[:-1]), 1)
+
+    def _traced(self, given: Any, lanes: Any, **static: Any) -> Any:
+        if not self._alone:
+            return self.function(given, lanes, **static)
+        _thread.tracing = True
+        try:
+            return self.function(*given[0], **given[1], **static)
+        finally:
+            _thread.tracing = False
+
+    def _made(
+        self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], how: dict[str, Any], static: Mapping[str, Any]
+    ) -> Single | Program | str | None:
+        """Return a program from the store of programs, or one that is made; or the operation that has no code."""
+        function = partial(self._traced, **static)
+        options: Any = how | {"most_lines": self._most_lines, "rows": self._rows, "alone": self._alone}
+
+        def make() -> tuple[Any, ...]:
+            try:
+                binary, results = object_file(function, *given, places, **options)
+            except NoRuleError as missing:  # which is kept, too: to find it out takes long
+                return b"", str(missing), None
+            except UnsupportedOperationError:
+                return b"", None, None
+            return binary, tuple(map(jax.tree.leaves, given)), results
+
+        key = self._key(given, places, dict(static) | how) if current_store() is not None else None
+        return made_or_kept(key, make, self._loaded)
+
+    def _loaded(self, binary: bytes, given: Any, results: Any) -> Single | Program | str | None:
+        if not binary:
+            return given
+        return Single(binary, given, results) if self._alone else Program(binary, given, results, rows=self._rows)
+
+    def _key(self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: dict[str, Any]) -> str | None:
+        """Return the name of a program in other processes, None where it holds something of a user's own."""
+        leaves, tree = jax.tree.flatten(given)
+        kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *places.values(), machine.processor()]
+        with suppress(UndescribedError):
+            return program_key(self.made_of, tree, [*kinds, "alone" if self._alone else "side by side"], static)
+        return None

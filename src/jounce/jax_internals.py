@@ -1,0 +1,127 @@
+"""What this package uses of JAX, jaxlib and Equinox that is private to them: all of it is here, and nowhere else.
+
+Another release may have none of it, or something else by the same name. It was tried with JAX and jaxlib 0.10 and 0.11
+and with Equinox 0.13. Where a release is without something, that does not happen which it was for: a program is not
+kept, or is compiled within another one; what cannot be done without is imported here, so that a release without it is
+known at once.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+from jax._src import config, core
+from jax.core import Tracer
+
+TRIED = (0, 10), (0, 11)  # releases of JAX
+MISSING = "equinox._module._flatten._Missing"  # in a tree, the value of a field that has none
+
+__all__ = [
+    "TRIED",
+    "config",
+    "core",
+    "description_reader",
+    "is_missing",
+    "is_tried",
+    "processes_started",
+    "runs_at_once",
+    "sizes_of_scan",
+    "trace_settings",
+    "use_file_cache",
+    "without_sources",
+]
+
+
+def is_tried() -> bool:
+    """Tell whether this release of JAX was tried: another one may say otherwise what an operation is to do."""
+    return jax.__version_info__[:2] in TRIED
+
+
+def trace_settings() -> tuple[Any, ...]:
+    """Return how JAX is set up in this thread, as `jax.jit` tells its own programs apart."""
+    return config.trace_context()
+
+
+def processes_started() -> bool:
+    """Tell whether JAX has started XLA's threads; where that is unknown, that it has."""
+    from jax._src import xla_bridge
+
+    return getattr(xla_bridge, "backends_are_initialized", lambda: True)()
+
+
+def is_missing(value: Any) -> bool:
+    """Tell whether a static value of a tree stands for none."""
+    kind = type(value)
+    return f"{kind.__module__}.{kind.__qualname__}" == MISSING
+
+
+def runs_at_once(value: Tracer) -> bool:
+    """Tell whether what JAX does with a value that it traces runs at once, as under `jax.jvp` outside of `jax.jit`.
+
+    Then a program is a whole one, which takes options. What is not known, and what is run later, is part of another.
+    """
+    trace: Any = getattr(value, "_trace", None)
+    kinds = []
+    while trace is not None:
+        kinds.append(type(trace).__name__)
+        trace = getattr(trace, "parent_trace", None)
+    return kinds[-1:] == ["EvalTrace"] and {"JVPTrace", "BatchTrace"}.issuperset(kinds[:-1])
+
+
+def without_sources(module: Any) -> None:
+    """Take the lines of Python out of a module of MLIR: a fourth of the time in which its program is read again.
+
+    Parameters
+    ----------
+    module : jaxlib.mlir.ir.Module
+        Changed in place.
+    """
+    try:
+        from jaxlib.mlir.passmanager import PassManager
+
+        with module.context:
+            PassManager.parse("builtin.module(strip-debuginfo)").run(module.operation)
+    except (ImportError, AttributeError, ValueError):
+        return
+
+
+def description_reader(reader: type) -> type:
+    """Return a class that reads what JAX writes beside the code of a program, and no code.
+
+    Parameters
+    ----------
+    reader : type
+        The subclass of `pickle.Unpickler` that says which names may be read.
+    """
+    from jax.experimental import serialize_executable
+
+    class Description(reader, serialize_executable._JaxPjrtUnpickler):
+        def persistent_load(self, pid: Any) -> Any:
+            """Return a device or a client, and nothing in the place of code."""
+            return None if pid[0] == "exec" else super().persistent_load(pid)
+
+    return Description
+
+
+def use_file_cache(make: Callable[[str], tuple[Any, str]]) -> bool:
+    """Have JAX keep its own programs in what a function makes for a path; tell whether this release can be told so."""
+    from jax._src import compilation_cache
+
+    if known := hasattr(compilation_cache, "get_file_cache"):
+        compilation_cache.get_file_cache = make
+    return known
+
+
+def sizes_of_scan(equation: Any) -> tuple[int, int]:
+    """Return how many operands of a loop of known length are constants, and how many are carried from turn to turn.
+
+    Releases of JAX write this down in different ways. What is carried has one shape outside and inside the loop; what
+    is read or collected turn by turn has one axis more outside.
+    """
+    inner = equation.params["jaxpr"].jaxpr
+
+    def alike(outer: Sequence[Any], inside: Sequence[Any]) -> int:
+        return sum(x.aval.ndim == y.aval.ndim for x, y in zip(outer, inside, strict=True))
+
+    carried = alike(equation.outvars, inner.outvars)
+    return alike(equation.invars, inner.invars) - carried, carried

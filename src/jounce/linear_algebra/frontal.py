@@ -1,0 +1,173 @@
+"""Orthogonal elimination of large sparse matrices, front by front: a multifrontal QR factorisation, the batch last."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.linear_algebra.fronts import Fronts
+from jounce.linear_algebra.linear import Columns
+from jounce.modules import Module
+from jounce.shapes import Numbers
+
+
+class FrontalFactor(Module):
+    """A batch of matrices, factored front by front into reflections and triangles.
+
+    Solutions are as good as substitution makes them, without refinement: reflections keep lengths. Where rows are more
+    than columns the solution is that of least squares.
+    """
+
+    fronts: Fronts
+    vectors: Float[Numbers, "front width row batch"]  # the reflections of each front
+    factors: Float[Numbers, "front width batch"]  # two over their squares
+    triangle: Float[Numbers, "front width column batch"]  # finished rows
+    inverted: Float[Numbers, "front width batch"]  # of the diagonal, infinite where singular
+
+    @classmethod
+    def of(
+        cls, fronts: Fronts, entries: Float[Numbers, "entry batch"], scale: Float[Numbers, "row 1"]
+    ) -> "FrontalFactor":
+        """Factor the matrices with these entries, shape (entries, batch), in rows multiplied by a scale, (rows, 1)."""
+        count, height, columns = fronts.shape
+        width, lanes = fronts.width, entries.shape[-1]
+        entries = jnp.concatenate([entries, jnp.zeros((1, lanes))])
+        scale = jnp.concatenate([scale, jnp.zeros((1, 1))])
+
+        def step(left: Any, plan: Any) -> Any:
+            front, own, rights, rows, taken = plan
+            known = left.reshape(count * (height - width), columns - width, lanes)
+            inherited = known.at[rows[:, None], taken].get(mode="fill", fill_value=0.0)
+            *found, rest = _eliminated(entries[own] * scale[rights][:, :, None] + inherited, width)
+            return _put(left, rest, front), tuple(found)
+
+        left = jnp.zeros((count, height - width, columns - width, lanes))
+        plans = (np.arange(count), fronts.entries, fronts.rights, fronts.left_rows, fronts.left_columns)
+        return cls(fronts, *jax.lax.scan(step, left, plans)[1])
+
+    @classmethod
+    def blank(cls, fronts: Fronts, lanes: int) -> "FrontalFactor":
+        """Return a placeholder for the factors of a batch, to start a loop with."""
+        (count, height, columns), width = fronts.shape, fronts.width
+        sizes = ((count, width, height, lanes), (count, width, lanes), (count, width, columns, lanes))
+        return cls(fronts, *map(np.zeros, (*sizes, sizes[1])))
+
+    @property
+    def arrays(self) -> tuple[Numbers, Numbers, Numbers, Numbers]:
+        """Reflections, their factors, triangle and inverted diagonal; the batch is the last axis of all of them."""
+        return self.vectors, self.factors, self.triangle, self.inverted
+
+    def solve(self, right: Columns, *, refined: bool = True) -> Float[Numbers, "column batch"]:
+        """Return the solutions, shape (columns, batch), for right-hand sides of shape (rows, batch)."""
+        del refined  # they are as good as can be
+        _, height, columns = self.fronts.shape
+        width, lanes, plan = self.fronts.width, right.shape[-1], self.fronts
+        right = jnp.concatenate([right, jnp.zeros((1, lanes))])
+
+        def forward(left: Any, level: Any) -> Any:
+            front, own, rows, vectors, factors = level
+            y = right[own] + left.reshape(-1, lanes).at[rows].get(mode="fill", fill_value=0.0)
+            y = _reflected(y, zip(vectors, factors, strict=True))
+            return _put(left, y[width:], front), y[:width]
+
+        def backward(known: Any, level: Any) -> Any:
+            front, beside, triangle, inverted, y = level
+            y = y - jnp.sum(triangle[:, width:] * known[beside].reshape(1, columns - width, lanes), axis=1)
+            x: list[Any] = [None] * width
+            for i in reversed(range(width)):
+                x[i] = (y[i] - sum(triangle[i, j] * x[j] for j in range(i + 1, width))) * inverted[i]
+            return _put(known, jnp.stack(x), front), None
+
+        count = np.arange(len(plan.entries))
+        left = jnp.zeros((len(count), height - width, lanes))
+        _, y = jax.lax.scan(forward, left, (count, plan.rights, plan.left_rows, self.vectors, self.factors))
+        known = jnp.zeros((len(count) + 1, width, lanes))
+        levels = (count, plan.neighbours, self.triangle, self.inverted, y)
+        known, _ = jax.lax.scan(backward, known, levels, reverse=True)
+        return known[plan.of_body].reshape(-1, lanes)
+
+    def solve_transposed(self, right: Float[Numbers, "column batch"]) -> Columns:
+        """Return the solutions with the transposed matrices, shape (rows, batch), of least norm where they are many."""
+        height, width = self.fronts.shape[1], self.fronts.width
+        lanes, plan = right.shape[-1], self.fronts
+        count = np.arange(len(plan.entries))
+        blocks = jnp.asarray(right).reshape(len(count), width, lanes)
+        order = jnp.argsort(plan.of_body)
+
+        def forward(owed: Any, level: Any) -> Any:
+            front, beside, body, triangle, inverted = level
+            w = blocks[body] - owed[front]
+            u: list[Any] = []
+            for i in range(width):
+                u.append((w[i] - sum(triangle[j, i] * u[j] for j in range(i))) * inverted[i])
+            found = jnp.stack(u)
+            share = jnp.sum(triangle[:, width:] * found[:, None], axis=0).reshape(-1, width, lanes)
+            return owed.at[beside].add(share, mode="drop"), found
+
+        owed = jnp.zeros((len(count), width, lanes))
+        _, u = jax.lax.scan(forward, owed, (count, plan.neighbours, order, self.triangle, self.inverted))
+
+        def backward(carry: Any, level: Any) -> Any:
+            left, solution = carry
+            front, own, rows, vectors, factors, top = level
+            y = jnp.concatenate([top, left[front]])
+            y = _reflected(y, zip(vectors[::-1], factors[::-1], strict=True))
+            flat = left.reshape(-1, lanes).at[rows].set(y, mode="drop")
+            return (flat.reshape(left.shape), solution.at[own].set(y, mode="drop")), None
+
+        blank = jnp.zeros((len(count), height - width, lanes)), jnp.zeros((plan.row_count, lanes))
+        levels = (count, plan.rights, plan.left_rows, self.vectors, self.factors, u)
+        return jax.lax.scan(backward, blank, levels, reverse=True)[0][1]
+
+    def applied_inverse(self, matrix: Float[Numbers, "row k"]) -> Float[Numbers, "column k"]:
+        """Return the products of the inverse of the first matrix with the columns of another, shape (columns, k)."""
+        return FrontalFactor(self.fronts, *(x[..., :1] for x in self.arrays)).solve(matrix)
+
+    def pivot_ratio(self) -> Float[Numbers, " batch"]:
+        """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""
+        sizes = 1 / jnp.abs(self.inverted.reshape(-1, self.inverted.shape[-1]))
+        return jnp.min(sizes, axis=0) / jnp.max(sizes, axis=0)
+
+    def sign(self) -> Float[Numbers, " batch"]:
+        """Return the signs of the determinants, or all of them turned round, shape (batch,): 0 where singular.
+
+        The order of rows and columns, which is the same for all matrices of a pattern, is not counted.
+        """
+        return jnp.prod(jnp.sign(jnp.where(jnp.isinf(self.inverted), 0.0, self.inverted)), axis=(0, 1))
+
+
+def _put(whole: Any, part: Any, place: Any) -> Any:
+    return jax.lax.dynamic_update_index_in_dim(whole, part, place, 0)
+
+
+def _reflected(y: Any, reflections: Any) -> Any:
+    for vector, factor in reflections:
+        y = y - vector * (factor[None] * jnp.sum(vector * y, axis=0, keepdims=True))
+        y = jax.lax.optimization_barrier(y)  # or XLA computes the chain again for each use
+    return y
+
+
+def _eliminated(front: Any, width: int) -> tuple[Any, Any, Any, Any, Any]:
+    """Return the reflections that clear the first columns, the finished rows, and what is left.
+
+    As in `FrontalFactor`: vectors, factors, triangle and inverted.
+    """
+    vectors, factors, rows, inverted = [], [], [], []
+    for k in range(width):
+        x = front[:, 0]
+        size = jnp.sqrt(jnp.sum(x * x, axis=0))
+        pivot = jnp.where(x[0] > 0, -size, size)
+        vector = jnp.concatenate([(x[0] - pivot)[None], x[1:]])
+        square = size * (size + jnp.abs(x[0]))
+        factor = jnp.where(square == 0, 0.0, 1.0 / jnp.where(square == 0, 1.0, square))
+        along = jnp.sum(vector[:, None] * front[:, 1:], axis=0, keepdims=True)
+        rest = front[:, 1:] - vector[:, None] * (factor[None, None] * along)
+        above = jnp.zeros((k, *x.shape[1:]))
+        vectors.append(jnp.concatenate([above, vector]))
+        factors.append(factor)
+        rows.append(jnp.concatenate([above, pivot[None], rest[0]]))
+        inverted.append(1.0 / pivot)
+        front = jax.lax.optimization_barrier(rest[1:])
+    return jnp.stack(vectors), jnp.stack(factors), jnp.stack(rows), jnp.stack(inverted), front

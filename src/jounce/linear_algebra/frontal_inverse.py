@@ -1,0 +1,150 @@
+"""Inverses of large sparse matrices, as one product with a small matrix for each front and each way through them.
+
+`FrontalFactor.solve` goes through reflections one after the other; where right sides come one by one, such as those of
+the orders of a Taylor series, what a front makes of them is put together once. Time and memory grow with the number of
+fronts, where a dense inverse takes its square.
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.jet.coefficients import total
+from jounce.linear_algebra.frontal import FrontalFactor
+from jounce.linear_algebra.fronts import Fronts
+from jounce.linear_algebra.linear import Columns
+from jounce.modules import Module
+from jounce.shapes import Numbers
+
+
+class InversePlan(Module):
+    """Where fronts find what they need for products with the inverse.
+
+    Attributes
+    ----------
+    fronts : Fronts
+        Of square matrices.
+    sources : array of int, shape (fronts, rows)
+        Where a row of a front is among the right sides, a zero, and what fronts leave over, one after the other.
+    responses : array of int, shape (fronts, columns, left rows)
+        Of the columns of neighbours and what the front leaves over: which entry of all blocks of the inverse, by front,
+        column and row, tells how the column responds; one beyond the last where there is none.
+    diagonal : array of int, shape (rows of the matrix,)
+        The entry of these blocks in which a row meets its own column.
+    """
+
+    fronts: Fronts
+    sources: Int[Numbers, "front row"]
+    responses: Int[Numbers, "front column left"]
+    diagonal: Int[Numbers, " size"]
+
+    @classmethod
+    def of(cls, fronts: Fronts) -> "InversePlan":
+        """Plan products from fronts that hold arrays of NumPy; row and column of a number belong together."""
+        (count, height, columns), width, size = fronts.shape, fronts.width, fronts.row_count
+        left_height, nothing = height - width, count * height * columns
+        inherited = fronts.left_rows < count * left_height
+        sources = np.where(inherited, size + 1 + fronts.left_rows, fronts.rights).astype(np.int32)
+        wanted = np.concatenate([np.arange(count)[:, None], fronts.neighbours], axis=1)  # of a block, its bodies
+        responses = np.full((count, columns - width, left_height), nothing, np.int32)
+        for front, at in np.argwhere(inherited).tolist():
+            child, row = divmod(int(fronts.left_rows[front, at]), left_height)
+            for slot, body in enumerate(fronts.neighbours[child].tolist()):
+                if body < count:
+                    column = int(np.flatnonzero(wanted[front] == body)[0]) * width + np.arange(width)
+                    responses[child, slot * width : (slot + 1) * width, row] = (front * columns + column) * height + at
+        diagonal = np.full(size, nothing, np.int32)
+        for front, at in np.argwhere(fronts.rights < size).tolist():
+            row = int(fronts.rights[front, at])
+            body, place = divmod(row, width)
+            column = int(np.flatnonzero(wanted[front] == fronts.of_body[body])[0]) * width + place
+            diagonal[row] = (front * columns + column) * height + at
+        return cls(fronts, sources, responses, diagonal)
+
+
+class FrontalInverse(Module):
+    """The inverses of a batch of square matrices.
+
+    Attributes
+    ----------
+    plan : InversePlan
+        Of their pattern.
+    inward : array of shape (fronts, rows, rows, batch)
+        What a right side adds, first, to the columns of the front, and then to what is left over.
+    outward : array of shape (fronts, columns of neighbours, width, batch)
+        What each unknown of a neighbour takes off the columns of the front.
+    """
+
+    plan: InversePlan
+    inward: Float[Numbers, "front row row batch"]
+    outward: Float[Numbers, "front column width batch"]
+
+    @classmethod
+    def of(cls, plan: InversePlan, factor: FrontalFactor) -> "FrontalInverse":
+        """Put together the products of factored matrices, all fronts side by side."""
+        (count, height, _), width = plan.fronts.shape, plan.fronts.width
+        lanes = factor.inverted.shape[-1]
+        turned = jnp.broadcast_to(np.eye(height)[None, :, :, None], (count, height, height, lanes))
+        for i in range(width):
+            vector = factor.vectors[:, i, :, None]
+            along = jnp.sum(vector * turned, axis=1, keepdims=True)
+            turned = jax.lax.optimization_barrier(turned - vector * (factor.factors[:, i, None, None] * along))
+        right = jnp.concatenate([turned[:, :width], factor.triangle[:, :, width:]], axis=2)
+        rows: list[Any] = [None] * width
+        for i in reversed(range(width)):
+            row = right[:, i]
+            for j in range(i + 1, width):
+                row = row - factor.triangle[:, i, j, None] * rows[j]
+            rows[i] = jax.lax.optimization_barrier(row * factor.inverted[:, i, None])
+        known = jnp.stack(rows, axis=2)
+        inward = jnp.concatenate([known[:, :height], jnp.swapaxes(turned[:, width:], 1, 2)], axis=2)
+        return cls(plan, inward, known[:, height:])
+
+    def solve(self, right: Columns) -> Float[Numbers, "column batch"]:
+        """Return the solutions, shape (columns, batch), for right-hand sides of shape (rows, batch)."""
+        plan, width, lanes = self.plan, self.plan.fronts.width, right.shape[-1]
+        (count, height, _), numbers = plan.fronts.shape, np.arange(plan.fronts.shape[0])
+        size, left = len(right), height - width
+
+        def inwards(known: Any, level: Any) -> tuple[Any, Any]:
+            front, sources, inward = level
+            y = known.at[sources].get(mode="promise_in_bounds")
+            found = total(inward[j] * y[j][None] for j in range(height))
+            return jax.lax.dynamic_update_slice_in_dim(known, found[width:], size + 1 + front * left, 0), found[:width]
+
+        known = jnp.concatenate([right, jnp.zeros((1 + count * left, lanes))])
+        _, begun = jax.lax.scan(inwards, known, (numbers, plan.sources, self.inward))
+
+        def outwards(known: Any, level: Any) -> tuple[Any, None]:
+            front, neighbours, outward, own = level
+            beside = known.at[neighbours].get(mode="promise_in_bounds").reshape(-1, lanes)
+            own = own - total(outward[j] * beside[j][None] for j in range(len(outward)))
+            return jax.lax.dynamic_update_index_in_dim(known, own, front, 0), None
+
+        known = jnp.zeros((count + 1, width, lanes))
+        levels = (numbers, plan.fronts.neighbours, self.outward, begun)
+        known, _ = jax.lax.scan(outwards, known, levels, reverse=True)
+        return known[plan.fronts.of_body].reshape(-1, lanes)
+
+    def diagonal(self) -> Float[Numbers, "row batch"]:
+        """Return the diagonals of the inverses, of which no more is computed than the blocks of the fronts."""
+        plan, width, lanes = self.plan, self.plan.fronts.width, self.inward.shape[-1]
+        count, height, columns = plan.fronts.shape
+        size = height * columns
+
+        def step(known: Any, level: Any) -> tuple[Any, None]:
+            front, responses, inward, outward = level
+            beside = known.at[responses].get(mode="promise_in_bounds")  # of what is left over
+            given = inward[:, width:]
+            others = total(beside[:, k, None] * given[None, :, k] for k in range(height - width))
+            own = jnp.swapaxes(inward[:, :width], 0, 1)
+            own = own - total(outward[j][:, None] * others[j][None] for j in range(columns - width))
+            block = jnp.concatenate([own, others]).reshape(size, lanes)
+            return jax.lax.dynamic_update_slice_in_dim(known, block, front * size, 0), None
+
+        levels = (np.arange(count), plan.responses, self.inward, self.outward)
+        known, _ = jax.lax.scan(step, jnp.zeros((count * size + 1, lanes)), levels, reverse=True)
+        return known[plan.diagonal]

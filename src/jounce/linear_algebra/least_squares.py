@@ -1,0 +1,125 @@
+"""Least squares for batches of small matrices with dependent rows, the batch last: orthonormal bases and triangles.
+
+Where constraints are redundant but agree, the equations of every order have more rows than unknowns and one solution
+all the same: that of least squares. The multipliers of the rows are many then; those of least norm are told.
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.linear_algebra.linear import DenseFactor
+from jounce.modules import Module
+from jounce.shapes import Numbers
+
+Basis = Float[Numbers, "row column batch"]
+Triangle = Float[Numbers, "column column batch"]
+
+
+class LeastSquaresFactor(Module):
+    """A batch of matrices with independent columns, factored into orthonormal columns and a triangle.
+
+    Columns are made orthogonal one after another, twice, which is enough (Giraud, Langou, Rozloznik and van den Eshof
+    2005, Rounding error analysis of the classical Gram-Schmidt orthogonalization process); no operation is LAPACK's,
+    as in `DenseFactor`.
+    """
+
+    basis: Basis
+    triangle: Triangle
+
+    @classmethod
+    def of(cls, matrix: Basis) -> "LeastSquaresFactor":
+        """Factor matrices of shape (rows, columns, batch), with at least as many rows as columns."""
+        _, columns, lanes = matrix.shape
+        at, put = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim
+        places = np.arange(columns)[:, None]
+
+        def orthogonalise(k: Any, carry: Any) -> Any:
+            basis, triangle = carry
+            column, along = at(matrix, k, 1, False), jnp.zeros((columns, lanes))
+            for _ in range(2):
+                part = jnp.sum(basis * column[:, None], axis=0)
+                column, along = column - jnp.sum(basis * part[None], axis=1), along + part
+            size = jnp.sqrt(jnp.sum(column * column, axis=0))
+            basis = put(basis, column / jnp.where(size == 0, 1.0, size)[None], k, 1)
+            return basis, put(triangle, jnp.where(places == k, size[None], along), k, 1)
+
+        blank = cls.blank(matrix.shape, lanes)
+        return cls(*jax.lax.fori_loop(0, columns, orthogonalise, (blank.basis, blank.triangle)))
+
+    @classmethod
+    def blank(cls, shape: tuple[int, ...], lanes: int) -> "LeastSquaresFactor":
+        """Return a placeholder for the factors of a batch, to start a loop with."""
+        rows, columns = shape[:2]
+        return cls(np.zeros((rows, columns, lanes)), np.zeros((columns, columns, lanes)))
+
+    def solve(self, right: Float[Numbers, "row batch"], *, refined: bool = True) -> Float[Numbers, "column batch"]:
+        """Return the solutions of least squares, shape (columns, batch); not finite where columns are dependent."""
+        del refined  # they are as good as can be
+        return self._back(jnp.sum(self.basis * right[:, None], axis=0))
+
+    def solve_transposed(self, right: Float[Numbers, "column batch"]) -> Float[Numbers, "row batch"]:
+        """Return the solutions of least norm with the transposed matrices, shape (rows, batch)."""
+        at, put, columns = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim, len(self.triangle)
+
+        def substitute(k: Any, found: Any) -> Any:
+            column = at(self.triangle, k, 1, False)
+            rest = at(right, k, 0, False) - jnp.sum(column * found, axis=0)
+            return put(found, rest / at(column, k, 0, False), k, 0)
+
+        found = jax.lax.fori_loop(0, columns, substitute, jnp.zeros(right.shape))
+        return jnp.sum(self.basis * found[None], axis=1)
+
+    def applied_inverse(self, matrix: Float[Numbers, "row k"]) -> Float[Numbers, "column k"]:
+        """Return the products of the pseudo-inverse of the first matrix with the columns of another, (columns, k)."""
+        first = LeastSquaresFactor(self.basis[..., :1], self.triangle[..., :1])
+        many = [jnp.broadcast_to(x, (*x.shape[:-1], matrix.shape[1])) for x in (first.basis, first.triangle)]
+        return LeastSquaresFactor(*many).solve(matrix)
+
+    def pivot_ratio(self) -> Float[Numbers, " batch"]:
+        """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""
+        sizes = jnp.diagonal(self.triangle)
+        return jnp.min(sizes, axis=-1) / jnp.max(sizes, axis=-1)
+
+    def orientation(self, before: Any) -> Float[Numbers, " batch"]:
+        """Return the signs of the determinants that the columns have as seen from those of other factors, (batch,).
+
+        It takes the place of the sign of the determinant, that a matrix with more rows than columns does not have.
+        """
+        seen = jnp.sum(before.basis[:, :, None] * self.basis[:, None], axis=0)
+        return DenseFactor.of(seen).sign()
+
+    def _back(self, right: Float[Numbers, "column batch"]) -> Float[Numbers, "column batch"]:
+        at, put, columns = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim, len(self.triangle)
+
+        def substitute(i: Any, found: Any) -> Any:
+            k = columns - 1 - i
+            row = at(self.triangle, k, 0, False)
+            rest = at(right, k, 0, False) - jnp.sum(row * found, axis=0)
+            return put(found, rest / at(row, k, 0, False), k, 0)
+
+        return jax.lax.fori_loop(0, columns, substitute, jnp.zeros(right.shape))
+
+
+def range_basis(matrix: Basis, rank: int) -> Float[Numbers, "row rank batch"]:
+    """Return orthonormal bases of what matrices of a rank map to, shape (rows, rank, batch).
+
+    The longest column that is left is the next to be made orthogonal to all before.
+    """
+    put = jax.lax.dynamic_update_index_in_dim
+    rows, _, lanes = matrix.shape
+
+    def choose(k: Any, carry: Any) -> Any:
+        basis, left = carry
+        longest = jnp.argmax(jnp.sum(left * left, axis=0), axis=0)
+        column = jnp.take_along_axis(left, longest[None, None], axis=1)[:, 0]
+        column = column - jnp.sum(basis * jnp.sum(basis * column[:, None], axis=0)[None], axis=1)
+        size = jnp.sqrt(jnp.sum(column * column, axis=0))
+        column = column / jnp.where(size == 0, 1.0, size)[None]
+        left = left - column[:, None] * jnp.sum(column[:, None] * left, axis=0)[None]
+        return put(basis, column, k, 1), left
+
+    return jax.lax.fori_loop(0, rank, choose, (jnp.zeros((rows, rank, lanes)), matrix))[0]

@@ -1,0 +1,110 @@
+"""Small dense matrices eliminated by Householder reflections, without pivoting: nothing depends on the numbers.
+
+Each entry is an operation of its own here, which suits code for one instant at a time (`jounce.execution.llvm`), where
+a choice of pivots would cost more than the arithmetic; on arrays `DenseFactor` takes less time.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.modules import Module
+from jounce.shapes import Numbers
+
+Columns = Float[Numbers, "row batch"]
+
+
+class ReflectedFactor(Module):
+    """A batch of small square matrices, factored into reflections and a triangle; the batch is last.
+
+    The solution of a triangle after reflections is backward stable (Higham 2002, Accuracy and Stability of Numerical
+    Algorithms, section 19.3). The step of refinement is for factors that serve a matrix nearby.
+    """
+
+    matrix: Float[Numbers, "row row batch"]
+    reduced: Float[Numbers, "row row batch"]  # above its diagonal the triangle, below and on it the reflections
+    pivots: Columns  # diagonal of the triangle
+    shares: Columns  # two over the squared length of each reflection; 0 where nothing is reflected
+
+    @classmethod
+    def of(cls, matrix: Float[Numbers, "row row batch"]) -> "ReflectedFactor":
+        """Factor matrices of shape (rows, rows, batch)."""
+        columns, pivots, shares, rows, rest = [], [], [], [], matrix
+        for _ in range(len(matrix)):
+            first = rest[:, 0]
+            length = jnp.sqrt(jnp.sum(first * first, axis=0))
+            pivot = jnp.where(first[0] > 0, -length, length)
+            head = first[0] - pivot
+            square = length * (length + jnp.abs(first[0]))  # half the squared length of the reflection
+            share = jnp.where(square == 0, 0.0, 1.0 / jnp.where(square == 0, 1.0, square))
+            column = jnp.concatenate([head[None], first[1:]])
+            others = rest[:, 1:]
+            part = jnp.sum(column[:, None] * others, axis=0) * share[None]
+            others = others - column[:, None] * part[None]
+            columns.append(column)
+            pivots.append(pivot)
+            shares.append(share)
+            rows.append(others[0])
+            rest = others[1:]
+        size = len(matrix)
+        reduced = [
+            jnp.concatenate([jnp.stack([columns[j][i - j] for j in range(i + 1)]), rows[i]]) for i in range(size)
+        ]
+        return cls(matrix, jnp.stack(reduced), jnp.stack(pivots), jnp.stack(shares))
+
+    @classmethod
+    def blank(cls, shape: tuple[int, ...], lanes: int) -> "ReflectedFactor":
+        """Return a placeholder for the factors of a batch, to start a loop with."""
+        matrix, column = np.zeros((*shape, lanes)), np.zeros((shape[0], lanes))
+        return cls(matrix, matrix, column, column)
+
+    def refining(self, matrix: Float[Numbers, "row row batch"]) -> "ReflectedFactor":
+        """Return these factors for matrices near to those that were factored, by which solutions are refined."""
+        return ReflectedFactor(matrix, self.reduced, self.pivots, self.shares)
+
+    def defect(self) -> Float[Numbers, " batch"]:
+        """Return by which part solutions are off that are not refined, as one of known solution tells, shape (batch,).
+
+        Refined, they are off by its square. It is not finite where a matrix is singular.
+        """
+        known = np.where(np.arange(len(self.pivots)) % 3 == 1, -1.0, 1.0)
+        right = jnp.sum(self.matrix * known[None, :, None], axis=1)
+        return jnp.max(jnp.abs(self.solve(right, refined=False) - known[:, None]), axis=0)
+
+    def solve(self, right: Columns, *, refined: bool = True) -> Columns:
+        """Return the solution for right-hand sides of shape (rows, batch); it is not finite where one is singular.
+
+        A correction that is followed by another need not be refined.
+        """
+        solution = self._substituted(right)
+        if not refined:
+            return solution
+        return solution + self._substituted(right - jnp.sum(self.matrix * solution[None], axis=1))
+
+    def _substituted(self, right: Columns) -> Columns:
+        size = len(self.pivots)
+        for k in range(size):
+            column = self.reduced[k:, k]
+            part = jnp.sum(column * right[k:], axis=0) * self.shares[k]
+            right = jnp.concatenate([right[:k], right[k:] - column * part[None]])
+        found = right[:0]
+        for k in reversed(range(size)):
+            rest = right[k] - jnp.sum(self.reduced[k, k + 1 :] * found, axis=0)
+            found = jnp.concatenate([(rest / self.pivots[k])[None], found])
+        return found
+
+    def applied_inverse(self, matrix: Float[Numbers, "row column"]) -> Float[Numbers, "row column"]:
+        """Return the products of the inverse of the first matrix with the columns of another, shape (rows, columns)."""
+        first = ReflectedFactor(*(x[..., :1] for x in (self.matrix, self.reduced, self.pivots, self.shares)))
+        return jax.lax.map(lambda column: first.solve(column[:, None], refined=False)[:, 0], matrix.T).T
+
+    def pivot_ratio(self) -> Float[Numbers, " batch"]:
+        """Return the smallest pivot over the largest, shape (batch,): near zero at a singular position."""
+        sizes = jnp.abs(self.pivots)
+        return jnp.min(sizes, axis=0) / jnp.max(sizes, axis=0)
+
+    def sign(self) -> Float[Numbers, " batch"]:
+        """Return the signs of the determinants, shape (batch,): 0 where singular, NaN where not finite."""
+        reflected = jnp.where(self.shares == 0, 1.0, -1.0)
+        return jnp.prod(reflected * jnp.sign(self.pivots), axis=0)

@@ -1,0 +1,56 @@
+"""Machine code that another process compiles, in haste or because it is long, is the same function."""
+
+import subprocess
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jounce.execution.llvm import machine, modules, programs, self_test
+
+pytestmark = pytest.mark.skipif(
+    not self_test.is_usable(), reason="there is no compiler, or a system where it was not tried"
+)
+
+
+def function(given, _):
+    (x,) = given
+    return (jnp.cos(x) * x[::-1] / (2.0 + jnp.sum(x * x)),)
+
+
+GIVEN = (np.linspace(-1, 2, 21),)
+
+
+def run(**how):
+    binary, results = modules.object_file(function, GIVEN, (), {}, large=4, alone=True, **how)
+    return binary, programs.Single(binary, GIVEN, results)(GIVEN)[0]
+
+
+def test_haste_changes_no_digit(monkeypatch):
+    monkeypatch.setattr(machine, "_compiled_here", None)
+    binary, hasty = run(hasty=True)
+    monkeypatch.undo()
+    usual, found = run()
+    assert binary != usual
+    np.testing.assert_array_equal(hasty, found)
+    x = GIVEN[0]
+    np.testing.assert_allclose(found, np.cos(x) * x[::-1] / (2 + x @ x), rtol=1e-14)
+
+
+@pytest.mark.parametrize("trouble", ["no process", "it fails", "an application"])
+def test_where_there_is_no_other_process_this_one_compiles(trouble, monkeypatch):
+    def refused(words, **_):
+        raise OSError(2, "no such file") if trouble == "no process" else subprocess.CalledProcessError(1, words)
+
+    if trouble == "an application":
+        monkeypatch.setattr(machine.sys, "executable", "/opt/editor/editor")
+    else:
+        monkeypatch.setattr(machine.subprocess, "run", refused)
+    np.testing.assert_array_equal(run(hasty=True)[1], run()[1])
+
+
+def test_long_code_goes_to_another_process(monkeypatch):
+    monkeypatch.setattr(machine, "LONG", 1)
+    monkeypatch.setattr(machine.os, "sched_getaffinity", lambda _: {0, 1})
+    monkeypatch.setattr(machine, "_compiled_here", None)
+    assert np.isfinite(run()[1]).all()

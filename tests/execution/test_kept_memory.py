@@ -1,0 +1,70 @@
+"""Blocks of memory that are lent again, and the arrays in them."""
+
+import threading
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.execution import kept_memory
+from jounce.execution.backends import is_wanted
+from jounce.execution.kept_memory import LINE, arrays_in, borrow, give_back, room_of
+from tests.problems.small import four_bar
+
+
+@pytest.fixture
+def kept(monkeypatch):
+    blocks = []
+    monkeypatch.setattr(kept_memory, "_kept", blocks)
+    return blocks
+
+
+def test_what_was_given_back_is_lent_again(kept):
+    block = borrow(1000)
+    give_back(block)
+    assert borrow(900) is block
+    assert not kept
+
+
+def test_a_block_that_is_too_small_makes_room_for_another(kept):
+    give_back(borrow(1000))
+    assert len(borrow(1001)) >= 1001
+    assert not kept
+
+
+def test_no_more_is_kept_than_is_allowed(kept, monkeypatch):
+    monkeypatch.setattr(kept_memory, "MOST", 1000)
+    for block in [borrow(600), borrow(401), borrow(300), borrow(200), borrow(100)]:
+        give_back(block)
+    assert list(map(len, kept)) == [600, 300, 100]
+
+
+def test_arrays_begin_at_lines_and_have_nothing_in_common():
+    shapes, kinds = [(3, 5), (2, 2, 7), (0,), (9,)], [float, float, float, int]
+    block = np.empty(room_of(shapes) + 3, np.uint8)[3:]
+    arrays = arrays_in(block, shapes, kinds)
+    assert [(x.shape, x.dtype) for x in arrays] == [(s, np.dtype(k)) for s, k in zip(shapes, kinds, strict=True)]
+    assert not any(x.ctypes.data % LINE for x in arrays if x.size)
+    for k, array in enumerate(arrays):
+        array[...] = k
+    assert [set(x.ravel().tolist()) for x in arrays] == [{0}, {1}, set(), {3}]
+
+
+def test_motions_are_their_own_beside_others_that_borrow_the_same_memory(kept):
+    """What one motion has found is not what the next writes, in several threads as in one."""
+    lengths = [0.038, 0.039, 0.04]
+    grid = np.linspace(0.0, 2.0, 3001)
+    wanted = [jn.solve(four_bar(AB=x), grid, threads=1).outputs["psi"].copy() for x in lengths]
+    found = {}
+
+    def solve(k):
+        found[k] = jn.solve(four_bar(AB=lengths[k % 3]), grid, threads=2).outputs["psi"]
+
+    threads = [threading.Thread(target=solve, args=(k,)) for k in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for k, values in found.items():
+        np.testing.assert_array_equal(values, wanted[k % 3])
+    assert bool(kept) == is_wanted()  # it is machine code that borrows

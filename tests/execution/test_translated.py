@@ -1,0 +1,106 @@
+"""Machine code of functions of small arrays beside XLA's programs."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.special import digamma
+
+import jounce as jn
+from jounce.execution import backends, store as store_, translated
+from jounce.execution.compilation import Compiled, compiled
+from jounce.execution.llvm import self_test
+from tests.execution.test_compilation import Shelf
+
+pytestmark = pytest.mark.skipif(
+    not self_test.is_usable(), reason="there is no compiler, or a system where it was not tried"
+)
+
+
+@pytest.fixture(autouse=True)
+def _wanted(monkeypatch):
+    monkeypatch.delenv("JOUNCE_NATIVE", raising=False)  # as where all tests run without machine code
+
+
+def logistic(x, count, *, rate=3.5, power=1):
+    """A history of a map, in an array that a loop fills; the kind of result tells who computed it."""
+
+    def turn(k, carry):
+        x, history = carry
+        x = rate * x * (1.0 - x)
+        return x, jax.lax.dynamic_update_index_in_dim(history, x**power, k, 0)
+
+    x, history = jax.lax.fori_loop(0, count, turn, (x, jnp.zeros((60, *x.shape))))
+    return {"last": x, "history": history}, history[:, 0].sum()
+
+
+def few(x, *_, **__):
+    return x.size < 10
+
+
+def program():
+    return Compiled(logistic, ("power",), alone=few)
+
+
+def expected(x, count, rate=3.5, power=1):
+    history = np.zeros((60, *x.shape))
+    for k in range(count):
+        x = rate * x * (1 - x)
+        history[k] = x**power
+    return x, history
+
+
+def check(found, wanted):
+    (result, total), (x, history) = found, wanted
+    np.testing.assert_allclose(result["last"], x, rtol=1e-13)
+    np.testing.assert_allclose(result["history"], history, rtol=1e-13)
+    np.testing.assert_allclose(total, history[:, 0].sum(), rtol=1e-13)
+
+
+def test_results_are_those_of_the_function():
+    x, run = np.array([0.2, 0.7, 0.31]), program()
+    for count in (0, 1, 13):
+        found = run(x, count)
+        assert isinstance(found[0]["last"], np.ndarray)
+        check(found, expected(x, count))
+    check(run(x, 5, rate=3.9, power=3), expected(x, 5, 3.9, 3))
+    check(run(0.5 * x, count=5), expected(0.5 * x, 5))
+
+
+@pytest.mark.parametrize("reason", ["environment", "size", "traced"])
+def test_xla_computes_the_rest(reason, monkeypatch):
+    x, run = np.linspace(0.1, 0.9, 12 if reason == "size" else 3), program()
+    if reason == "environment":
+        monkeypatch.setenv("JOUNCE_NATIVE", "0")
+    found = jax.jit(lambda x: run(x, 7))(x) if reason == "traced" else run(x, 7)
+    assert isinstance(found[0]["last"], jax.Array)
+    check(found, expected(x, 7))
+
+
+def test_an_operation_without_code_is_left_to_xla(monkeypatch):
+    monkeypatch.setattr(backends, "_told", set())
+
+    @compiled(alone=lambda x: True)
+    def transformed(x):
+        return jax.lax.digamma(x)
+
+    with pytest.warns(jn.MachineCodeWarning, match="digamma"):
+        found = transformed(np.arange(1.0, 5.0))
+    np.testing.assert_allclose(found, digamma(np.arange(1.0, 5.0)), rtol=1e-13)
+
+
+@pytest.mark.parametrize("damage", [None, b"", b"no program"])
+def test_what_is_kept_is_loaded_or_made_again(damage, monkeypatch):
+    made, shelf, x = [], Shelf(), np.array([0.2, 0.4])
+    real = translated.object_file
+    monkeypatch.setattr(translated, "object_file", lambda *a, **k: made.append(k["hasty"]) or real(*a, **k))
+    monkeypatch.setattr(store_, "_store", shelf)
+    for _ in range(2):
+        function = translated.Translated(logistic, (Compiled.__call__,), alone=True)
+        arrays, tree = [x, np.asarray(4)], jax.tree.structure(((x, 4), {}))
+        run = function.program((arrays, tree), ((), jax.tree.structure(())), {"power": 2}, large=32, hasty=True)
+        check(run(arrays), expected(x, 4, power=2))
+        if damage is not None:
+            shelf |= dict.fromkeys(shelf, damage)
+    assert made == [True] * (1 if damage is None else 2)
+    assert len(shelf.dropped) == (damage is not None)
