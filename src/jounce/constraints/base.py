@@ -1,6 +1,7 @@
 """What a joint or a driver is: named values on two or three bodies, and one residual on jets."""
 
 import abc
+import dataclasses
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
@@ -133,6 +134,7 @@ class AbstractConstraint(Module):
 
     def __init_subclass__(cls, type: str = "", space: str = "", role: str = "joint", **keywords: Any):  # noqa: A002
         super().__init_subclass__(**keywords)
+        keep_words_static(cls)
         if type:
             check_choice("role", role, ("joint", "driver"), MechanismError)
             register(cls, type, space, role)
@@ -204,6 +206,14 @@ def check_bodies(element: Any, counts: tuple[int, ...], does: str = "joins", mus
     if len(set(element.bodies)) != len(element.bodies):
         message = f"{name} must {must} different bodies, not a body with itself"
         raise MechanismError(message, name="bodies", value=list(element.bodies))
+
+
+def keep_words_static(kind: type[Any]) -> None:
+    """Have the fields of text of a class, before it is made a dataclass, be no values that JAX sees."""
+    for name, annotation in vars(kind).get("__annotations__", {}).items():
+        default = vars(kind).get(name, dataclasses.MISSING)
+        if annotation in (str, "str") and not isinstance(default, dataclasses.Field):
+            setattr(kind, name, eqx.field(static=True, default=default))
 
 
 def check_words(element: Any) -> None:

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jounce.constraints.base import catalogue, check_bodies, check_words, register
+from jounce.constraints.base import catalogue, check_bodies, check_words, keep_words_static, register
 from jounce.constraints.facts import USUAL_DIMENSIONS, USUAL_SIGNS
 from jounce.jet import Jet
 from jounce.modules import Module
@@ -71,6 +71,7 @@ class AbstractForce(Module):
 
     def __init_subclass__(cls, type: str = "", space: str = "", **keywords: Any):  # noqa: A002
         super().__init_subclass__(**keywords)
+        keep_words_static(cls)
         if space:
             cls.space = space
         if type:

@@ -8,13 +8,13 @@ from typing import Any
 from jounce.constraints import AbstractConstraint
 from jounce.constraints.base import SPACES
 from jounce.constraints.facts import facts_of
-from jounce.errors import MechanismError, check_choice, check_name, whole_number
+from jounce.errors import ContractError, MechanismError, check_choice, check_name, whole_number
 from jounce.testing.forms import back_ends, copies, files
 from jounce.testing.positions import facts, rank
 from jounce.testing.reactions import equilibrium
 from jounce.testing.residuals import derivatives, expressions, frames, instances, jacobian, one_program
 from jounce.testing.samples import Samples
-from jounce.testing.subject import LeftOut, Subject
+from jounce.testing.subject import Broken, LeftOut, Subject
 
 CONTRACTS: Mapping[str, Callable[[Subject], None]] = MappingProxyType(
     {
@@ -59,7 +59,7 @@ class JointReport:
 
 
 def check_joint(
-    kind: type[AbstractConstraint],
+    kind: type[Any],
     *,
     values: Mapping[str, Any] | None = None,
     space: str = "",
@@ -149,6 +149,8 @@ def check_joint(
     for name in chosen:
         try:
             CONTRACTS[name](subject)
+        except Broken as wrong:
+            raise ContractError(f"{kind.__module__}.{kind.__qualname__}: {name}: {wrong}") from None
         except LeftOut as reason:
             left_out[name] = str(reason)
         else:

@@ -22,7 +22,7 @@ from jounce.kinematics.side_by_side import SideBySide
 from jounce.mechanism import Body, Mechanism
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.testing.samples import BODIES, INSTANT, group_of, pose_of, random_motion
-from jounce.testing.subject import LeftOut, Subject, evaluated
+from jounce.testing.subject import Broken, LeftOut, Subject, evaluated
 
 LANES = 9  # instants: more than a vector holds, and a rest
 
@@ -39,7 +39,7 @@ def copies(subject: Subject) -> None:
         found["pickle"] = pickle.loads(pickle.dumps(element))
     for way, other in found.items():
         if type(other) is not kind or not bool(other == element) or hash(other) != hash(element):
-            subject.fail(f"what {way} makes of a joint is not equal to it, with its hash")
+            raise Broken(f"what {way} makes of a joint is not equal to it, with its hash")
     if "pickle" not in found:
         raise LeftOut(f"copies are equal; pickle finds no class {kind.__qualname__} in the module {kind.__module__}")
 
@@ -71,7 +71,7 @@ def files(subject: Subject) -> None:
     motion = random_motion(subject.random(), space, 2)
     first, second = (_residual(group_of([each], space), motion) for each in (element, read))
     if type(read) is not kind or not np.array_equal(first, second):
-        subject.fail("a joint that was written to a file and read is not the same")
+        raise Broken("a joint that was written to a file and read is not the same")
 
 
 def _residual(group: Any, motion: Any) -> np.ndarray:

@@ -20,9 +20,9 @@ from jounce.testing.samples import (
     random_motion,
     with_unknowns,
 )
-from jounce.testing.subject import LeftOut, Subject, evaluated, random_start, residual
+from jounce.testing.subject import Broken, LeftOut, Subject, evaluated, random_start, residual
 
-STARTS, STEPS = 20, 60
+STARTS, STEPS = 8, 40
 WANTED = 2  # positions
 CLOSED = 1e-13
 DEPENDENT = 1e-9  # smallest singular value over the largest
@@ -38,7 +38,7 @@ def rank(subject: Subject) -> None:
         found, rows = int((sizes > DEPENDENT * sizes[0]).sum()), len(slopes)
         equations = rows if subject.equations is None else subject.equations
         if found != equations:
-            subject.fail(
+            raise Broken(
                 f"where it holds, its {rows} rows are {found} independent equations, not {equations}; leave out rows "
                 "that follow from others, and square none that vanishes by itself"
             )
@@ -50,7 +50,7 @@ def facts(subject: Subject) -> None:
     stated, group = facts_of(type(element)), group_of([element], subject.space)
     found = _positions(subject, group)
     for motion, _ in found:
-        _held_parallel(subject, group, motion)
+        _held_parallel(group, motion)
         if stated.pair:
             _is_pair(subject, element, motion)
         _dimensions(subject, element, motion)
@@ -72,15 +72,16 @@ def _sample(subject: Subject) -> Any:
 
 def _positions(subject: Subject, group: Group) -> list[tuple[Motion, np.ndarray]]:
     """Return some positions in which a joint holds, with the Jacobian there, shape (rows, coordinates)."""
-    random, found = subject.random(), []
+    random, found = subject.random(), subject.positions
     for _ in range(STARTS):
+        if len(found) == WANTED:
+            break
         position = _closed(subject, group, random_start(subject, random))
         if position is not None:
             found.append(position)
-        if len(found) == WANTED:
-            return found
-    subject.fail(f"from {STARTS} random positions of its bodies none was found in which the joint holds")
-    raise AssertionError
+    if not found:
+        raise Broken(f"from {STARTS} random positions of its bodies none was found in which the joint holds")
+    return found
 
 
 def _closed(subject: Subject, group: Group, motion: Motion) -> tuple[Motion, np.ndarray] | None:
@@ -105,7 +106,7 @@ def _closed(subject: Subject, group: Group, motion: Motion) -> tuple[Motion, np.
     return (motion, slopes) if size <= 1e3 * CLOSED else None
 
 
-def _held_parallel(subject: Subject, group: Group, motion: Motion) -> None:
+def _held_parallel(group: Group, motion: Motion) -> None:
     pose = pose_of(motion)
     for names in facts_of(type(group.element)).held_parallel:
         first, second = (
@@ -115,7 +116,7 @@ def _held_parallel(subject: Subject, group: Group, motion: Motion) -> None:
         size = np.linalg.norm(first) * np.linalg.norm(second)
         if abs(abs(first @ second) / size - 1.0) > 1e-12:
             angle = np.degrees(np.arccos(np.clip(first @ second / size, -1, 1)))
-            subject.fail(f"held_parallel {names}: where the joint holds, they are at an angle of {angle:.3g} deg")
+            raise Broken(f"held_parallel {names}: where the joint holds, they are at an angle of {angle:.3g} deg")
 
 
 def _is_pair(subject: Subject, element: Any, motion: Motion) -> None:
@@ -145,7 +146,7 @@ def _squared_distance(subject: Subject, element: Any) -> None:
     words = f"squared_distance {field!r}: the residual is not the square of a distance less the square of it"
     subject.same(squares[0], squares[1], 1e-14, words)
     if squares[0].min() < 0 or len(squares[0]) != 1:
-        subject.fail(words)
+        raise Broken(words)
 
 
 def _dimensions(subject: Subject, element: Any, motion: Motion) -> None:

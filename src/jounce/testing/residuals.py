@@ -23,7 +23,7 @@ from jounce.testing.samples import (
     time_jet,
     with_unknowns,
 )
-from jounce.testing.subject import LeftOut, Subject, evaluated, residual
+from jounce.testing.subject import Broken, LeftOut, Subject, evaluated, residual
 from jounce.trajectory import Expression
 
 NODES = 40  # through which a polynomial is put
@@ -65,7 +65,7 @@ def jacobian(subject: Subject) -> None:
     differences = (-far + 8 * near - 8 * behind + far_behind) / (12 * step)
     subject.same(slopes, differences, 1e-9, "the Jacobian is not that of differences of the residual")
     if np.abs(slopes).max() <= 1e-9:
-        subject.fail("the residual does not depend on how its bodies lie")
+        raise Broken("the residual does not depend on how its bodies lie")
     subject.same(jacobian_of_blocks(group, motion), slopes, 1e-14, "the Jacobian is not that in blocks")
 
 
@@ -101,7 +101,7 @@ def derivatives(subject: Subject) -> None:
         if all(size[-NODES // 4 :].max() <= 1e-13 * max(size.max(), subject.scale) for size in sizes):
             break
     else:
-        subject.fail("the residual is not smooth along a random motion: no polynomial follows it")
+        raise Broken("the residual is not smooth along a random motion: no polynomial follows it")
     for k in range(1, 5):
         exact = [fit.deriv(k)(0.0) / np.prod(range(1, k + 1)) for fit in fits]
         words = f"derivative {k} along a motion is not that of the residual as a function of time"
@@ -201,7 +201,7 @@ def one_program(subject: Subject) -> None:
     elements = [subject.samples.element(random) for _ in range(2)]
     first, second = (run(group_of([element], subject.space), pose, time_jet(1)) for element in elements)
     if len(calls) > 1:
-        subject.fail("the residual is compiled anew for other values; does it look at them in Python?")
+        raise Broken("the residual is compiled anew for other values; does it look at them in Python?")
     numbers = [kind in ("scalar", "vector") for kind in field_kinds(subject.samples.kind).values()]
     if any(numbers) and not subject.samples.given and np.array_equal(first[0], second[0]):
-        subject.fail("the residual does not depend on the values of its fields")
+        raise Broken("the residual does not depend on the values of its fields")

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from jounce.errors import ContractError
 from jounce.jet import Jet
 from jounce.mechanism.system import Group
 from jounce.testing.samples import Motion, Samples, group_of, pose_of, random_motion, time_jet
@@ -14,6 +13,10 @@ from jounce.testing.samples import Motion, Samples, group_of, pose_of, random_mo
 
 class LeftOut(Exception):  # noqa: N818 - it is no error
     """A contract that says nothing of a joint, and why."""
+
+
+class Broken(Exception):  # noqa: N818 - `ContractError` says of which contract, too
+    """What is wrong where a joint does not keep a contract."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,6 +37,8 @@ class Subject:
         How many independent equations it stands for; None for as many as its residual has rows.
     seed : int
         Of all random numbers.
+    positions : list
+        In which the joint holds, once they are found.
     """
 
     samples: Samples
@@ -42,6 +47,7 @@ class Subject:
     period: str | float | None
     equations: int | None
     seed: int
+    positions: list[Any] = dataclasses.field(default_factory=list)
 
     @property
     def space(self) -> str:
@@ -66,21 +72,16 @@ class Subject:
         largest = float(np.abs(residual(group, random_start(self, random))).max())
         return largest if largest > 10 else 1.0
 
-    def fail(self, words: str) -> None:
-        """Raise ContractError."""
-        kind = self.samples.kind
-        raise ContractError(f"{kind.__module__}.{kind.__qualname__}: {words}")
-
     def same(self, found: Any, expected: Any, tolerance: float, words: str) -> None:
-        """Raise ContractError unless numbers agree within a tolerance, in sizes of the residual."""
+        """Raise Broken unless numbers agree within a tolerance, in sizes of the residual."""
         found, expected = np.asarray(found, float), np.asarray(expected, float)
         if found.shape != expected.shape:
-            self.fail(f"{words}: shapes {found.shape} and {expected.shape}")
+            raise Broken(f"{words}: shapes {found.shape} and {expected.shape}")
         if not (np.isfinite(found) & np.isfinite(expected)).all():
-            self.fail(f"{words}: there are values that are not finite")
+            raise Broken(f"{words}: there are values that are not finite")
         worst = float(np.abs(found - expected).max(initial=0.0))
         if worst > tolerance * self.scale:
-            self.fail(f"{words}: they differ by {worst:.3g}, where {tolerance * self.scale:.3g} is allowed")
+            raise Broken(f"{words}: they differ by {worst:.3g}, where {tolerance * self.scale:.3g} is allowed")
 
 
 def random_start(subject: Subject, random: np.random.Generator) -> Motion:
