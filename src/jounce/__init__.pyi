@@ -6,6 +6,7 @@ from jounce import (
     jet as jet,
     rigid as rigid,
     robot as robot,
+    testing as testing,
 )
 from jounce.constraints import (
     AbstractConstraint as AbstractConstraint,
@@ -59,6 +60,7 @@ from jounce.dynamics import (
 from jounce.errors import (
     AssemblyError as AssemblyError,
     AssemblyWarning as AssemblyWarning,
+    ContractError as ContractError,
     DamageWarning as DamageWarning,
     DesignError as DesignError,
     ExpressionError as ExpressionError,

@@ -285,6 +285,10 @@ class UnsupportedError(JounceError):
     """What is right in itself cannot be done here: with values that JAX traces, or in a process that was forked."""
 
 
+class ContractError(JounceError):
+    """A class of one's own does not do what those of the library do, see `jounce.testing`."""
+
+
 class MechanismError(JounceError):
     """The structure of a mechanism is wrong: a missing body, an axis of zero length, a bad grid of time."""
 

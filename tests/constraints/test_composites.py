@@ -7,7 +7,8 @@ import pytest
 import jounce as jn
 from jounce import jet, planar, spatial
 from jounce.jet import Jet
-from tests.problems.bank import BODIES, cases, group_of, pose_of, random_motion
+from jounce.testing.samples import BODIES, group_of, pose_of, random_motion
+from tests.problems.bank import cases
 
 ORDER = 4
 RANKS = {

@@ -12,15 +12,14 @@ import pytest
 import jounce as jn
 from jounce import drivers, forces, planar
 from jounce.constraints.base import ROLES, catalogue
-from jounce.dynamics.inverse import MotionForces
-from jounce.mechanism import build
+from jounce.testing.reactions import acting, convolved, resultant, spins_of, worked
+from jounce.testing.samples import BODIES
 from tests.contracts.test_frames import MECHANISMS
-from tests.problems.bank import BODIES, INDEX, OWN, pose_of, random_motion
+from tests.problems.bank import OWN
 
 RATES = 4
 RATES_OF_ONE = {"planar": RATES, "spatial": 2}  # of a joint alone: in space, angles about axes compile long
 ORDER = RATES + 2  # of motions: forces use up two
-INSTANT = 0.3
 
 
 class OwnRatio(jn.AbstractConstraint, space="planar"):
@@ -78,42 +77,6 @@ def subjects(space):
     return placed
 
 
-def moving(space):
-    """All of them between four bodies in a random motion, with random multipliers: nothing that they hold is held."""
-    random = np.random.default_rng(3)
-    elements = subjects(space)
-    roles = {role: {n: e for n, e in elements.items() if (e.role or "joint") == role} for role in ROLES}
-    rates = RATES_OF_ONE[space]
-    mechanism = jn.Mechanism(
-        space=space,
-        bodies={name: jn.Body([0.0] * (2 if space == "planar" else 3), mass=1.0) for name in BODIES[1:]},
-        joints=roles["joint"],
-        drivers=roles["driver"],
-        forces=roles["force"],
-    )
-    model = build(mechanism)
-    pose = pose_of(random_motion(random, space, rates + 2, degree=3))
-    coordinates = {name: np.stack(jet.dense().coefficients) for name, jet in pose.coordinates().items()}
-    motion = jn.Motion(mechanism, model, np.array([INSTANT]), rates + 2, (coordinates, ()), np.zeros(1, int), {})
-    found = MotionForces(motion)
-    found.__dict__["multipliers"] = random.normal(size=(rates + 1, len(model.rows), 1))
-    return pose, found
-
-
-def convolved(product, a, b):
-    """Taylor coefficients of a product of series, the levels first."""
-    return np.stack([sum(product(a[j], b[k - j]) for j in range(k + 1)) for k in range(min(len(a), len(b)))])
-
-
-def cross(a, b):
-    """The vector product along the first axis; in the plane its third component."""
-    return np.cross(a, b, axis=0) if len(a) == 3 else (a[0] * b[1] - a[1] * b[0])[None]
-
-
-def scalar(a, b):
-    return (a * b).sum(axis=0)
-
-
 @pytest.mark.parametrize("space", ["planar", pytest.param("spatial", marks=pytest.mark.slow)])
 def test_what_is_exerted_has_no_resultant_and_the_power_of_what_it_works_on(space):
     """About the origin, from moments about random points of all bodies, the ground among them.
@@ -121,46 +84,22 @@ def test_what_is_exerted_has_no_resultant_and_the_power_of_what_it_works_on(spac
     The power on the bodies is that of the multipliers on the residual with its law held, and of the forces.
     """
     random = np.random.default_rng(5)
-    pose, found = moving(space)
-    components = 2 if space == "planar" else 3
+    elements, rates = subjects(space), RATES_OF_ONE[space]
+    pose, found = acting(elements, space, rates, np.random.default_rng(3))
     missing = {kind for role in ROLES for kind in catalogue(space, role).values()}
-    spins = pose.angle.differentiate().map(lambda c: c[None]) if components == 2 else pose.global_angular_velocity()
-    spins = np.stack(spins.dense().coefficients)
-    for name, element in subjects(space).items():
-        force, moment, power, size = 0.0, 0.0, 0.0, 0.0
-        load = element.role == "force" and len(element.bodies) == 1
-        felt = element.bodies if load else (*element.bodies, "ground")
-        for body in dict.fromkeys(felt):
-            point, index = random.uniform(-1, 1, components), INDEX[body]
-            place = pose.take((index,)).point(point[:, None, None])
-            path, speed = (np.stack(x.dense().coefficients)[..., 0] for x in (place, place.differentiate()))
-            part, turning = (np.asarray(x) for x in found.reaction(name, index, None, point))
-            assert part.shape[0] == RATES_OF_ONE[space] + 1
-            lever = convolved(cross, path, part)
-            force, moment = force + part, moment + turning + lever
-            power = power + convolved(scalar, part, speed) + convolved(scalar, turning, spins[:, :, index])
-            size = max(size, *(np.abs(x).max() for x in (part, turning, lever)))
+    spins = spins_of(pose)
+    for name, element in elements.items():
+        exerted = resultant(found, name, element, pose, random, spins)
+        size = exerted.size
         assert size > 1e-3, name
-        if not load:
-            assert np.abs(force).max() <= 1e-13 * size, name
-            assert np.abs(moment).max() <= 1e-12 * size, name
-        expected = worked(found, name, element, pose)
-        np.testing.assert_allclose(power, expected, rtol=0, atol=1e-12 * size * np.abs(spins).max(), err_msg=name)
+        assert exerted.power.shape[0] == rates + 1
+        if element.role != "force" or len(element.bodies) > 1:
+            assert np.abs(exerted.force).max() <= 1e-13 * size, name
+            assert np.abs(exerted.moment).max() <= 1e-12 * size, name
+        expected, bound = worked(found, name, element, pose), 1e-12 * size * np.abs(spins).max()
+        np.testing.assert_allclose(exerted.power, expected, rtol=0, atol=bound, err_msg=name)
         missing.discard(type(element))
     assert not missing
-
-
-def worked(found, name, element, pose):
-    """Taylor coefficients of the power that a joint, driver or force puts into all bodies, (levels, time)."""
-    clock = jn.Jet.variable(np.full((1, 1), INSTANT), pose.order)
-    if element.role == "force":
-        index, instance = found._force_index(name)
-        power = found.model.system.forces[index].power(pose, clock)
-        return np.stack(power.dense().coefficients)[: found.levels, instance]
-    place, frozen = found.indices[name], jn.Jet.constant(clock.coefficients[0], pose.order)
-    rate = found.model.system.groups[place.group].residual(pose, frozen).differentiate()
-    rates = np.stack(rate.dense().coefficients)[:, :, place.instance]
-    return -convolved(scalar, found.multipliers[:, list(place.own_rows)], rates)
 
 
 def pair():

@@ -15,7 +15,7 @@ from jounce.mechanism import build
 from jounce.mechanism.axis_angles import with_datums
 from jounce.mechanism.builder import pose_at
 from jounce.robot import CoupledJoints, LinkClosure, SlideOutput
-from tests.problems.bank import group_of, pose_of, random_motion
+from jounce.testing.samples import group_of, pose_of, random_motion
 from tests.problems.drawings import (
     as_drawn,
     assert_same,

@@ -15,7 +15,8 @@ from jounce.jet import Jet
 from jounce.kinematics.jacobian_series import slopes
 from jounce.mechanism import build
 from jounce.mechanism.system import law_left_out
-from tests.problems.bank import cases, group_of, pose_of, random_motion
+from jounce.testing.samples import group_of, pose_of, random_motion
+from tests.problems.bank import cases
 from tests.problems.massed import arm
 
 STEP = 1e-3

@@ -7,8 +7,8 @@ import numpy as np
 
 from jounce.jet import Jet
 from jounce.rigid import PlanarPose, SpatialPose
+from jounce.testing.samples import BODIES, group_of
 from tests.oracles import sommer_planar, sommer_spatial
-from tests.problems.bank import BODIES, group_of
 
 ORDER = 4
 FACTORIALS = np.array([math.factorial(k) for k in range(ORDER + 1)], float)

@@ -3,13 +3,21 @@
 import abc
 import dataclasses
 from collections.abc import Mapping
-from functools import lru_cache
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Bool
 
+from jounce.constraints.facts import (
+    USUAL_DIMENSIONS,
+    USUAL_SIGNS,
+    facts_of,
+    field_kind as field_kind,
+    field_kinds as field_kinds,
+    value_fields as value_fields,
+)
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, concatenate
 from jounce.modules import Module
@@ -20,7 +28,6 @@ Vector = Annotated[Any, "vector"]
 MotionLaw = Annotated[Any, "motion"]
 Wrenches = Annotated[Any, "wrenches"]
 Whole = Annotated[int, "whole"]
-WORDS = ("Scalar", "Vector", "Law", "Laws", "Wrenches", "Whole")  # annotations that say what kind of value a field has
 
 SPACES = ("planar", "spatial")
 ROLES = ("joint", "driver", "force")
@@ -62,20 +69,49 @@ def register(kind: type[Any], type: str, space: str, role: str) -> None:  # noqa
 class AbstractConstraint(Module):
     """A joint or driver: one residual, written on the jets of its bodies, that vanishes when it holds.
 
-    A subclass lists its values as fields and defines `residual`; nothing else. Jacobian, right-hand sides of every
-    order, forces and files follow. Fields are annotated `Scalar`, `Vector`, `MotionLaw` or ``str``; the fields
-    ``point_i`` and ``point_j`` are the key ``points`` of a mechanism file, and likewise vectors, axes and normals.
-    Given a `type`, the subclass can be used in files by that name.
+    A subclass lists its values as fields and defines `residual`. Jacobian, right-hand sides of every order, forces and
+    files follow. Fields are annotated `Scalar`, `Vector`, `MotionLaw` or ``str``; the fields ``point_i`` and
+    ``point_j`` are the key ``points`` of a mechanism file, and likewise vectors, axes and normals. Given a `type`, the
+    subclass can be used in files by that name. What else there is to know of the joint, the class states in class
+    variables, which subclasses inherit; `jounce.testing.check_joint` tells whether all of it is true.
 
     Parameters
     ----------
     bodies : tuple of str
         Names of the bodies i, j (and m), ``"ground"`` among them if one is fixed.
 
+    Attributes
+    ----------
+    dimensions : mapping of str to str
+        Class variable: dimensions of fields, ``length``, ``angle``, ``ratio``, ``mass`` and so on; ``direction`` for a
+        vector of any unit; ``of coordinate`` or ``per angle`` where it depends on the field ``coordinate``; ``any``.
+        An entry ``axis`` is for ``axis_i`` and ``axis_j``. Points and fields named length, radius and lead are lengths,
+        vectors, axes and normals are directions, unless it says otherwise.
+    signs : mapping of str to str
+        Class variable: ``positive``, ``not negative``, ``not zero`` (a vector of no zero length) or ``any``, by field.
+        Fields named length and radius must be positive, lead, vectors, axes and normals not zero, unless it says
+        otherwise.
+    choices : mapping of str to tuple of str
+        Class variable: the words that fields annotated ``str`` may be.
+    held_parallel : tuple of tuple of str
+        Class variable: pairs of fields, of the first and of the second body, whose directions the joint holds parallel.
+        Its residual then cannot tell a part from one that is turned over, which assembly avoids.
+    never_parallel : tuple of tuple of str
+        Class variable: pairs of fields of one body, of which the first must not be parallel to the second.
+    squared_distance : str
+        Class variable: the field, a value or a law, whose square the residual subtracts from that of a distance.
+    symbol : str
+        Class variable: what plots and the viewer draw, one of `jounce.constraints.facts.symbols`, from the fields of
+        the joint of the library that has it; ``none`` for nothing, empty for a mark at each point.
+    pair : str
+        Class variable: ``revolute``, ``rod`` or ``prismatic`` if the planar joint is nothing else, with the fields of
+        that joint of the library. Linkages are recognised by it.
+
     Raises
     ------
     MechanismError
-        If the number of bodies is wrong or a body is joined with itself.
+        If the number of bodies is wrong or a body is joined with itself; if a field of text has a word that it may not
+        have; or if its class states a fact that cannot be.
     """
 
     bodies: tuple[str, ...] = eqx.field(static=True, converter=tuple)
@@ -87,15 +123,25 @@ class AbstractConstraint(Module):
     body_counts: ClassVar[tuple[int, ...]] = ()  # where more than one number is right
     periodic: ClassVar[bool] = False  # whether its residual forgets whole turns, which the law must not skip then
     law_apart: ClassVar[bool] = False  # of the class that defines `residual`: a function of bodies less one of the law
+    dimensions: ClassVar[Mapping[str, str]] = USUAL_DIMENSIONS
+    signs: ClassVar[Mapping[str, str]] = USUAL_SIGNS
+    choices: ClassVar[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
+    held_parallel: ClassVar[tuple[tuple[str, str], ...]] = ()
+    never_parallel: ClassVar[tuple[tuple[str, str], ...]] = ()
+    squared_distance: ClassVar[str] = ""
+    symbol: ClassVar[str] = ""
+    pair: ClassVar[str] = ""
 
     def __init_subclass__(cls, type: str = "", space: str = "", role: str = "joint", **keywords: Any):  # noqa: A002
         super().__init_subclass__(**keywords)
+        keep_words_static(cls)
         if type:
             check_choice("role", role, ("joint", "driver"), MechanismError)
             register(cls, type, space, role)
 
     def __check_init__(self):
         check_bodies(self, self.body_counts or (self.body_count,))
+        check_words(self)
 
     @abc.abstractmethod
     def residual(self, *bodies_and_time: Any, **_: Any) -> Jet:  # with both, type checkers let parameters be named
@@ -162,27 +208,21 @@ def check_bodies(element: Any, counts: tuple[int, ...], does: str = "joins", mus
         raise MechanismError(message, name="bodies", value=list(element.bodies))
 
 
+def keep_words_static(kind: type[Any]) -> None:
+    """Have the fields of text of a class, before it is made a dataclass, be no values that JAX sees."""
+    for name, annotation in vars(kind).get("__annotations__", {}).items():
+        default = vars(kind).get(name, dataclasses.MISSING)
+        if annotation in (str, "str") and not isinstance(default, dataclasses.Field):
+            setattr(kind, name, eqx.field(static=True, default=default))
+
+
+def check_words(element: Any) -> None:
+    """Raise MechanismError unless fields of text have words that they may have, and the facts of its class can be."""
+    for field, words in facts_of(type(element)).choices.items():
+        check_choice(field, getattr(element, field), words, MechanismError)
+
+
 def rows(*parts: Jet) -> Jet:
     """Join scalar residuals, of shape (...), and vector ones, of shape (rows, ...), into one of shape (rows, ...)."""
     whole = [part if len(part.shape) == 3 else part.map(lambda c: c[None]) for part in parts]
     return concatenate(whole)
-
-
-@lru_cache(maxsize=1000)
-def value_fields(kind: type[Any]) -> Mapping[str, dataclasses.Field]:
-    """Return the fields of a joint, driver or force that a user gives, by name; `bodies` is not among them."""
-    return {field.name: field for field in dataclasses.fields(kind) if field.name != "bodies" and field.init}
-
-
-@lru_cache(maxsize=1000)
-def field_kinds(kind: type[Any]) -> Mapping[str, str]:
-    """Return the kinds of the fields that a user gives, by name; see `field_kind`."""
-    return {name: field_kind(field) for name, field in value_fields(kind).items()}
-
-
-def field_kind(field: dataclasses.Field) -> str:
-    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole`` or ``text``."""
-    if isinstance(field.type, str):  # under ``from __future__ import annotations``
-        word = field.type.rpartition(".")[2].strip()
-        return "motion" if word == "MotionLaw" else word.lower() if word in WORDS else "text"
-    return next(iter(getattr(field.type, "__metadata__", ())), "text")

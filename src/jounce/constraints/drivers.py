@@ -10,7 +10,6 @@ from jaxtyping import Bool
 from jounce.constraints.angles import Datum, check_vectors, relative_angle
 from jounce.constraints.base import AbstractConstraint, MotionLaw, Scalar, Vector
 from jounce.constraints.planar import COORDINATES, coordinate_of, slide
-from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, sqrt, wrap
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose
@@ -29,9 +28,9 @@ class CoordinateDriver(AbstractConstraint, type="coordinate", space="planar", ro
     offset: Scalar = 0.0  # rad or m
 
     law_apart = True
-
-    def __check_init__(self):
-        check_choice("coordinate", self.coordinate, COORDINATES, MechanismError)
+    dimensions = {"motion": "of coordinate", "ratio": "per angle", "offset": "of coordinate"}
+    choices = {"coordinate": COORDINATES}
+    symbol = "coordinate"
 
     def evaluate(self, body_i: PlanarPose, body_j: PlanarPose) -> Jet:
         ratio = 1.0 if self.ratio is None else self.ratio
@@ -50,6 +49,8 @@ class SlideDriver(AbstractConstraint, type="slide", space="planar", role="driver
     motion: MotionLaw  # m
 
     law_apart = True
+    dimensions = {"motion": "length"}
+    symbol = "slide"
 
     def evaluate(self, body_i: Pose, body_j: Pose) -> Jet:
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
@@ -66,6 +67,9 @@ class DistanceDriver(AbstractConstraint, type="distance", space="planar", role="
     motion: MotionLaw  # m
 
     law_apart = True
+    dimensions = {"motion": "length"}
+    squared_distance = "motion"
+    symbol = "distance"
 
     def evaluate(self, body_i: Pose, body_j: Pose) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -104,6 +108,9 @@ class RotationDriver(AbstractConstraint, type="rotation", space="spatial", role=
 
     periodic = True
     law_apart = True
+    dimensions = {"motion": "angle"}
+    never_parallel = (("vector_i", "axis_i"),)
+    symbol = "rotation"
 
     __check_init__ = check_vectors
 

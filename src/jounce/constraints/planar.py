@@ -8,7 +8,6 @@ import equinox as eqx
 from jaxtyping import Float
 
 from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
-from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, cross, dot, sqrt
 from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
@@ -40,6 +39,9 @@ class Revolute(AbstractConstraint, type="revolute", space="planar"):
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
 
+    symbol = "revolute"
+    pair = "revolute"
+
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         return body_j.point(self.point_j) - body_i.point(self.point_i)
 
@@ -50,6 +52,10 @@ class DoubleRevolute(AbstractConstraint, type="double_revolute", space="planar")
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
     length: Scalar  # m
+
+    squared_distance = "length"
+    symbol = "rod"
+    pair = "rod"
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -62,6 +68,9 @@ class Parallel1(AbstractConstraint, type="parallel1", space="planar"):
     vector_i: Vector  # in the frame of body i
     vector_j: Vector
 
+    held_parallel = (("vector_i", "vector_j"),)
+    symbol = "none"
+
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         return cross(body_i.direction(self.vector_i), body_j.direction(self.vector_j))
 
@@ -72,6 +81,8 @@ class Parallel2(AbstractConstraint, type="parallel2", space="planar"):
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
     vector_i: Vector  # along the slot
+
+    symbol = "slot"
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -85,6 +96,10 @@ class Prismatic(AbstractConstraint, type="prismatic", space="planar"):
     point_j: Vector
     vector_i: Vector  # along the slide, in each frame
     vector_j: Vector
+
+    held_parallel = (("vector_i", "vector_j"),)
+    symbol = "prismatic"
+    pair = "prismatic"
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -103,8 +118,9 @@ class Coordinate(AbstractConstraint, type="coordinate", space="planar"):
     ratio: Scalar = None
     offset: Scalar = None  # rad or m
 
-    def __check_init__(self):
-        check_choice("coordinate", self.coordinate, COORDINATES, MechanismError)
+    dimensions = {"ratio": "per angle", "offset": "of coordinate"}
+    choices = {"coordinate": COORDINATES}
+    symbol = "coordinate"
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         ratio = 1.0 if self.ratio is None else self.ratio
@@ -118,6 +134,8 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
     offset: Scalar = None  # rad
 
     body_count = 3
+    dimensions = {"ratio": "ratio", "offset": "angle"}
+    symbol = "gear"
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, body_m: PlanarPose, time: Jet) -> Jet:
         return (body_j.angle - body_m.angle) - self.ratio * (body_i.angle - body_m.angle) - self.offset
@@ -131,6 +149,9 @@ class Rolling(AbstractConstraint, type="rolling", space="planar"):
     vector_i: Vector  # along the line
     radius: Scalar  # m
     offset: Scalar = None  # m
+
+    dimensions = {"offset": "length"}
+    symbol = "rolling"
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         travel = slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)

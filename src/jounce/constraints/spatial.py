@@ -20,6 +20,8 @@ class Spherical(AbstractConstraint, type="spherical", space="spatial"):
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
 
+    symbol = "spherical"
+
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return body_j.point(self.point_j) - body_i.point(self.point_i)
 
@@ -30,6 +32,9 @@ class DoubleSpherical(AbstractConstraint, type="double_spherical", space="spatia
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
     length: Scalar  # m
+
+    squared_distance = "length"
+    symbol = "rod"
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -42,6 +47,8 @@ class Dot1(AbstractConstraint, type="dot1", space="spatial"):
     vector_i: Vector  # in the frame of body i
     vector_j: Vector
 
+    symbol = "none"
+
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return body_i.direction(self.vector_i).dot(body_j.direction(self.vector_j))
 
@@ -52,6 +59,8 @@ class Dot2(AbstractConstraint, type="dot2", space="spatial"):
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
     vector_i: Vector  # normal of the plane
+
+    symbol = "plane"
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -66,6 +75,8 @@ class Universal(AbstractConstraint, type="universal", space="spatial"):
     vector_i: Vector  # the arm of the cross held by each body
     vector_j: Vector
 
+    symbol = "universal"
+
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return rows(d, body_i.direction(self.vector_i).dot(body_j.direction(self.vector_j)))
@@ -78,6 +89,9 @@ class Revolute(AbstractConstraint, type="revolute", space="spatial"):
     point_j: Vector
     axis_i: Vector
     axis_j: Vector
+
+    held_parallel = (("axis_i", "axis_j"),)
+    symbol = "revolute"
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -92,6 +106,9 @@ class Cylindrical(AbstractConstraint, type="cylindrical", space="spatial"):
     axis_i: Vector
     axis_j: Vector
 
+    held_parallel = (("axis_i", "axis_j"),)
+    symbol = "cylindrical"
+
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return rows(*_collinear(self, body_i, body_j))
 
@@ -105,6 +122,10 @@ class Prismatic(AbstractConstraint, type="prismatic", space="spatial"):
     axis_j: Vector
     normal_i: Vector  # a perpendicular to the axis on each body that stays parallel
     normal_j: Vector
+
+    held_parallel = (("axis_i", "axis_j"), ("normal_i", "normal_j"))
+    never_parallel = (("normal_i", "axis_i"), ("normal_j", "axis_j"))
+    symbol = "prismatic"
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         side = body_i.direction(cross(self.axis_i, self.normal_i) / length_of(self.axis_i)[None])
@@ -124,6 +145,10 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
     axis_j: Vector
     lead: Scalar  # m per turn of j about the axis of i; negative for a left-hand thread
     offset: Scalar = None  # m
+
+    dimensions = {"offset": "length"}
+    held_parallel = (("axis_i", "axis_j"),)
+    symbol = "screw"
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         advance = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)

@@ -26,6 +26,7 @@ class DistanceForce(AbstractForce, type="distance_force"):
     law: Law  # N
 
     dimensions = {"law": "force"}
+    symbol = "distance"
 
     def displacement(self, body_i: Pose, body_j: Pose, time: Jet) -> Jet:
         return distance(body_i, body_j, self.point_i, self.point_j)
@@ -45,6 +46,7 @@ class SlideForce(AbstractForce, type="slide_force"):
     law: Law  # N
 
     dimensions = {"law": "force"}
+    symbol = "slide"
 
     def displacement(self, body_i: Pose, body_j: Pose, time: Jet) -> Jet:
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
@@ -59,6 +61,7 @@ class Torque(AbstractForce, type="torque", space="planar"):
 
     unit = "N*m"
     dimensions = {"law": "torque"}
+    symbol = "rotation"
 
     def displacement(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         return body_j.angle - body_i.angle
@@ -80,6 +83,8 @@ class SpatialTorque(AbstractForce, type="torque", space="spatial"):
 
     unit = "N*m"
     dimensions = {"law": "torque"}
+    never_parallel = (("vector_i", "axis_i"),)
+    symbol = "rotation"
 
     __check_init__ = check_vectors
 

@@ -1,13 +1,16 @@
 """What an applied force is: named values on one or more bodies, where it acts, and how large it is, on jets."""
 
 import abc
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from jounce.constraints.base import catalogue, check_bodies, register
+from jounce.constraints.base import catalogue, check_bodies, check_words, keep_words_static, register
+from jounce.constraints.facts import USUAL_DIMENSIONS, USUAL_SIGNS
 from jounce.jet import Jet
 from jounce.modules import Module
 from jounce.rigid.pose import Pose
@@ -19,10 +22,11 @@ Laws = Annotated[Any, "laws"]
 class AbstractForce(Module):
     """An applied force or torque: a displacement on which it does work, and its size.
 
-    A subclass lists its values as fields and defines `displacement` and `force`; nothing else. What it does to its
-    bodies follows from how the displacement changes as they move, and the rates of that, to any order, follow too.
-    Fields are annotated `Scalar`, `Vector`, `Law`, `Laws` or ``str``. Given a `type`, the subclass can be used in
-    mechanism files by that name; the keys are those of joints: ``point_i`` and ``point_j`` are the key ``points``.
+    A subclass lists its values as fields and defines `displacement` and `force`. What it does to its bodies follows
+    from how the displacement changes as they move, and the rates of that, to any order, follow too. Fields are
+    annotated `Scalar`, `Vector`, `Law`, `Laws` or ``str``. Given a `type`, the subclass can be used in mechanism files
+    by that name; the keys are those of joints: ``point_i`` and ``point_j`` are the key ``points``. What else there is
+    to know, the class states as joints do: `dimensions`, `signs`, `choices`, `never_parallel` and `symbol`.
 
     Parameters
     ----------
@@ -59,10 +63,15 @@ class AbstractForce(Module):
     unit: ClassVar[str] = "N"
     displacement_names: ClassVar[tuple[str, ...]] = ("x",)  # what expressions of the law call the displacement
     velocity_names: ClassVar[tuple[str, ...]] = ("v",)
-    signs: ClassVar[dict[str, str]] = {}  # for lengths that need not be above zero: "not negative" or "any"
+    dimensions: ClassVar[Mapping[str, str]] = USUAL_DIMENSIONS  # these facts are those of `AbstractConstraint`
+    signs: ClassVar[Mapping[str, str]] = USUAL_SIGNS
+    choices: ClassVar[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
+    never_parallel: ClassVar[tuple[tuple[str, str], ...]] = ()
+    symbol: ClassVar[str] = ""
 
     def __init_subclass__(cls, type: str = "", space: str = "", **keywords: Any):  # noqa: A002
         super().__init_subclass__(**keywords)
+        keep_words_static(cls)
         if space:
             cls.space = space
         if type:
@@ -70,6 +79,7 @@ class AbstractForce(Module):
 
     def __check_init__(self):
         check_bodies(self, (self.body_count,), "acts on", "act between")
+        check_words(self)
 
     @abc.abstractmethod
     def displacement(self, *bodies_and_time: Any, **_: Any) -> Jet:  # with both, parameters may be named

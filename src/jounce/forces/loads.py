@@ -4,7 +4,6 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jounce.constraints.base import Vector
-from jounce.errors import MechanismError, check_choice
 from jounce.forces.base import AbstractForce, Law, Laws, by_law
 from jounce.jet import Jet
 from jounce.rigid import PlanarPose, SpatialPose
@@ -25,11 +24,10 @@ class PointForce(AbstractForce, type="point_force", space="planar"):
 
     body_count = 1
     dimensions = {"law": "force"}
+    choices = {"frame": FRAMES}
+    symbol = "point force"
     displacement_names = ("x", "y")
     velocity_names = ("vx", "vy")
-
-    def __check_init__(self):
-        check_choice("frame", self.frame, FRAMES, MechanismError)
 
     def displacement(self, body: Pose, time: Jet) -> Jet:
         return body.point(self.point)
@@ -65,6 +63,7 @@ class Moment(AbstractForce, type="moment", space="planar"):
     body_count = 1
     unit = "N*m"
     dimensions = {"law": "torque"}
+    symbol = "rotation"
 
     def displacement(self, body: PlanarPose, time: Jet) -> Jet:
         return body.angle
@@ -84,11 +83,10 @@ class SpatialMoment(AbstractForce, type="moment", space="spatial"):
     body_count = 1
     unit = "N*m"
     dimensions = {"law": "torque"}
+    choices = {"frame": FRAMES}
+    symbol = "rotation"
     displacement_names = ()
     velocity_names = ("wx", "wy", "wz")
-
-    def __check_init__(self):
-        check_choice("frame", self.frame, FRAMES, MechanismError)
 
     def displacement(self, body: SpatialPose, time: Jet) -> Jet:
         # no vector changes at the rate of the angular velocity: what the moment works on is told by the rates below

@@ -42,6 +42,7 @@ class Spring(AbstractForce, type="spring"):
 
     dimensions = {"stiffness": "stiffness", "damping": "damping"}
     signs = {"length": "not negative"}
+    symbol = "spring"
 
     def displacement(self, body_i: Pose, body_j: Pose, time: Jet) -> Jet:
         return distance(body_i, body_j, self.point_i, self.point_j)
@@ -61,6 +62,7 @@ class SlideSpring(AbstractForce, type="slide_spring"):
 
     dimensions = {"stiffness": "stiffness", "damping": "damping"}
     signs = {"length": "any"}
+    symbol = "slide spring"
 
     def displacement(self, body_i: Pose, body_j: Pose, time: Jet) -> Jet:
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
@@ -77,6 +79,7 @@ class TorsionalSpring(AbstractForce, type="torsional_spring", space="planar"):
 
     unit = "N*m"
     dimensions = {"stiffness": "torsional stiffness", "damping": "torsional damping", "angle": "angle"}
+    symbol = "spiral"
 
     def displacement(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         return body_j.angle - body_i.angle
@@ -100,6 +103,8 @@ class SpatialTorsionalSpring(AbstractForce, type="torsional_spring", space="spat
 
     unit = "N*m"
     dimensions = {"stiffness": "torsional stiffness", "damping": "torsional damping", "angle": "angle"}
+    never_parallel = (("vector_i", "axis_i"),)
+    symbol = "spiral"
 
     __check_init__ = check_vectors
 

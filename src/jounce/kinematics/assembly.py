@@ -6,9 +6,7 @@ import warnings
 import numpy as np
 from jaxtyping import Float
 
-from jounce.constraints.drivers import DistanceDriver
-from jounce.constraints.planar import DoubleRevolute
-from jounce.constraints.spatial import DoubleSpherical
+from jounce.constraints.facts import facts_of
 from jounce.errors import AssemblyError, AssemblyWarning, MobilityError
 from jounce.execution.device import resident
 from jounce.jet import Jet
@@ -27,6 +25,7 @@ from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
 from jounce.mechanism.builder import group_rows, with_reference
 from jounce.modules import with_fields
+from jounce.trajectory import AbstractMotion
 
 MAX_DATUMS = 100
 TIGHT = 1e-12  # rad or sizes of the mechanism: the tolerance of bodies put together to rounding
@@ -261,13 +260,11 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
     """Return the squares of the distances that joints and drivers keep between two points, by name, m^2."""
     found, clock = {}, Jet([np.full((1, 1), instant)])
     for group, rows in zip(model.system.groups, group_rows(model), strict=True):
-        element = group.element
-        if type(element) in (DoubleRevolute, DoubleSpherical):
-            lengths = element.length
-        elif isinstance(element, DistanceDriver):
-            lengths = element.motion(clock).coefficients[0]
-        else:
+        field = facts_of(type(group.element)).squared_distance
+        if not field:
             continue
+        lengths = getattr(group.element, field)
+        lengths = lengths(clock).coefficients[0] if isinstance(lengths, AbstractMotion) else lengths
         lengths = np.broadcast_to(lengths, (group.instances, 1))[:, 0]
         found |= {name: float(length) ** 2 for name, length in zip(model.rows[rows], lengths, strict=False)}
     return found

@@ -10,14 +10,13 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Bool, Float, Int
 
-from jounce.constraints.base import field_kind, value_fields
+from jounce.constraints.facts import facts_of, field_kinds, has_other_sign
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.kinematics.factors import factored
 from jounce.kinematics.gauss_newton import MAX_STEPS
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.builder import pose_at, starting_guess
-from jounce.mechanism.resolve import NONZERO, POSITIVE
 from jounce.mechanism.system import POSITION_COMPONENTS, System
 from jounce.mechanism.traced import traced_model
 from jounce.modules import with_fields
@@ -110,30 +109,21 @@ class Designs:
         lanes = np.arange(len(self.rows))
         bad = np.zeros(len(lanes), bool)
         for group in (*self.system(lanes).groups, *self.system(lanes).outputs):
-            signs = getattr(group.element, "signs", {})
-            for name, field in value_fields(type(group.element)).items():
+            signs = facts_of(type(group.element)).signs
+            for name, kind in field_kinds(type(group.element)).items():
                 value = getattr(group.element, name)
-                if field_kind(field) not in ("scalar", "vector") or value is None:
+                if kind not in ("scalar", "vector") or value is None:
                     continue
-                value = np.broadcast_to(value, (*np.shape(value)[:-1], len(lanes)))
-                bad |= _unfit(name, signs.get(name, ""), value)
+                entries = value if kind == "vector" else np.asarray(value)[None]
+                entries = np.broadcast_to(entries, (*np.shape(entries)[:-1], len(lanes)))
+                bad |= _unfit(signs[name], entries)
         return bad
 
 
-def _unfit(name: str, sign: str, value: Float[np.ndarray, "*shape design"]) -> Bool[np.ndarray, " design"]:
-    """Tell which values do not fit a field; see `check_value`."""
-    word = name.removesuffix("_i").removesuffix("_j")
-    flat = value.reshape(-1, value.shape[-1])
-    bad: Any = ~np.isfinite(flat).all(axis=0)
-    if sign == "not negative":
-        bad |= (flat < 0).any(axis=0)
-    elif word in POSITIVE and not sign:
-        bad |= (flat <= 0).any(axis=0)
-    elif word == "lead":
-        bad |= (flat == 0).any(axis=0)
-    elif word in NONZERO:
-        bad |= ~np.abs(value).max(axis=0).reshape(-1, value.shape[-1]).all(axis=0)
-    return bad
+def _unfit(sign: str, value: Float[np.ndarray, "component instance design"]) -> Bool[np.ndarray, " design"]:
+    """Tell which designs have a value that does not fit a field; see `check_value`."""
+    unfit = has_other_sign(sign, value.min(axis=0), np.abs(value).max(axis=0))
+    return (unfit | ~np.isfinite(value).all(axis=0)).any(axis=0)
 
 
 class Trials(NamedTuple):

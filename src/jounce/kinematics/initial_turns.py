@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
+from jounce.constraints.facts import dimension_of_field
 from jounce.jet.turns import WHOLE_TURN, principal, whole_periods
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Model
@@ -74,7 +75,7 @@ def driver_lag(model: Model, instant: float, residual: Float[np.ndarray, " row"]
         its = rows[first : first + group.instances]
         first += group.instances
         size[its] = -residual[its]
-        turning[its] = getattr(group.element, "coordinate", "") == "angle"
+        turning[its] = dimension_of_field(group.element, "motion") == "angle"
         if measures_angle(group):
             turning[its] = periodic[its] = True
             size[its] = [next(told).angle for _ in its] - np.asarray(group.element.datum.angle)[:, 0]

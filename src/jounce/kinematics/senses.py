@@ -11,9 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.constraints import planar, spatial
 from jounce.constraints.angles import perpendiculars
 from jounce.constraints.base import rows
+from jounce.constraints.facts import facts_of
 from jounce.jet import Jet
 from jounce.kinematics.gauss_newton import Trial, put_together
 from jounce.kinematics.initial_turns import Coordinates
@@ -24,12 +24,6 @@ from jounce.mechanism.system import Group, System
 from jounce.modules import Module
 from jounce.rigid.pose import Pose
 
-AXES, NORMALS, VECTORS = ("axis_i", "axis_j"), ("normal_i", "normal_j"), ("vector_i", "vector_j")
-HELD_PARALLEL = (  # a user's own joint may have axes that are not
-    ((spatial.Revolute, spatial.Cylindrical, spatial.Prismatic, spatial.Screw), AXES),
-    ((spatial.Prismatic,), NORMALS),
-    ((planar.Parallel1, planar.Prismatic), VECTORS),
-)
 DRAWN_OPPOSITE = -0.9  # cosine: directions as far apart in the starting guess are meant to point opposite ways
 DRAWN_NEARLY = 0.8  # where all are within this, the guess leaves no doubt, and nothing is gained by another
 
@@ -160,9 +154,8 @@ def _joins(leads: list[int], body: int, other: int) -> bool:
 def _pairs(system: System) -> Iterator[tuple[Group, tuple[str, str]]]:
     """Give the groups of joints that hold two directions parallel, with the names of these."""
     for group in system.groups:
-        for kinds, names in HELD_PARALLEL:
-            if isinstance(group.element, kinds):
-                yield group, names
+        for names in facts_of(type(group.element)).held_parallel:
+            yield group, names
 
 
 def _unit(group: Group, name: str) -> Float[np.ndarray, "component instance"]:

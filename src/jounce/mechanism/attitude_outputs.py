@@ -12,7 +12,7 @@ from jounce.jet.turns import counted_on
 from jounce.mechanism.outputs import AbstractOutput
 from jounce.rigid import SpatialPose
 from jounce.rigid.orientation import euler_angles
-from jounce.rigid.rotations import check_sequence
+from jounce.rigid.rotations import SEQUENCES, check_sequence
 
 LETTERS = ("x", "y", "z")
 RATES = ("value", "rate", "second rate", "third rate", "fourth rate")
@@ -79,6 +79,7 @@ class EulerAnglesOutput(AbstractOutput):
 
     unit = "rad"
     space = "spatial"
+    choices = {"sequence": SEQUENCES}
     labels = ("alpha", "beta", "gamma")
     axes = (("euler_angle", labels),)
     wraps = (True, False, True)

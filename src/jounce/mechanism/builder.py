@@ -11,7 +11,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
-from jounce.constraints.base import field_kinds, value_fields
+from jounce.constraints.facts import facts_of, field_kinds, value_fields
 from jounce.errors import JounceError
 from jounce.jet import Jet
 from jounce.linear_algebra.fronts import Fronts, elimination
@@ -384,11 +384,14 @@ def _size(groups: tuple[Group, ...], guess: dict[str, Any]) -> float:
     """Return the largest distance among the points of the joints and the bodies of the guess, 1 if there is none."""
     points, sizes = [guess["position"][..., 0]], []
     for group in groups:
+        facts = facts_of(type(group.element))
         for name, kind in field_kinds(type(group.element)).items():
             value = getattr(group.element, name)
-            if kind == "vector" and name.startswith("point") and not isinstance(value, Tracer):
+            if value is None or facts.dimensions[name] != "length" or isinstance(value, Tracer):
+                continue
+            if kind == "vector" and name.startswith("point"):
                 points.append(value[..., 0])
-            elif name in ("length", "radius") and not isinstance(value, Tracer):
+            elif kind == "scalar" and facts.signs[name] == "positive":
                 sizes.append(np.max(value))
     farthest = np.linalg.norm(np.concatenate(points, axis=1), axis=0).max()
     return float(max([farthest, *sizes])) or 1.0

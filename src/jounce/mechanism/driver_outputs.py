@@ -4,20 +4,20 @@ from typing import Any
 
 import equinox as eqx
 
-from jounce.constraints.base import value_fields
+from jounce.constraints.facts import dimension_of_field, stem_of, value_fields
 from jounce.errors import MechanismError, check_name
 from jounce.mechanism.outputs import AbstractMotionOutput
 
 
 def is_turning(driver: Any) -> bool:
-    """Tell whether the law of a driver is an angle, so that what it exerts is a torque."""
-    fields = value_fields(type(driver))
-    stated = getattr(driver, "dimensions", {}).get("motion")
-    if stated is not None:
+    """Tell whether the law of a driver is an angle, so that what it exerts is a torque.
+
+    A class that does not state its dimension drives an angle where it has no points.
+    """
+    stated = dimension_of_field(driver, "motion")
+    if stated != "any":
         return stated == "angle"
-    if "coordinate" in fields:
-        return driver.coordinate == "angle"
-    return "point_i" not in fields and "point_j" not in fields
+    return not any(stem_of(field) == "point" for field in value_fields(type(driver)))
 
 
 class _DriverCoordinateOutput(AbstractMotionOutput):

@@ -1,13 +1,15 @@
 """Outputs: what a user wants to know of a motion, each one function on the jets of its bodies."""
 
 import abc
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import equinox as eqx
 
 from jounce.constraints.angles import relative_angle
-from jounce.constraints.base import Vector, check_bodies
-from jounce.errors import MechanismError, check_choice
+from jounce.constraints.base import Vector, check_bodies, check_words
+from jounce.constraints.facts import USUAL_DIMENSIONS, USUAL_SIGNS
 from jounce.jet import Jet, sqrt
 from jounce.modules import Module
 from jounce.rigid import PlanarPose, SpatialPose
@@ -26,6 +28,10 @@ class AbstractQuantity(Module):
     labels: ClassVar[tuple[str, ...]] = ("x", "y", "z")  # of the components, where there are some
     axes: ClassVar[tuple[tuple[str, tuple[str, ...]], ...]] = ()  # of components that are those of no vector
     of_forces: ClassVar[bool] = False  # whether applied forces bear on it
+    dimensions: ClassVar[Mapping[str, str]] = USUAL_DIMENSIONS  # these facts are those of `AbstractConstraint`
+    signs: ClassVar[Mapping[str, str]] = USUAL_SIGNS
+    choices: ClassVar[Mapping[str, tuple[str, ...]]] = MappingProxyType({})
+    never_parallel: ClassVar[tuple[tuple[str, str], ...]] = ()
 
     def check(self, mechanism: Any) -> None:
         """Raise MechanismError unless the quantity exists in a mechanism; names of bodies are checked elsewhere."""
@@ -74,6 +80,7 @@ class AbstractOutput(AbstractQuantity):
 
     def __check_init__(self):
         check_bodies(self, (self.body_count,), "takes", "be of")
+        check_words(self)
 
     @abc.abstractmethod
     def evaluate(self, *bodies: Any, **_: Any) -> Jet:  # with both, type checkers let parameters be named
@@ -118,6 +125,7 @@ class RelativeAngleOutput(AbstractOutput):
     space = "spatial"
     turning = True
     body_count = 2
+    never_parallel = (("vector_i", "axis"),)
 
     def evaluate(self, body_i: SpatialPose, body_j: SpatialPose) -> Jet:
         return relative_angle(body_i, body_j, self.axis, self.vector_i, self.vector_j, self.datum)
@@ -141,9 +149,7 @@ class AngularVelocityOutput(AbstractOutput):
 
     unit = "rad/s"
     lost_orders = 1
-
-    def __check_init__(self):
-        check_choice("frame", self.frame, FRAMES, MechanismError)
+    choices = {"frame": FRAMES}
 
     def is_vector(self, mechanism):
         return mechanism.space == "spatial"

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import numbers
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from jounce.constraints.base import field_kinds, value_fields
+from jounce.constraints.facts import SIGNS, facts_of, field_kinds, has_other_sign, stem_of, value_fields
 from jounce.errors import JounceError, MechanismError
 from jounce.forces import AbstractForce, AbstractLaw, ExpressionLaw, FunctionLaw, TimeLaw, VectorLaw
 from jounce.forces.laws import read_law
@@ -24,9 +24,6 @@ from jounce.trajectory.user_laws import read_laws
 
 Element = Module
 """A joint, driver, force or output."""
-
-POSITIVE = ("length", "radius")
-NONZERO = ("axis", "vector", "normal")
 
 
 def resolve(value: Any, parameters: Mapping[str, Any]) -> Any:
@@ -184,11 +181,8 @@ def parameter_value(name: str, value: Any) -> Any:
     return float(number)
 
 
-def check_value(field: str, kind: str, value: Any, components: int, sign: str = "") -> None:
-    """Raise MechanismError unless a value fits its field: shape, finite, not a zero axis, not a negative length.
-
-    A `sign` of "not negative" or "any" lets a length be zero, or negative too.
-    """
+def check_value(kind: str, value: Any, components: int, sign: str = "any") -> None:
+    """Raise MechanismError unless a value fits its field: shape, finite, and of the `sign` that its class states."""
     if isinstance(value, Tracer):
         return
     size = components
@@ -200,22 +194,18 @@ def check_value(field: str, kind: str, value: Any, components: int, sign: str = 
     entries = [value] if array is None else array.ravel().tolist()  # of so few numbers Python tells sooner than NumPy
     if not all(map(math.isfinite, entries)):
         raise MechanismError("must be finite", value=_plain(value))
-    word = field.removesuffix("_i").removesuffix("_j")
-    if sign == "not negative" and value < 0:
-        raise MechanismError("must not be negative", value=_plain(value))
-    if word in POSITIVE and not sign and value <= 0:
-        raise MechanismError("must be greater than zero", value=_plain(value))
-    if word == "lead" and value == 0:
-        raise MechanismError("must not be zero", value=_plain(value))
-    if word in NONZERO and not any(entries):
-        raise MechanismError("must not be of zero length", value=_plain(value))
+    if sign == "any":
+        return
+    if has_other_sign(sign, min(entries), max(map(abs, entries))):
+        of_vector = kind == "vector" and sign == "not zero"
+        raise MechanismError("must not be of zero length" if of_vector else SIGNS[sign], value=_plain(value))
 
 
 def resolved(value: Any, name: str, kind: str, components: int, parameters: Mapping[str, Any]) -> Any:
     """Return what a value of a body stands for, checked: a ``scalar``, ``vector`` or ``tensor``; `name` is dotted."""
     try:
         found = resolve(value, parameters)
-        check_value(name.rpartition(".")[2], kind, found, components)
+        check_value(kind, found, components)
     except JounceError as error:
         raise error.located(name=name) from None
     return found
@@ -227,7 +217,7 @@ def _plain(value: Any) -> Any:
 
 def resolve_element(element: Element, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, Any]:
     """Return the values of a joint, driver, force or output as arrays, by field, checked."""
-    values, signs = {}, getattr(element, "signs", {})
+    values, facts = {}, facts_of(type(element))
     kinds = field_kinds(type(element))
     for field_name, field in value_fields(type(element)).items():
         kind, value = kinds[field_name], getattr(element, field_name)
@@ -238,13 +228,13 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
                 value = resolve_law(value, element, parameters, None if kind == "law" else components)
             elif kind in ("scalar", "vector") and (value is not None or field.default is not None):
                 value = resolve(value, parameters)
-                check_value(field_name, kind, value, components, signs.get(field_name, ""))
+                check_value(kind, value, components, facts.signs[field_name])
             elif kind == "wrenches":
                 value = _wrenches(resolve(value, parameters))
         except JounceError as error:
             raise error.located(name=f"{name}.{field_name}") from None
         values[field_name] = value
-    _check_sideways(values, name)
+    _check_directions(values, facts.never_parallel, name)
     return values
 
 
@@ -261,25 +251,23 @@ def _wrenches(value: Any) -> Any:
     return value
 
 
-def _check_sideways(values: Mapping[str, Any], name: str) -> None:
-    """Raise MechanismError where a normal, or a vector of an angle, is parallel to the axis it must stand off from."""
-    for axis_name, others in (("axis_i", ("normal_i", "vector_i")), ("axis_j", ("normal_j",)), ("axis", ("vector_i",))):
-        axis = values.get(axis_name)
-        for other in others if axis is not None else ():
-            vector = values.get(other)
-            if isinstance(axis, np.ndarray) and isinstance(vector, np.ndarray):
-                (a, b, c), (x, y, z) = _of_size_one(axis), _of_size_one(vector)
-                across = math.hypot(b * z - c * y, c * x - a * z, a * y - b * x)
-                if across < 1e-9 * math.hypot(a, b, c) * math.hypot(x, y, z):
-                    message = "must not be parallel to the axis"
-                    raise MechanismError(message, name=f"{name}.{other}", value=_plain(vector))
+def _check_directions(values: Mapping[str, Any], never_parallel: Iterable[tuple[str, str]], name: str) -> None:
+    """Raise MechanismError where a direction is parallel to another that it must not be parallel to."""
+    for field, other in never_parallel:
+        vector, axis = values[field], values[other]
+        if isinstance(axis, np.ndarray) and isinstance(vector, np.ndarray):
+            (a, b, c), (x, y, z) = _of_size_one(axis), _of_size_one(vector)
+            across = math.hypot(b * z - c * y, c * x - a * z, a * y - b * x)
+            if across < 1e-9 * math.hypot(a, b, c) * math.hypot(x, y, z):
+                message = f"must not be parallel to the {stem_of(other)}"
+                raise MechanismError(message, name=f"{name}.{field}", value=_plain(vector))
 
 
 def _of_size_one(vector: np.ndarray) -> list[float]:
     """Return entries of a vector over the largest: no product of them overflows; of so few Python is sooner done."""
     entries = vector.tolist()
     size = max(map(abs, entries))
-    return [entry / size for entry in entries]
+    return [entry / size for entry in (*entries, 0.0)[:3]]
 
 
 @lru_cache(maxsize=1000)

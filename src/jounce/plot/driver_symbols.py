@@ -12,7 +12,7 @@ from jounce.plot.symbol_parts import PAPER, actuator, ball, normal_of, pin, spri
 
 __all__ = ["DRIVERS_AND_FORCES"]
 
-HINGES = ("revolute", "cylindrical", "universal", "screw", "spherical", "parallel2", "prismatic")
+HINGES = ("revolute", "cylindrical", "universal", "screw", "spherical", "slot", "prismatic")  # that have one place
 
 
 def _spring(drawing: Drawing, symbol: Symbol) -> None:
@@ -49,7 +49,7 @@ def _sliding(drawing: Drawing, symbol: Symbol) -> None:
 
 def _turning(drawing: Drawing, symbol: Symbol) -> None:
     """Draw an arrow, or a spring, about the axis of a turn, at the joint of its bodies where they have one."""
-    turn(drawing, *_pivot(drawing, symbol), spiral=symbol.kind == "torsional_spring")
+    turn(drawing, *_pivot(drawing, symbol), spiral=symbol.kind == "spiral")
 
 
 def _pivot(drawing: Drawing, symbol: Symbol) -> tuple[Flat, Float[np.ndarray, "time 2 2"]]:
@@ -82,11 +82,8 @@ DRIVERS_AND_FORCES = {
     "distance": _cylinder_and_rod,
     "rotation": _turning,
     "spring": _spring,
-    "slide_spring": _spring,
-    "distance_force": _cylinder_and_rod,
-    "slide_force": _sliding,
-    "torque": _turning,
-    "torsional_spring": _turning,
-    "moment": _turning,
-    "point_force": _point_force,
+    "slide spring": _spring,
+    "spiral": _turning,
+    "point force": _point_force,
+    "none": lambda *_: None,
 }

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.constraints.facts import facts_of
 from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve
@@ -69,7 +70,7 @@ def _pins(mechanism: Any) -> Pins:
             for body, point in zip(joint.bodies, (joint.point_i, joint.point_j), strict=True)
         }
         for joint in mechanism.joints.values()
-        if joint.type_name == "revolute"
+        if facts_of(type(joint)).pair == "revolute"
     ]
 
 

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.constraints.base import AbstractConstraint, field_kind, value_fields
+from jounce.constraints.base import AbstractConstraint
+from jounce.constraints.facts import facts_of, field_kinds
 from jounce.errors import JounceError
 from jounce.forces.base import AbstractForce
 from jounce.mechanism import Mechanism
@@ -33,7 +34,6 @@ Element = AbstractConstraint | AbstractForce
 Values = Mapping[str, Mapping[str, np.ndarray]]  # numbers and vectors by element and field
 
 SLOTS = {"_i": 0, "_j": 1, "_m": 2}  # endings of fields, and the body that each is fixed to
-DIRECTIONS = ("axis", "vector")  # of joints; the first that there is counts
 SAME = 1e-9  # points nearer than this, in sizes of the mechanism, are one
 
 
@@ -67,8 +67,8 @@ class Symbol:
     Parameters
     ----------
     name, kind : str
-        Its name, and its type as files name it; ``gear`` also for a fixed ratio of two angles, ``rack`` for a wheel
-        that rolls along x or y.
+        Its name, and the symbol that its class states; ``gear`` also for a fixed ratio of two angles, ``rack`` for a
+        wheel that rolls along x or y.
     bodies : tuple of str
         Those it acts on, in the order i, j, m.
     points : tuple of numpy.ndarray
@@ -212,7 +212,7 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
     >>> seen.links["crank"].names, seen.links["crank"].edges
     ((('A',), ('BC',)), ((0, 1),))
     >>> [symbol.kind for symbol in seen.symbols]
-    ['revolute', 'revolute', 'double_revolute']
+    ['revolute', 'revolute', 'rod']
     """
     check_mechanism(mechanism)
     components = POSITION_COMPONENTS[mechanism.space]
@@ -226,7 +226,7 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
     everywhere = [points_at(start[body], place)[0] for _, body, place in found]
     size = float(np.linalg.norm(np.ptp(everywhere or [[0.0]], axis=0)))
     if not size:
-        size = 2 * _largest([place for _, _, place in found], kinds) or 1.0
+        size = 2 * _largest([place for _, _, place in found], mechanism, kinds) or 1.0
     bodies = {body: _Points() for body in start}
     for name, body, place in found:
         bodies[body].add(place, name, SAME * size)
@@ -251,13 +251,13 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
 def _values(element: Any, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, np.ndarray]:
     """Return the numbers and vectors of an element by field; laws and words are left out."""
     values = {}
-    for field_name, its_field in value_fields(type(element)).items():
-        kind, value = field_kind(its_field), getattr(element, field_name)
+    signs = facts_of(type(element)).signs
+    for field_name, kind in field_kinds(type(element)).items():
+        value = getattr(element, field_name)
         if kind in ("scalar", "vector") and value is not None:
             try:
                 value = resolve(value, parameters)
-                signs = getattr(element, "signs", {})
-                check_value(field_name, kind, value, components, signs.get(field_name, ""))
+                check_value(kind, value, components, signs[field_name])
             except JounceError as error:
                 raise error.located(name=f"{name}.{field_name}") from None
             values[field_name] = np.asarray(value, float)
@@ -286,11 +286,14 @@ def _complete(body: str, points: _Points, mechanism: Mechanism, components: int,
         points.add(np.zeros(components), "", near)
 
 
-def _largest(places: list[Point], kinds: Mapping[str, Values]) -> float:
+def _largest(places: list[Point], mechanism: Mechanism, kinds: Mapping[str, Values]) -> float:
     """Return the largest length that is known where all points fall into one."""
-    elements = [found for values in kinds.values() for found in values.values()]
-    lengths = [abs(float(found[name])) for found in elements for name in ("length", "radius") if name in found]
-    return max([*lengths, *(float(np.linalg.norm(place)) for place in places)], default=0.0)
+    lengths = [float(np.linalg.norm(place)) for place in places]
+    for kind, values in kinds.items():
+        for name, found in values.items():
+            dimensions = facts_of(type(mechanism.elements[kind][name])).dimensions
+            lengths += [abs(float(x)) for field, x in found.items() if x.ndim == 0 and dimensions[field] == "length"]
+    return max(lengths, default=0.0)
 
 
 def _bars(points: Points, near: float, held: list[bool]) -> tuple[tuple[int, int], ...]:
@@ -327,7 +330,7 @@ def _bars(points: Points, near: float, held: list[bool]) -> tuple[tuple[int, int
 def _symbol(
     mechanism: Mechanism, name: str, element: Element, values: Mapping[str, np.ndarray], components: int
 ) -> Symbol:
-    bodies, kind = element.bodies, element.type_name or type(element).__name__
+    bodies, facts = element.bodies, facts_of(type(element))
     points: list[np.ndarray] = [np.zeros(components)] * len(bodies)
     axes: list[np.ndarray | None] = [None] * len(bodies)
     radii: list[float | None] = [None] * len(bodies)
@@ -335,16 +338,15 @@ def _symbol(
         slot = _slot(field_name)
         if slot < len(bodies) and field_name.startswith("point"):
             points[slot] = value
-        word = field_name.removesuffix("_i").removesuffix("_j").removesuffix("_m")
-        if slot < len(bodies) and word in DIRECTIONS and (axes[slot] is None or word == "axis"):
+        if slot < len(bodies) and facts.dimensions[field_name] == "direction" and axes[slot] is None:
             axes[slot] = value
-    if "radius" in values and len(bodies) > 1:
+    if facts.symbol == "rolling":
         radii[1] = float(values["radius"])
-    coordinate = getattr(element, "coordinate", "angle")
+    coordinate = element.coordinate if facts.symbol == "coordinate" else "angle"
     if coordinate != "angle":
         axes[0] = np.array([1.0, 0.0]) if coordinate == "x" else np.array([0.0, 1.0])
-    symbol = Symbol(name, kind, bodies, tuple(points), tuple(axes), tuple(radii))
-    if getattr(element, "role", "") == "joint" and kind in ("gear", "coordinate") and mechanism.space == "planar":
+    symbol = Symbol(name, facts.symbol, bodies, tuple(points), tuple(axes), tuple(radii))
+    if element.role == "joint" and facts.symbol in ("gear", "coordinate"):
         return _geared(mechanism, symbol, coordinate, float(values.get("ratio", 1.0)))
     return symbol
 

@@ -27,7 +27,7 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
         drawing.owner = f"joints.{symbol.name}"
         (_PLANAR if drawing.planar else _SPATIAL).get(symbol.kind, _unknown)(drawing, symbol)
         if symbol.kind not in _UNNAMED:
-            place = np.mean(drawing.ends(symbol), axis=0) if "double" in symbol.kind else drawing.place(symbol)
+            place = np.mean(drawing.ends(symbol), axis=0) if symbol.kind == "rod" else drawing.place(symbol)
             drawing.name(symbol.name, place, INK)
     for kind, symbols in (("drivers", seen.drivers), ("forces", seen.forces)):
         for symbol in symbols:
@@ -68,7 +68,7 @@ def _rod(drawing: Drawing, symbol: Symbol) -> None:
     ends = drawing.ends(symbol)
     drawing.line(*ends, width=2.6, stroke="#666666", layer=BARS)
     for place in ends:
-        (parts.ball if symbol.kind == "double_spherical" else parts.pin)(drawing, place)
+        (parts.pin if drawing.planar else parts.ball)(drawing, place)
 
 
 def _slide(drawing: Drawing, symbol: Symbol, beyond: float) -> tuple[int, str]:
@@ -198,7 +198,7 @@ def _nothing(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _unknown(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw a square at each point, and a dotted line between them: what a type of one's own is, nobody else knows."""
+    """Draw a square at each point, and a dotted line between them: its class states no symbol."""
     places = [drawing.place(symbol, slot) for slot in range(len(symbol.bodies))]
     for place in places:
         corners = [place + 0.7 * drawing.unit * np.array(corner) for corner in parts.CORNERS]
@@ -207,26 +207,26 @@ def _unknown(drawing: Drawing, symbol: Symbol) -> None:
         drawing.line(*places, width=1.0, dashes=parts.DASHES, layer=GUIDES)
 
 
-_UNNAMED = ("dot1", "parallel1", "coordinate", "gear", "rack", "rolling")
+_UNNAMED = ("none", "coordinate", "gear", "rack", "rolling")
 _PLANAR: dict[str, Callable[[Drawing, Symbol], None]] = {
     "revolute": _revolute,
-    "double_revolute": _rod,
-    "parallel1": _nothing,
-    "parallel2": _pin_in_slot,
+    "rod": _rod,
+    "slot": _pin_in_slot,
     "prismatic": _prismatic,
     "coordinate": _coordinate,
     "gear": _nothing,
     "rack": _rack,
     "rolling": _rolling,
+    "none": _nothing,
 }
 _SPATIAL: dict[str, Callable[[Drawing, Symbol], None]] = {
     "spherical": _spherical,
-    "double_spherical": _rod,
-    "dot1": _nothing,
-    "dot2": _plane,
+    "rod": _rod,
+    "plane": _plane,
     "universal": _universal,
     "revolute": _hinge,
     "cylindrical": _sleeve,
     "prismatic": _slider,
     "screw": _sleeve,
+    "none": _nothing,
 }

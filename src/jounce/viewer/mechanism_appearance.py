@@ -17,12 +17,10 @@ from jounce.viewer.mechanism_meshes import THICKNESS, planar_meshes, spatial_mes
 __all__ = ["mechanism_appearance"]
 
 ROD, SPRING, ACTUATOR = ("rod", 0.012, GREY), ("spring", 0.022, (90, 120, 90)), ("actuator", 0.016, (136, 34, 85))
-CONNECTORS = {  # kind, radius in sizes of the mechanism, and colour
-    "double_revolute": ROD,
-    "double_spherical": ROD,
+CONNECTORS = {  # by symbol: kind, radius in sizes of the mechanism, and colour
+    "rod": ROD,
     "spring": SPRING,
     "distance": ACTUATOR,
-    "distance_force": ACTUATOR,
 }
 
 

@@ -44,9 +44,9 @@ def planar_meshes(motion: Motion, skeleton: Skeleton, colours: Mapping[str, Colo
     layer = {body: (k - 1) * THICKNESS * size for k, body in enumerate(skeleton.links)}
     yield from _plates_and_wheels(skeleton, layer, colours)
     for symbol in skeleton.symbols:
-        if symbol.kind in ("revolute", "double_revolute", "parallel2"):
+        if symbol.kind in ("revolute", "rod", "slot"):
             yield from _pins(symbol, layer, size)
-        if symbol.kind in ("prismatic", "parallel2"):
+        if symbol.kind in ("prismatic", "slot"):
             yield from _planar_slide(motion, symbol, layer, size)
     for symbol in skeleton.drivers:
         if symbol.kind == "slide":
@@ -99,7 +99,7 @@ def _pedestal(point: Point, size: float, low: float) -> Trimesh:
 
 def _pins(symbol: Symbol, layer: Mapping[str, float], size: float) -> Pieces:
     """Give the pin of a joint through the layers of its bodies, or those at both ends of a rod."""
-    rod = symbol.kind == "double_revolute"
+    rod = symbol.kind == "rod"
     for k in (0, 1) if rod else (1,):
         levels = [layer[body] for body in ((symbol.bodies[k],) if rod else symbol.bodies)]
         low, high = min(levels) - 0.15 * THICKNESS * size, max(levels) + 1.1 * THICKNESS * size
@@ -160,15 +160,15 @@ def _spatial_joint(symbol: Symbol, size: float) -> Pieces:
     if kind == "revolute":
         yield first, cylinder(1.75 * radius, 0.085 * size, symbol.axis_on(0), points[0]), DARK
         yield second, cylinder(0.9 * radius, 0.11 * size, symbol.axis_on(1), points[1]), GREY
-    elif kind in ("spherical", "double_spherical"):
+    elif kind in ("spherical", "rod"):
         yield second, sphere(1.9 * radius, points[1]), DARK
-        if kind == "double_spherical":
+        if kind == "rod":
             yield first, sphere(1.9 * radius, points[0]), DARK
     elif kind == "universal":
         yield first, cylinder(0.75 * radius, 0.1 * size, symbol.axis_on(0), points[0]), DARK
         yield second, cylinder(0.75 * radius, 0.1 * size, symbol.axis_on(1), points[1]), DARK
         yield second, sphere(1.3 * radius, points[1]), GREY
-    elif kind == "dot2":
+    elif kind == "plane":
         yield second, sphere(1.3 * radius, points[1]), DARK
 
 

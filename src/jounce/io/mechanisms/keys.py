@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import MISSING, dataclass
 from typing import Any
 
-from jounce.constraints.base import field_kind, value_fields
+from jounce.constraints.facts import facts_of, field_kind, value_fields
 from jounce.io.files.located_data import Location
 
 ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
@@ -33,8 +33,8 @@ class FileKey:
     kind : str
         ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole`` or ``text``.
     quantity : str
-        Kind of unit, one of ``units.KINDS``; or ``direction`` (any unit, the same in all components), or ``of
-        coordinate`` and ``per angle``, which follow the key ``coordinate`` beside it.
+        Kind of unit that the class states: one of ``units.KINDS``; or ``direction`` (any unit, the same in all
+        components), or ``of coordinate`` and ``per angle``, which follow the key ``coordinate`` beside it.
     required : bool
         Whether the key must be given.
     """
@@ -67,27 +67,8 @@ def file_keys(kind: type[Any]) -> tuple[FileKey, ...]:
         first = fields[names[0]]
         key = stem if len(names) == 1 else _PLURALS[stem]
         required = first.default is MISSING and first.default_factory is MISSING
-        quantity = _quantity(kind, stem, set(fields))
-        keys.append(FileKey(key, tuple(names), field_kind(first), quantity, required))
+        keys.append(FileKey(key, tuple(names), field_kind(first), facts_of(kind).dimensions[names[0]], required))
     return tuple(sorted(keys, key=lambda k: k.kind != "text"))
-
-
-def _quantity(kind: type[Any], stem: str, fields: set[str]) -> str:
-    """Return the kind of unit of a field, by its name, unless the class says otherwise in ``dimensions``."""
-    stated = getattr(kind, "dimensions", {})
-    if stem in stated:
-        return stated[stem]
-    if stem in ("point", "length", "radius", "lead"):
-        return "length"
-    if stem in ("vector", "axis", "normal"):
-        return "direction"
-    if not kind.__module__.startswith("jounce.") or stem not in ("ratio", "offset", "motion"):
-        return "any"
-    if stem == "ratio":
-        return "per angle" if "coordinate" in fields else "ratio"
-    if "coordinate" in fields:
-        return "of coordinate"
-    return "length" if "point_i" in fields else "angle"
 
 
 def location_of(keys: Iterable[FileKey], field: str) -> Location:

@@ -10,6 +10,7 @@ import numpy as np
 
 from jounce import importing
 from jounce.constraints import catalogue
+from jounce.constraints.facts import at_coordinate
 from jounce.errors import JounceError, MechanismFileError, unknown
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
@@ -132,9 +133,7 @@ def _driven_quantities(drivers: object, space: str) -> dict[str, str]:
         given = raw if isinstance(raw, dict) else {}
         kind = kinds.get(str(given.get("type")))
         quantity = next((key.quantity for key in file_keys(kind) if key.kind == "motion"), "any") if kind else "any"
-        if quantity == "of coordinate":
-            quantity = "angle" if given.get("coordinate") == "angle" else "length"
-        found[name] = quantity
+        found[name] = at_coordinate(quantity, given.get("coordinate"))
     return found
 
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Union
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, create_model
 
 from jounce.constraints import catalogue
-from jounce.constraints.planar import COORDINATES
+from jounce.constraints.facts import facts_of
 from jounce.errors import JounceError, MechanismFileError, no_such
 from jounce.io.mechanisms.inertia_forms import inertia
 from jounce.io.mechanisms.keys import FileKey, file_keys
@@ -32,13 +32,10 @@ from jounce.io.mechanisms.values import (
 )
 from jounce.mechanism.mechanism import NEAREST, SIDES, check_body_name, check_output_name
 from jounce.mechanism.system import POSITION_COMPONENTS
-from jounce.rigid.orientation import FRAMES
-from jounce.rigid.rotations import SEQUENCES
 from jounce.units.dimensions import variables_of
 from jounce.units.expression import PARAMETER_NAME, check_parameter_name
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,99}")
-_CHOICES = {"coordinate": COORDINATES, "frame": FRAMES, "sequence": SEQUENCES}
 _Types = tuple[tuple[str, type[Any]], ...]
 
 
@@ -148,7 +145,7 @@ def _model(name: str, doc: str | None, fields: dict[str, tuple[Any, Any]]) -> ty
     return create_model(name, __config__=config, __doc__=" ".join(summary.split()), **aliased)  # type: ignore[call-overload]
 
 
-def _annotation(kind: type[Any], key: FileKey, size: int, choices: dict[str, tuple[str, ...]]) -> Any:
+def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
     match key.kind:
         case "law":
             return motion(key.quantity, variables_of(kind))
@@ -166,15 +163,14 @@ def _annotation(kind: type[Any], key: FileKey, size: int, choices: dict[str, tup
             return wrenches()
         case "whole":
             return Annotated[Any, Checked(_whole, {"type": "integer", "minimum": 0})]
-    words = {"enum": list(choices[key.key])} if key.key in choices else {"type": "string"}
+    choices = facts_of(kind).choices.get(key.fields[0])
+    words = {"enum": list(choices)} if choices else {"type": "string"}
     return Annotated[Any, Checked(_text, words)]
 
 
 def _values(kind: type[Any], size: int) -> dict[str, tuple[Any, Any]]:
     """Return the keys of a class besides its bodies, as fields of a model."""
-    own_frames = not kind.body_count  # the frame of a force may also be a body by its name
-    choices = _CHOICES if kind.__module__.startswith("jounce.") and not own_frames else {}
-    return {key.key: (_annotation(kind, key, size, choices), ... if key.required else None) for key in file_keys(kind)}
+    return {key.key: (_annotation(kind, key, size), ... if key.required else None) for key in file_keys(kind)}
 
 
 def _bodies(kind: type[Any]) -> dict[str, tuple[Any, Any]]:

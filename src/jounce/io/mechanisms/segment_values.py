@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+from jounce.constraints.facts import at_coordinate
 from jounce.errors import UNSET, TrajectoryError, show_value, unknown
 from jounce.io.mechanisms.values import ANY_VALUE, defined, list_schema, object_schema, parse, problem, scalar_schema
 from jounce.trajectory import AbstractMotion, Expression, FollowingMotion, PiecewiseMotion, Segment, SegmentedMotion
@@ -151,8 +152,7 @@ def rate(raw: object, order: int, quantity: str, info: Any, *at: str | int, by: 
 
 def bases(quantity: str, info: Any) -> list[str]:
     """Return the dimensions that a driven quantity may have; none of what is no coordinate, such as a force."""
-    if quantity == "of coordinate":
-        return ["angle" if info.data.get("coordinate") == "angle" else "length"]
+    quantity = at_coordinate(quantity, info.data.get("coordinate"))
     return [quantity] if quantity in ("length", "angle") else ["angle", "length"] if quantity == "any" else []
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from jounce.constraints import catalogue
+from jounce.constraints.facts import at_coordinate
 from jounce.errors import JounceError, UnitWarning
 from jounce.io.files.located_data import Location, Source, dotted
 from jounce.io.files.samples import sampled_dimension
@@ -225,8 +226,7 @@ def _fields(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Locati
     for section, role in ROLES.items():
         for name, given in (data.get(section) or {}).items():
             for key in file_keys(catalogue(mechanism.space, role)[given["type"]]):
-                turning = given.get("coordinate") == "angle"
-                quantity = ("length", "angle")[turning] if key.quantity == "of coordinate" else key.quantity
+                quantity = at_coordinate(key.quantity, given.get("coordinate"))
                 yield from _leaves((section, name, key.key), quantity, given.get(key.key))
     for name, given in (data.get("bodies") or {}).items():
         for key in ("position", "center_of_mass"):

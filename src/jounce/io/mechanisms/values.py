@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 from pydantic_core import PydanticCustomError, core_schema
 
+from jounce.constraints.facts import at_coordinate
 from jounce.errors import UNSET, JounceError, MechanismError
 from jounce.io.files.located_data import shows_value
 from jounce.mechanism.redundant_reactions import CHOICES, STIFFNESSES
@@ -46,10 +47,7 @@ def parse(
     raw: object, quantity: str, info: Any, *at: str | int, variables: dict[str, Dimension | None] | None = None
 ) -> Value:
     """Read one value of a kind of ``dimensions.KINDS``; ``at`` leads on from the entry being validated."""
-    if quantity in ("of coordinate", "per angle"):
-        turning = info.data.get("coordinate") == "angle"
-        by_coordinate = {"of coordinate": ("length", "angle"), "per angle": ("length per angle", "ratio")}
-        quantity = by_coordinate[quantity][turning]
+    quantity = at_coordinate(quantity, info.data.get("coordinate"))
     context = info.context or {}
     try:
         value = parse_value(raw, quantity, context.get("names", ()), context.get("dimensions"), variables)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.constraints.base import field_kind, value_fields
+from jounce.constraints.facts import dimension_of_field, field_kinds
 from jounce.errors import MechanismError, MobilityError, SingularityError, check_name
 from jounce.execution.device import resident
 from jounce.jet import Jet
@@ -93,7 +93,7 @@ def law_values(mechanism: Mechanism, instant: float) -> dict[str, float]:
 
 
 def _with_law(driver: Any, text: str) -> Any:
-    fields = [name for name, field in value_fields(type(driver)).items() if field_kind(field) == "motion"]
+    fields = [name for name, kind in field_kinds(type(driver)).items() if kind == "motion"]
     if fields != ["motion"]:
         raise MechanismError(
             "a driver whose value is free needs one law, its field motion", name="driver", value=fields
@@ -102,10 +102,7 @@ def _with_law(driver: Any, text: str) -> Any:
 
 
 def _unit(driver: Any) -> str:
-    kind = driver.type_name
-    if kind == "coordinate":
-        return "rad" if driver.coordinate == "angle" else "m"
-    return {"rotation": "rad", "slide": "m", "distance": "m"}.get(kind, "")
+    return {"angle": "rad", "length": "m"}.get(dimension_of_field(driver, "motion"), "")
 
 
 def first_instant(mechanism: Mechanism) -> float:

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from jounce.constraints.drivers import CoordinateDriver
+from jounce.constraints.facts import facts_of
 from jounce.jet.turns import WHOLE_TURN, brought_near
 from jounce.mechanism import Mechanism, build
 from jounce.mechanism.mechanism import GROUND
@@ -127,9 +129,9 @@ def extremes(linkage: Linkage, low: float, high: float) -> tuple[tuple[float, fl
 def recognised(mechanism: Mechanism, driver: str) -> Linkage | None:
     """Return the four-bar or slider-crank that a mechanism is, driven at a link on the ground by its angle, or None."""
     law = {**mechanism.initial, **mechanism.drivers}.get(driver)
-    if mechanism.space != "planar" or law is None or getattr(law, "coordinate", "") != "angle":
+    if mechanism.space != "planar" or not isinstance(law, CoordinateDriver) or law.coordinate != "angle":
         return None
-    if law.bodies[0] != GROUND or getattr(law, "offset", 0.0) not in (0, 0.0):
+    if law.bodies[0] != GROUND or law.offset not in (0, 0.0):
         return None
     hinges, guides = _joints(mechanism)
     crank = law.bodies[1]
@@ -153,16 +155,16 @@ def _joints(mechanism: Mechanism) -> tuple[list[Hinge], list[Any]]:
     for group in build(mechanism).system.groups:
         if group.is_driver:
             continue
-        kind = group.element.type_name
+        pair = facts_of(type(group.element)).pair
         for k in range(group.instances):
             first, second = (names[slot[k]] for slot in group.bodies[:2])
-            if kind == "revolute":
+            if pair == "revolute":
                 hinges.append(((first, second), (_value(group, "point_i", k), _value(group, "point_j", k))))
-            elif kind == "double_revolute":
+            elif pair == "rod":
                 rod, length = f"rod {len(hinges)}", float(_value(group, "length", k))
                 hinges.append(((first, rod), (_value(group, "point_i", k), np.zeros(2))))
                 hinges.append(((rod, second), (np.array([length, 0.0]), _value(group, "point_j", k))))
-            elif kind == "prismatic":
+            elif pair == "prismatic":
                 fields = ("point_i", "point_j", "vector_i")
                 guides.append(((first, second), *(_value(group, name, k) for name in fields)))
             else:

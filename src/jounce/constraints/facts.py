@@ -1,0 +1,283 @@
+"""Facts that the class of a joint, driver, force or output states, and its fields, for all who read them.
+
+A class states a fact as a class variable; subclasses inherit it, and may state another. Facts of single fields are
+mappings from the name of a field, or from its name without the body, ``axis`` for ``axis_i`` and ``axis_j``; each entry
+is inherited by itself. The base classes state those of usual names.
+"""
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any
+
+from jounce.errors import MechanismError, no_such
+from jounce.units.dimensions import KINDS
+
+WORDS = ("Scalar", "Vector", "Law", "Laws", "Wrenches", "Whole")  # annotations that say what kind of value a field has
+BODY_ENDINGS = ("_i", "_j", "_m")  # of fields, by the body that they are fixed in
+
+USUAL_DIMENSIONS: Mapping[str, str] = MappingProxyType(
+    {
+        **dict.fromkeys(("point", "length", "radius", "lead"), "length"),
+        **dict.fromkeys(("vector", "axis", "normal"), "direction"),
+    }
+)
+"""Dimensions of fields of usual names, unless a class states others."""
+
+USUAL_SIGNS: Mapping[str, str] = MappingProxyType(
+    {
+        **dict.fromkeys(("length", "radius"), "positive"),
+        **dict.fromkeys(("lead", "vector", "axis", "normal"), "not zero"),
+    }
+)
+"""Signs of fields of usual names, unless a class states others."""
+
+BY_COORDINATE: Mapping[str, Mapping[bool, str]] = MappingProxyType(
+    {
+        "of coordinate": {True: "angle", False: "length"},
+        "per angle": {True: "ratio", False: "length per angle"},
+    }
+)
+"""Dimensions that depend on whether the field ``coordinate`` beside is ``angle``."""
+
+SIGNS: Mapping[str, str] = MappingProxyType(
+    {
+        "positive": "must be greater than zero",
+        "not negative": "must not be negative",
+        "not zero": "must not be zero",
+        "any": "",
+    }
+)
+"""Signs that values may have to have, and what is said of a value that has another."""
+
+_MACHINES = {
+    "planar": ("revolute", "rod", "slot", "prismatic", "coordinate", "gear", "rolling"),
+    "spatial": ("spherical", "rod", "plane", "universal", "revolute", "cylindrical", "prismatic", "screw"),
+}
+_DRIVES = ("coordinate", "slide", "distance", "rotation")
+_LOADS = ("spring", "slide spring", "slide", "distance", "rotation", "spiral", "point force")
+_SYMBOL_FIELDS = {"rolling": ("radius",), "coordinate": ("coordinate",)}
+PAIRS = {
+    "revolute": ("point_i", "point_j"),
+    "rod": ("point_i", "point_j", "length"),
+    "prismatic": ("point_i", "point_j", "vector_i"),
+}
+"""Pairs by which planar linkages are recognised, and the fields that a joint has as one of them."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Facts:
+    """What a class of joints, drivers, forces or outputs states, its own and what it inherits.
+
+    Parameters
+    ----------
+    dimensions : mapping of str to str
+        Of each field: a word of `jounce.units.dimensions.KINDS`; ``direction`` for a vector of any unit;
+        ``of coordinate`` or ``per angle`` where it depends on the field ``coordinate``; ``any``.
+    signs : mapping of str to str
+        Of each field: ``positive``, ``not negative``, ``not zero`` (of a vector: of no zero length), ``any``.
+    choices : mapping of str to tuple of str
+        Words that a field of text may be.
+    held_parallel : tuple of tuple of str
+        Pairs of fields whose directions, on the first and the second body, the joint holds parallel.
+    never_parallel : tuple of tuple of str
+        Pairs of fields: the first must not be parallel to the second, on the same body.
+    squared_distance : str
+        Field of the distance, a value or a law, where the residual is the square of a distance less the square of it.
+    symbol : str
+        What is drawn for it, see `symbols`; ``none`` for nothing, empty for a mark of what is not known.
+    pair : str
+        One of `PAIRS` where the joint is nothing else, else empty.
+    """
+
+    dimensions: Mapping[str, str]
+    signs: Mapping[str, str]
+    choices: Mapping[str, tuple[str, ...]]
+    held_parallel: tuple[tuple[str, str], ...]
+    never_parallel: tuple[tuple[str, str], ...]
+    squared_distance: str
+    symbol: str
+    pair: str
+
+
+NAMES = tuple(field.name for field in dataclasses.fields(Facts))
+
+
+@lru_cache(maxsize=1000)
+def facts_of(kind: type[Any]) -> Facts:
+    """Return the facts of a class.
+
+    Raises
+    ------
+    MechanismError
+        If the class states what cannot be: of a field that it has not, or in words that nobody knows; or if a field
+        has the name of a fact.
+
+    Examples
+    --------
+    >>> from jounce import planar, spatial
+    >>> from jounce.constraints.facts import facts_of
+    >>> facts_of(spatial.Prismatic).held_parallel
+    (('axis_i', 'axis_j'), ('normal_i', 'normal_j'))
+    >>> dict(facts_of(planar.Rolling).signs)["radius"]
+    'positive'
+    """
+    fields = tuple(value_fields(kind))
+    for field in dataclasses.fields(kind):
+        if field.name in NAMES:
+            message = f"no field of {kind.__qualname__} may have this name, by which a class states a fact; rename it"
+            raise MechanismError(message, name="field", value=field.name)
+    found = Facts(
+        dimensions={name: _of_field(kind, "dimensions", name, "any") for name in fields},
+        signs={name: _of_field(kind, "signs", name, "any") for name in fields},
+        choices={name: told for name in fields if (told := _of_field(kind, "choices", name, ()))},
+        held_parallel=tuple(map(tuple, getattr(kind, "held_parallel", ()))),
+        never_parallel=tuple(map(tuple, getattr(kind, "never_parallel", ()))),
+        squared_distance=_of_residual(kind, "squared_distance"),
+        symbol=getattr(kind, "symbol", ""),
+        pair=_of_residual(kind, "pair"),
+    )
+    _check(kind, found, fields)
+    return found
+
+
+def _of_field(kind: type[Any], fact: str, field: str, otherwise: Any) -> Any:
+    """Return what the first class in the order of inheritance says of a field."""
+    for base in kind.__mro__:
+        stated = vars(base).get(fact, {})
+        if not isinstance(stated, Mapping):
+            message = f"the class {base.__qualname__} must state this by field, in a dictionary"
+            raise MechanismError(message, name=fact, value=stated)
+        for name in (field, stem_of(field)):
+            if name in stated:
+                return stated[name]
+    return otherwise
+
+
+def _of_residual(kind: type[Any], fact: str) -> str:
+    """Return what is stated by the class that a user's residual is of, or by one derived from it; else it is empty."""
+    for base in kind.__mro__:
+        if fact in vars(base):
+            return vars(base)[fact]
+        if "residual" in vars(base) and "stands_for" not in vars(base):
+            return ""
+    return ""
+
+
+def _check(kind: type[Any], facts: Facts, fields: tuple[str, ...]) -> None:
+    def must_be(fact: str, word: str, known: Any, noun: str) -> None:
+        if word not in known:
+            message = f"the class {kind.__qualname__}: {no_such(noun, word, list(known))}"
+            raise MechanismError(message, name=fact, value=word)
+
+    for name in _stated_fields(kind, ("signs", "choices")):
+        must_be("signs", name, {*fields, *map(stem_of, fields)}, "field")
+    dimensions = (*KINDS, *BY_COORDINATE, "direction")
+    for field in fields:
+        must_be(f"dimensions.{field}", facts.dimensions[field], dimensions, "dimension")
+        must_be(f"signs.{field}", facts.signs[field], SIGNS, "sign")
+    for fact in ("held_parallel", "never_parallel"):
+        for name in (name for pair in getattr(facts, fact) for name in pair):
+            must_be(fact, name, fields, "field")
+    if facts.squared_distance:
+        must_be("squared_distance", facts.squared_distance, fields, "field")
+    if facts.pair:
+        must_be("pair", facts.pair, PAIRS, "pair")
+        for name in PAIRS[facts.pair]:
+            must_be(f"pair {facts.pair}", name, fields, "field")
+    if facts.symbol:
+        must_be("symbol", facts.symbol, ("none", *symbols(kind)), "symbol")
+        for name in _SYMBOL_FIELDS.get(facts.symbol, ()):
+            must_be(f"symbol {facts.symbol}", name, fields, "field")
+
+
+def _stated_fields(kind: type[Any], facts: tuple[str, ...]) -> Iterator[str]:
+    """Give the names of the fields of which a class or one of its bases states facts, the usual ones left out."""
+    for base in kind.__mro__:
+        for fact in facts:
+            stated = vars(base).get(fact, {})
+            if stated is not USUAL_SIGNS:
+                yield from stated
+
+
+def symbols(kind: type[Any]) -> tuple[str, ...]:
+    """Return the symbols that a class may state, as plots know them.
+
+    Examples
+    --------
+    >>> from jounce import planar
+    >>> from jounce.constraints.facts import symbols
+    >>> symbols(planar.Revolute)
+    ('revolute', 'rod', 'slot', 'prismatic', 'coordinate', 'gear', 'rolling')
+    """
+    if kind.role in ("driver", "force"):
+        return _DRIVES if kind.role == "driver" else _LOADS
+    return _MACHINES.get(kind.space) or tuple(dict.fromkeys((*_MACHINES["planar"], *_MACHINES["spatial"])))
+
+
+def stem_of(field: str) -> str:
+    """Return the name of a field without the body that it is fixed in."""
+    return field[:-2] if field[-2:] in BODY_ENDINGS else field
+
+
+def has_other_sign(sign: str, least: Any, largest: Any) -> Any:
+    """Tell whether values do not have the sign that they must have, by their least entries and largest magnitudes.
+
+    Examples
+    --------
+    >>> has_other_sign("positive", -1.0, 1.0), has_other_sign("not zero", -1.0, 1.0)
+    (True, False)
+    """
+    match sign:
+        case "positive":
+            return least <= 0
+        case "not negative":
+            return least < 0
+        case "not zero":
+            return largest == 0
+    return False
+
+
+def at_coordinate(dimension: str, coordinate: object) -> str:
+    """Return the dimension of a field where that depends on the field ``coordinate``, else as it is.
+
+    Examples
+    --------
+    >>> at_coordinate("of coordinate", "angle"), at_coordinate("per angle", "x"), at_coordinate("mass", "x")
+    ('angle', 'length per angle', 'mass')
+    """
+    return BY_COORDINATE[dimension][coordinate == "angle"] if dimension in BY_COORDINATE else dimension
+
+
+def dimension_of_field(element: Any, field: str) -> str:
+    """Return the dimension of a field of an element, of its own coordinate where it depends on that.
+
+    Examples
+    --------
+    >>> from jounce import drivers
+    >>> dimension_of_field(drivers.CoordinateDriver(("ground", "crank"), "angle", motion="t"), "motion")
+    'angle'
+    """
+    stated = facts_of(type(element)).dimensions.get(field, "any")
+    return at_coordinate(stated, getattr(element, "coordinate", ""))
+
+
+@lru_cache(maxsize=1000)
+def value_fields(kind: type[Any]) -> Mapping[str, dataclasses.Field]:
+    """Return the fields of a joint, driver or force that a user gives, by name; `bodies` is not among them."""
+    return {field.name: field for field in dataclasses.fields(kind) if field.name != "bodies" and field.init}
+
+
+@lru_cache(maxsize=1000)
+def field_kinds(kind: type[Any]) -> Mapping[str, str]:
+    """Return the kinds of the fields that a user gives, by name; see `field_kind`."""
+    return {name: field_kind(field) for name, field in value_fields(kind).items()}
+
+
+def field_kind(field: dataclasses.Field) -> str:
+    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole`` or ``text``."""
+    if isinstance(field.type, str):  # under ``from __future__ import annotations``
+        word = field.type.rpartition(".")[2].strip()
+        return "motion" if word == "MotionLaw" else word.lower() if word in WORDS else "text"
+    return next(iter(getattr(field.type, "__metadata__", ())), "text")

@@ -1,0 +1,7 @@
+"""Contracts of the library for classes of one's own: `check_joint` holds a joint or driver to them."""
+
+from jounce.errors import ContractError as ContractError
+from jounce.settings import compute_under_own_settings as _compute_under_own_settings
+from jounce.testing.check import JointReport as JointReport, check_joint as check_joint
+
+_compute_under_own_settings(__name__)

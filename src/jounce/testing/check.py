@@ -1,0 +1,158 @@
+"""A class of joints or drivers held to the contracts of the library."""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+from jounce.constraints import AbstractConstraint
+from jounce.constraints.base import SPACES
+from jounce.constraints.facts import facts_of
+from jounce.errors import ContractError, MechanismError, check_choice, check_name, whole_number
+from jounce.testing.forms import back_ends, copies, files
+from jounce.testing.positions import facts, rank
+from jounce.testing.reactions import equilibrium
+from jounce.testing.residuals import derivatives, expressions, frames, instances, jacobian, one_program
+from jounce.testing.samples import Samples
+from jounce.testing.subject import Broken, LeftOut, Subject
+
+CONTRACTS: Mapping[str, Callable[[Subject], None]] = MappingProxyType(
+    {
+        "jacobian": jacobian,
+        "derivatives": derivatives,
+        "frames": frames,
+        "instances": instances,
+        "expressions": expressions,
+        "one program": one_program,
+        "rank": rank,
+        "facts": facts,
+        "equilibrium": equilibrium,
+        "copies": copies,
+        "files": files,
+        "back ends": back_ends,
+    }
+)
+"""What every joint of the library keeps, by name."""
+
+
+@dataclasses.dataclass(frozen=True)
+class JointReport:
+    """To which contracts a class of joints or drivers was held.
+
+    Parameters
+    ----------
+    kind : type
+        The class.
+    held : tuple of str
+        Names of the contracts that it keeps.
+    left_out : mapping of str to str
+        Why contracts say nothing of it, or not all that they do, by name.
+    """
+
+    kind: type[Any]
+    held: tuple[str, ...]
+    left_out: Mapping[str, str]
+
+    def __str__(self) -> str:
+        lines = [f"{self.kind.__qualname__} keeps: {', '.join(self.held)}"]
+        return "\n".join([*lines, *(f"{name}: {why}" for name, why in self.left_out.items())])
+
+
+def check_joint(
+    kind: type[Any],
+    *,
+    values: Mapping[str, Any] | None = None,
+    space: str = "",
+    order: int = 6,
+    relative: bool = True,
+    equations: int | None = None,
+    period: str | float | None = None,
+    optional: bool = False,
+    contracts: Sequence[str] | None = None,
+    seed: int = 0,
+) -> JointReport:
+    """Hold a class of joints or drivers to the contracts that those of the library keep.
+
+    Joints of the class with random values are put between bodies in random motions:
+
+    - ``jacobian``: of each order, the residual is affine in the coordinates of that order, with the Jacobian as slope,
+      which is that of differences;
+    - ``derivatives``: those along a motion are those of a polynomial through values of the residual;
+    - ``frames``: a common motion of all bodies changes nothing;
+    - ``instances``: many joints side by side are those alone;
+    - ``expressions``: values may be expressions of parameters;
+    - ``one program``: other values compile nothing again;
+    - ``rank``: where the joint holds, it stands for as many independent equations as it has rows;
+    - ``facts``: `held_parallel`, `squared_distance`, `pair` and `dimensions`, as the class states them, are true;
+    - ``equilibrium``: its reactions have no resultant, and the power of its multipliers on its residual;
+    - ``copies``: copies and pickles are equal, with the same hash;
+    - ``files``: it is the same after it was written to a file and read;
+    - ``back ends``: machine code, XLA, and one operation after another agree.
+
+    Parameters
+    ----------
+    kind : type
+        Derived from `AbstractConstraint`.
+    values : mapping, optional
+        Values of fields, of those that are not to be random: words, or lengths with which the joint can hold.
+    space : str, optional
+        planar or spatial, where the class does not say it.
+    order : int
+        Up to which derivatives the residual is looked at.
+    relative : bool
+        Whether the joint depends on how its bodies lie to each other, and on nothing else.
+    equations : int, optional
+        How many independent equations it stands for, if not as many as it has rows.
+    period : str or float, optional
+        Of the last row, where that is known up to whole periods: a number, or the field that has it; 2 pi if the
+        class is `periodic`.
+    optional : bool
+        Whether fields that may be left out have values, too.
+    contracts : sequence of str, optional
+        Names of those to be looked at, if not all.
+    seed : int
+        Of the random numbers.
+
+    Returns
+    -------
+    JointReport
+        With the contracts kept, and with those that say nothing of the class.
+
+    Raises
+    ------
+    ContractError
+        If the class does not keep a contract, with its name and what is wrong.
+    MechanismError
+        If the class states a fact that cannot be, or values do not fit.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.testing import check_joint
+    >>> report = check_joint(jn.planar.Rolling, contracts=["jacobian", "frames", "facts"])
+    >>> print(report)
+    Rolling keeps: jacobian, frames, facts
+    """
+    if not (isinstance(kind, type) and issubclass(kind, AbstractConstraint)):
+        raise MechanismError("must be a class derived from jn.AbstractConstraint", name="kind", value=kind)
+    space = kind.space or space
+    check_choice("space", space, SPACES, MechanismError)
+    whole_number("order", order, 1, error=MechanismError)
+    chosen = tuple(CONTRACTS) if contracts is None else tuple(contracts)
+    for name in chosen:
+        check_name("contract", name, CONTRACTS, MechanismError, name="contracts")
+    for name in values or {}:
+        check_name("field", name, facts_of(kind).signs, MechanismError, name="values")
+    samples = Samples(kind, space, dict(values or {}), optional)
+    subject = Subject(samples, order, relative, period, equations, seed)
+    held, left_out = [], {}
+    for name in chosen:
+        try:
+            CONTRACTS[name](subject)
+        except Broken as wrong:
+            raise ContractError(f"{kind.__module__}.{kind.__qualname__}: {name}: {wrong}") from None
+        except LeftOut as reason:
+            left_out[name] = str(reason)
+        else:
+            held.append(name)
+    return JointReport(kind, tuple(held), MappingProxyType(left_out))

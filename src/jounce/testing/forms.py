@@ -1,0 +1,102 @@
+"""Contracts of forms in which a joint exists: copies, pickles, files, and programs of both back ends."""
+
+import copy
+import dataclasses
+import pickle
+import sys
+import tempfile
+import warnings
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.constraints import catalogue
+from jounce.constraints.facts import field_kinds
+from jounce.errors import UnitWarning
+from jounce.io import load, write_mechanism
+from jounce.jet import Jet
+from jounce.kinematics.side_by_side import SideBySide
+from jounce.mechanism import Body, Mechanism
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.testing.samples import BODIES, INSTANT, group_of, pose_of, random_motion
+from jounce.testing.subject import Broken, LeftOut, Subject, evaluated
+
+LANES = 9  # instants: more than a vector holds, and a rest
+
+
+def copies(subject: Subject) -> None:
+    """Check that copies of a joint, and what pickle makes of it, are equal to it and have its hash."""
+    element = subject.samples.element(subject.random())
+    vectors = (name for name, kind in field_kinds(type(element)).items() if kind == "vector")
+    given = {name: tuple(value) for name in vectors if (value := getattr(element, name)) is not None}
+    element = dataclasses.replace(element, **given)  # of lists there is no hash
+    found = {"copy.copy": copy.copy(element), "copy.deepcopy": copy.deepcopy(element)}
+    kind = type(element)
+    if _by_name(kind) is kind:
+        found["pickle"] = pickle.loads(pickle.dumps(element))
+    for way, other in found.items():
+        if type(other) is not kind or not bool(other == element) or hash(other) != hash(element):
+            raise Broken(f"what {way} makes of a joint is not equal to it, with its hash")
+    if "pickle" not in found:
+        raise LeftOut(f"copies are equal; pickle finds no class {kind.__qualname__} in the module {kind.__module__}")
+
+
+def _by_name(kind: type[Any]) -> Any:
+    found: Any = sys.modules.get(kind.__module__)
+    for name in kind.__qualname__.split("."):
+        found = getattr(found, name, None)
+    return found
+
+
+def files(subject: Subject) -> None:
+    """Check that a mechanism with the joint is the same after it was written to a file and read."""
+    kind, space = subject.samples.kind, subject.space
+    role = kind.role or "joint"
+    if catalogue(space, role).get(kind.type_name) is not kind:
+        raise LeftOut("it has no type by which files name it")
+    element = subject.samples.element(subject.random())
+    mechanism = Mechanism(
+        space=space,
+        bodies={name: Body([0.0] * (2 if space == "planar" else 3)) for name in BODIES[1:]},
+        **{f"{role}s": {"own": element}},
+    )
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnitWarning)  # numbers are random
+        path = Path(folder) / "mechanism.json"
+        write_mechanism(mechanism, path)
+        read = getattr(load(path), f"{role}s")["own"]
+    motion = random_motion(subject.random(), space, 2)
+    first, second = (_residual(group_of([each], space), motion) for each in (element, read))
+    if type(read) is not kind or not np.array_equal(first, second):
+        raise Broken("a joint that was written to a file and read is not the same")
+
+
+def _residual(group: Any, motion: Any) -> np.ndarray:
+    return evaluated(group, pose_of(motion), Jet.variable(np.full((1, 1), INSTANT), len(motion["position"]) - 1))
+
+
+def back_ends(subject: Subject) -> None:
+    """Check that machine code, XLA, and one operation after another give the same residual and its derivatives."""
+    random, pose_type = subject.random(), PlanarPose if subject.space == "planar" else SpatialPose
+    group = group_of([subject.samples.element(random)], subject.space)
+    pose = pose_of(random_motion(random, subject.space, 2, batch=LANES))
+    coordinates = {name: [np.asarray(c) for c in jet.dense().coefficients] for name, jet in pose.coordinates().items()}
+    instants = np.linspace(INSTANT, INSTANT + 0.2, LANES)[None]
+
+    def run(group: Any, lanes: Any) -> Any:
+        coordinates, instant = lanes
+        pose = pose_type.from_coordinates({name: Jet(given) for name, given in coordinates.items()})
+        return list(group.residual(pose, Jet.variable(instant, 2)).dense().coefficients)
+
+    lanes = (coordinates, instants)
+    expected = np.array(run(group, lanes))
+    subject.same(jax.jit(run)(group, lanes), expected, 1e-13, "XLA's program gives another residual")
+    if find_spec("llvmlite") is None:
+        raise LeftOut("XLA agrees; there is no compiler of machine code, llvmlite")
+    program = SideBySide(run).program(group, lanes)
+    if program is None:
+        raise LeftOut("XLA agrees; there is no machine code for what the residual does")
+    subject.same(program(lanes), expected, 1e-13, "machine code gives another residual")

@@ -1,0 +1,170 @@
+"""Contracts at positions where a joint holds: how many equations it stands for, and whether its facts are true."""
+
+import dataclasses
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.constraints import planar
+from jounce.constraints.facts import dimension_of_field, facts_of, field_kinds
+from jounce.jet import Jet
+from jounce.mechanism.system import Group
+from jounce.testing.samples import (
+    INSTANT,
+    Motion,
+    directions,
+    displaced,
+    group_of,
+    pose_of,
+    random_motion,
+    with_unknowns,
+)
+from jounce.testing.subject import Broken, LeftOut, Subject, evaluated, random_start, residual
+
+STARTS, STEPS = 8, 40
+WANTED = 2  # positions
+CLOSED = 1e-13
+DEPENDENT = 1e-9  # smallest singular value over the largest
+STRETCH = 3.0  # by which lengths, and directions, are multiplied
+PAIRS = {"revolute": planar.Revolute, "rod": planar.DoubleRevolute, "prismatic": planar.Prismatic}
+
+
+def rank(subject: Subject) -> None:
+    """Check that a joint stands for as many equations as it has rows, or as are claimed, where it holds."""
+    group = group_of([_sample(subject)], subject.space)
+    for _, slopes in _positions(subject, group):
+        sizes = np.linalg.svd(slopes, compute_uv=False)
+        found, rows = int((sizes > DEPENDENT * sizes[0]).sum()), len(slopes)
+        equations = rows if subject.equations is None else subject.equations
+        if found != equations:
+            raise Broken(
+                f"where it holds, its {rows} rows are {found} independent equations, not {equations}; leave out rows "
+                "that follow from others, and square none that vanishes by itself"
+            )
+
+
+def facts(subject: Subject) -> None:
+    """Check that what the class states is true: directions held parallel, a squared distance, a pair, dimensions."""
+    element = _sample(subject)
+    stated, group = facts_of(type(element)), group_of([element], subject.space)
+    found = _positions(subject, group)
+    for motion, _ in found:
+        _held_parallel(group, motion)
+        if stated.pair:
+            _is_pair(subject, element, motion)
+        _dimensions(subject, element, motion)
+    if stated.squared_distance:
+        _squared_distance(subject, element)
+
+
+def _sample(subject: Subject) -> Any:
+    """Return a random joint, with directions that must not be parallel perpendicular to each other."""
+    element = subject.samples.element(subject.random())
+    changed = {}
+    for name, other in facts_of(type(element)).never_parallel:
+        vector, axis = getattr(element, name), getattr(element, other)
+        if vector is not None and axis is not None and name not in subject.samples.given:
+            vector, axis = np.asarray(vector, float), np.asarray(axis, float)
+            changed[name] = (vector - axis * (vector @ axis) / (axis @ axis)).tolist()
+    return dataclasses.replace(element, **changed)
+
+
+def _positions(subject: Subject, group: Group) -> list[tuple[Motion, np.ndarray]]:
+    """Return some positions in which a joint holds, with the Jacobian there, shape (rows, coordinates)."""
+    random, found = subject.random(), subject.positions
+    for _ in range(STARTS):
+        if len(found) == WANTED:
+            break
+        position = _closed(subject, group, random_start(subject, random))
+        if position is not None:
+            found.append(position)
+    if not found:
+        raise Broken(f"from {STARTS} random positions of its bodies none was found in which the joint holds")
+    return found
+
+
+def _closed(subject: Subject, group: Group, motion: Motion) -> tuple[Motion, np.ndarray] | None:
+    """Return the position near to another in which a joint holds, by Gauss-Newton, or None."""
+    unit = directions(subject.space)
+    unknowns = np.stack([np.zeros_like(unit), unit])
+    still = Jet.constant(jnp.full((1, unit.shape[-1]), INSTANT), 1)
+    for _ in range(STEPS):
+        values = evaluated(group, with_unknowns(motion, unknowns), still)[..., 0, :]
+        gap, slopes = values[0, :, 0], values[1]
+        if not np.isfinite(values).all():
+            return None
+        step = np.linalg.lstsq(slopes, -gap, rcond=1e-12)[0]
+        size = float(np.abs(step).max())
+        if size <= CLOSED:
+            return motion, slopes
+        along = step * min(1.0, 0.5 / size)
+        whole = np.tensordot(unit, along, axes=1)[..., None]
+        motion = displaced(motion, whole)
+        if "quaternion" in motion:
+            motion["quaternion"][0] /= np.linalg.norm(motion["quaternion"][0], axis=0)
+    return (motion, slopes) if size <= 1e3 * CLOSED else None
+
+
+def _held_parallel(group: Group, motion: Motion) -> None:
+    pose = pose_of(motion)
+    for names in facts_of(type(group.element)).held_parallel:
+        first, second = (
+            np.array(pose.take(bodies).direction(getattr(group.element, name)).coefficients[0])[:, 0, 0]
+            for name, bodies in zip(names, group.bodies[:2], strict=True)
+        )
+        size = np.linalg.norm(first) * np.linalg.norm(second)
+        if abs(abs(first @ second) / size - 1.0) > 1e-12:
+            angle = np.degrees(np.arccos(np.clip(first @ second / size, -1, 1)))
+            raise Broken(f"held_parallel {names}: where the joint holds, they are at an angle of {angle:.3g} deg")
+
+
+def _is_pair(subject: Subject, element: Any, motion: Motion) -> None:
+    """Check that a joint holds where its pair does, and the pair where the joint does."""
+    pair = facts_of(type(element)).pair
+    kind = PAIRS[pair]
+    values = {name: getattr(element, name, None) for name in field_kinds(kind)}
+    if pair == "prismatic" and values["vector_j"] is None:
+        raise LeftOut("a prismatic pair without vector_j is not compared with that of the library")
+    known = group_of([kind(element.bodies, **values)], subject.space)
+    subject.same(residual(known, motion)[0], 0 * residual(known, motion)[0], 1e-11, f"pair {pair}: it does not hold")
+    other = _closed(subject, known, random_start(subject, subject.random()))
+    if other is not None:
+        gap = residual(group_of([element], subject.space), other[0])[0]
+        subject.same(gap, 0 * gap, 1e-11, f"pair {pair}: the joint does not hold where it does")
+
+
+def _squared_distance(subject: Subject, element: Any) -> None:
+    """Check that the residual, with the square of the value added, is that of a distance, whatever the value."""
+    field = facts_of(type(element)).squared_distance
+    motion = random_motion(subject.random(), subject.space, 0, batch=20)
+    is_law = field_kinds(type(element))[field] == "motion"
+    squares = []
+    for value in (0.5, 1.2):
+        changed = dataclasses.replace(element, **{field: str(value) if is_law else value})
+        squares.append(residual(group_of([changed], subject.space), motion)[0] + value**2)
+    words = f"squared_distance {field!r}: the residual is not the square of a distance less the square of it"
+    subject.same(squares[0], squares[1], 1e-14, words)
+    if squares[0].min() < 0 or len(squares[0]) != 1:
+        raise Broken(words)
+
+
+def _dimensions(subject: Subject, element: Any, motion: Motion) -> None:
+    """Check that a joint which holds still does where all lengths are multiplied, and directions are lengthened."""
+    changed: dict[str, Any] = {}
+    for name, kind in field_kinds(type(element)).items():
+        value = getattr(element, name)
+        dimension = dimension_of_field(element, name)
+        if kind not in ("scalar", "vector", "motion") or value is None:
+            continue
+        if dimension not in ("length", "length per angle", "direction", "angle", "ratio"):
+            return  # nothing is said of a field
+        if dimension in ("length", "length per angle", "direction"):
+            changed[name] = f"{STRETCH}*({value})" if kind == "motion" else (STRETCH * np.asarray(value)).tolist()
+    wide = {**motion, "position": STRETCH * motion["position"]}
+    gap = residual(group_of([dataclasses.replace(element, **changed)], subject.space), wide)[0]
+    if period := subject.period_of(group_of([element], subject.space)):
+        period = STRETCH * period if isinstance(subject.period, str) else period
+        gap[-1] -= period * np.round(gap[-1] / period)
+    words = "dimensions: a joint that holds does not where all lengths are those in another unit"
+    subject.same(gap, 0 * gap, 1e-10, words)

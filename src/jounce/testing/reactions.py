@@ -1,0 +1,131 @@
+"""Equilibrium of what joints, drivers and forces exert, along random motions with random multipliers.
+
+Nothing that they hold is held then, and nothing depends on a mechanism's being solved.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jounce.constraints.base import ROLES
+from jounce.dynamics.inverse import MotionForces
+from jounce.jet import Jet
+from jounce.kinematics import Motion
+from jounce.mechanism import Body, Mechanism, build
+from jounce.testing.samples import BODIES, INDEX, INSTANT, pose_of, random_motion
+from jounce.testing.subject import Subject
+
+RATES = 1  # of reactions that are looked at
+
+
+def equilibrium(subject: Subject) -> None:
+    """Check that the reactions of a joint have no resultant, and the power of its multipliers on its residual."""
+    random = subject.random()
+    element = subject.samples.element(random)
+    pose, found = acting({"joint": element}, subject.space, RATES, random)
+    spins = spins_of(pose)
+    exerted = resultant(found, "joint", element, pose, random, spins)
+    size = max(exerted.size, 1e-300)
+    subject.same(exerted.force / size, 0 * exerted.force, 1e-13, "the reactions have a resultant force")
+    subject.same(exerted.moment / size, 0 * exerted.moment, 1e-12, "the reactions have a resultant moment")
+    power, scale = worked(found, "joint", element, pose), size * np.abs(spins).max()
+    words = "the power of the reactions is not that of the multipliers on the residual"
+    subject.same(exerted.power / scale, power / scale, 1e-12, words)
+
+
+class Resultant(NamedTuple):
+    """What a joint, driver or force exerts on all its bodies together, as Taylor coefficients, the levels first.
+
+    Attributes
+    ----------
+    force, moment : array
+        Resultant, and moment about the origin.
+    power : array
+        That goes into the bodies.
+    size : float
+        Of the largest part of them.
+    """
+
+    force: Any
+    moment: Any
+    power: Any
+    size: float
+
+
+def acting(
+    elements: Mapping[str, Any], space: str, rates: int, random: np.random.Generator
+) -> tuple[Any, MotionForces]:
+    """Return the pose of four bodies in a random motion, and the forces between them with random multipliers."""
+    roles = {role: {n: e for n, e in elements.items() if (e.role or "joint") == role} for role in ROLES}
+    mechanism = Mechanism(
+        space=space,
+        bodies={name: Body([0.0] * (2 if space == "planar" else 3), mass=1.0) for name in BODIES[1:]},
+        joints=roles["joint"],
+        drivers=roles["driver"],
+        forces=roles["force"],
+    )
+    model = build(mechanism)
+    pose = pose_of(random_motion(random, space, rates + 2, degree=3))
+    coordinates = {name: np.stack(jet.dense().coefficients) for name, jet in pose.coordinates().items()}
+    motion = Motion(mechanism, model, np.array([INSTANT]), rates + 2, (coordinates, ()), np.zeros(1, int), {})
+    found = MotionForces(motion)
+    found.__dict__["multipliers"] = random.normal(size=(rates + 1, len(model.rows), 1))
+    return pose, found
+
+
+def spins_of(pose: Any) -> np.ndarray:
+    """Return Taylor coefficients of the angular velocities of all bodies, (levels, components, bodies, batch)."""
+    planar = hasattr(pose, "angle")
+    spins = pose.angle.differentiate().map(lambda c: c[None]) if planar else pose.global_angular_velocity()
+    return np.stack(spins.dense().coefficients)
+
+
+def resultant(
+    found: MotionForces, name: str, element: Any, pose: Any, random: np.random.Generator, spins: np.ndarray
+) -> Resultant:
+    """Return what a joint, driver or force exerts, from moments about random points of all bodies and the ground."""
+    force: Any = 0.0
+    moment: Any = 0.0
+    power: Any = 0.0
+    size = 0.0
+    load = element.role == "force" and len(element.bodies) == 1
+    felt = element.bodies if load else (*element.bodies, "ground")
+    for body in dict.fromkeys(felt):
+        point, index = random.uniform(-1, 1, len(pose.position.coefficients[0])), INDEX[body]
+        place = pose.take((index,)).point(point[:, None, None])
+        path, speed = (np.stack(x.dense().coefficients)[..., 0] for x in (place, place.differentiate()))
+        part, turning = (np.asarray(x) for x in found.reaction(name, index, None, point))
+        lever = convolved(cross, path, part)
+        force, moment = force + part, moment + turning + lever
+        power = power + convolved(scalar, part, speed) + convolved(scalar, turning, spins[:, :, index])
+        size = max(size, *(float(np.abs(x).max()) for x in (part, turning, lever)))
+    return Resultant(force, moment, power, size)
+
+
+def worked(found: MotionForces, name: str, element: Any, pose: Any) -> np.ndarray:
+    """Return Taylor coefficients of the power that a joint, driver or force puts into all bodies, (levels, time)."""
+    clock = Jet.variable(np.full((1, 1), INSTANT), pose.order)
+    if element.role == "force":
+        index, instance = found._force_index(name)
+        power = found.model.system.forces[index].power(pose, clock)
+        return np.stack(power.dense().coefficients)[: found.levels, instance]
+    place, frozen = found.indices[name], Jet.constant(clock.coefficients[0], pose.order)
+    rate = found.model.system.groups[place.group].residual(pose, frozen).differentiate()
+    rates = np.stack(rate.dense().coefficients)[:, :, place.instance]
+    return -convolved(scalar, found.multipliers[:, list(place.own_rows)], rates)
+
+
+def convolved(product: Callable[..., Any], a: Any, b: Any) -> np.ndarray:
+    """Return Taylor coefficients of a product of series, the levels first."""
+    return np.stack([sum(product(a[j], b[k - j]) for j in range(k + 1)) for k in range(min(len(a), len(b)))])
+
+
+def cross(a: Any, b: Any) -> Any:
+    """Return the vector product along the first axis; in the plane its third component."""
+    return np.cross(a, b, axis=0) if len(a) == 3 else (a[0] * b[1] - a[1] * b[0])[None]
+
+
+def scalar(a: Any, b: Any) -> Any:
+    """Return the scalar product along the first axis."""
+    return (a * b).sum(axis=0)

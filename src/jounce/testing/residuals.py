@@ -1,0 +1,207 @@
+"""Contracts of residuals: derivatives by bodies and by time, frames, instances, expressions, compilation."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.constraints.facts import field_kinds
+from jounce.jet import Jet
+from jounce.mechanism.system import Group
+from jounce.testing.samples import (
+    BODIES,
+    INSTANT,
+    Motion,
+    coordinates_of,
+    directions,
+    displaced,
+    group_of,
+    moved_together,
+    pose_of,
+    random_motion,
+    time_jet,
+    with_unknowns,
+)
+from jounce.testing.subject import Broken, LeftOut, Subject, evaluated, residual
+from jounce.trajectory import Expression
+
+NODES = 40  # through which a polynomial is put
+REACHES = (0.5, 0.25, 0.125)  # s, on either side
+
+
+def jacobian(subject: Subject) -> None:
+    """Check that coefficients are affine in the unknown, with the Jacobian as slope.
+
+    For each order k, the k-th coefficient with the unknown x[k], less that with zero, is the Jacobian times x[k]. The
+    Jacobian, read off at order one, is that of central differences, and the one that the solver takes in blocks.
+    Everything is evaluated side by side: two lanes for each order, then one for each column of the Jacobian.
+    """
+    random, order = subject.random(), subject.order
+    group = group_of([subject.samples.element(random)], subject.space)
+    motion, unit = random_motion(random, subject.space, 0), directions(subject.space)
+    unknowns = random.uniform(-1, 1, (order + 1, *unit.shape[:2], 1))
+    unknowns[:, :, 0] = 0  # the ground
+    lanes = np.repeat(unknowns, 2 * order + unit.shape[-1], axis=-1)
+    for k in range(1, order + 1):
+        lanes[k, ..., 2 * k - 1] = 0
+    lanes[1:, ..., 2 * order :] = 0
+    lanes[1, ..., 2 * order :] = unit
+    running = jnp.asarray(np.arange(lanes.shape[-1]) < 2 * order, float)[None]
+    time = Jet((jnp.full_like(running, INSTANT), running, *[None] * (order - 1)))
+    found = evaluated(group, with_unknowns(motion, lanes), time)
+
+    slopes = found[1, ..., 2 * order :]
+    for k in range(1, order + 1):
+        change = found[k, ..., 2 * k - 2] - found[k, ..., 2 * k - 1]
+        x = np.swapaxes(unknowns[k, :, 1:, 0], 0, 1).reshape(-1)
+        words = f"coefficient {k} of the residual is not its Jacobian by the coordinates times theirs of that order"
+        subject.same(change, slopes @ x, 1e-12, words)
+
+    step = 1e-4
+    still = Jet([jnp.full((1, 4 * unit.shape[-1]), INSTANT)])
+    moved = displaced(motion, np.concatenate([s * step * unit for s in (2, 1, -1, -2)], axis=-1))
+    far, near, behind, far_behind = np.split(residual(group, moved, still)[0], 4, axis=-1)
+    differences = (-far + 8 * near - 8 * behind + far_behind) / (12 * step)
+    subject.same(slopes, differences, 1e-9, "the Jacobian is not that of differences of the residual")
+    if np.abs(slopes).max() <= 1e-9:
+        raise Broken("the residual does not depend on how its bodies lie")
+    subject.same(jacobian_of_blocks(group, motion), slopes, 1e-14, "the Jacobian is not that in blocks")
+
+
+def jacobian_of_blocks(group: Group, motion: Motion) -> np.ndarray:
+    """Return the Jacobian that the solver takes: block by block for the bodies in each slot."""
+    pose = pose_of({name: series[:1] for name, series in motion.items()})
+    frozen = Jet.constant(jnp.full((1, 1), INSTANT), 1)
+    count = coordinates_of("planar" if "angle" in motion else "spatial")
+    blocks = [np.array(block)[..., 0] for block in group.derivative_blocks(pose, frozen, jnp.ones(count))]
+    whole = np.zeros((*blocks[0].shape[1:], (len(BODIES) - 1) * count))
+    for slot, block in zip(group.moving_slots, blocks, strict=True):
+        first = (group.bodies[slot][0] - 1) * count
+        whole[..., first : first + count] = np.moveaxis(block, 0, -1)
+    return whole
+
+
+def derivatives(subject: Subject) -> None:
+    """Check that derivatives along a motion are those of the residual as a function of time.
+
+    The residual at order zero on instants around, through which a Chebyshev polynomial is put, judges its jets.
+    """
+    random = subject.random()
+    group = group_of([subject.samples.element(random)], subject.space)
+    motion = random_motion(random, subject.space, 4, degree=3)
+    jets = residual(group, motion)[..., 0]
+    for reach in REACHES:
+        steps, values = _around(subject, group, motion, jets, reach)
+        fits = [
+            np.polynomial.chebyshev.Chebyshev.fit(steps, row, NODES - 1, domain=[-reach, reach])
+            for row in values.reshape(-1, NODES)
+        ]
+        sizes = [np.abs(fit.coef) for fit in fits]
+        if all(size[-NODES // 4 :].max() <= 1e-13 * max(size.max(), subject.scale) for size in sizes):
+            break
+    else:
+        raise Broken("the residual is not smooth along a random motion: no polynomial follows it")
+    for k in range(1, 5):
+        exact = [fit.deriv(k)(0.0) / np.prod(range(1, k + 1)) for fit in fits]
+        words = f"derivative {k} along a motion is not that of the residual as a function of time"
+        subject.same(jets[k].reshape(-1), exact, 1e-8 * 10**k, words)
+
+
+def _around(subject: Subject, group: Group, motion: Motion, jets: Any, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return instants around, less the instant, and the residual there, shape (rows, instances, instants)."""
+    steps = reach * np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
+    around = {name: sum(c * steps**k for k, c in enumerate(series))[None] for name, series in motion.items()}
+    around["position"][..., 0, :] = 0
+    values = residual(group, around, Jet([jnp.asarray(INSTANT + steps)[None]]))[0]
+    if period := subject.period_of(group):
+        values[-1] = np.unwrap(values[-1], period=period)
+        values[-1] += period * np.round((jets[0, -1] - values[-1, :, [NODES // 2]]) / period)
+    return steps, values
+
+
+def frames(subject: Subject) -> None:
+    """Check that a common motion of all bodies changes nothing.
+
+    A joint between moving bodies knows their relative motion only; vectors of residuals turn with the bodies.
+    """
+    if not subject.relative:
+        raise LeftOut("it is said to depend on the global frame")
+    random = subject.random()
+    group = group_of([subject.samples.element(random)], subject.space)
+    motion = random_motion(random, subject.space, 2)
+    here, there = residual(group, motion), residual(group, moved_together(motion, random, 2))
+    words = "the residual changes where all bodies are moved together; is it between places in the global frame?"
+    if period := subject.period_of(group):
+        subject.same(here[1:], there[1:], 1e-11, words)
+        turns = (here[0] - there[0]) / period
+        subject.same(turns, np.round(turns), 1e-12, words)
+    elif here.shape[1] == 1:
+        subject.same(here, there, 1e-12, words)
+    else:
+        subject.same(_square(here), _square(there), 1e-11, words)
+
+
+def _square(rows: np.ndarray) -> np.ndarray:
+    """Return coefficients of the sum of squares of the rows."""
+    return np.array([sum((rows[j] * rows[k - j]).sum(axis=0) for j in range(k + 1)) for k in range(len(rows))])
+
+
+def instances(subject: Subject) -> None:
+    """Check that joints evaluated together are those evaluated alone."""
+    random, samples = subject.random(), subject.samples
+    count = samples.count
+    places = [BODIES[1 : 1 + count], BODIES[4 - count + 1 : 5][::-1], (*BODIES[: count - 1], BODIES[4])]
+    elements = [samples.element(random, bodies) for bodies in places]
+    motion = random_motion(random, subject.space, 1, batch=2)
+    together = residual(group_of(elements, subject.space), motion)
+    for k, element in enumerate(elements):
+        alone = residual(group_of([element], subject.space), motion)
+        bound = 1e-15 * (1.0 + np.abs(alone[:, :, 0]))
+        subject.same(together[:, :, k] / bound, alone[:, :, 0] / bound, 1.0, "joints side by side are not those alone")
+
+
+def expressions(subject: Subject) -> None:
+    """Check that values that are expressions of parameters are the numbers."""
+    random = subject.random()
+    plain = subject.samples.element(random)
+    parameters, replaced = {"unit": 1.0, "law": 0.9}, {}
+    for name, kind in field_kinds(type(plain)).items():
+        value = getattr(plain, name)
+        if kind == "scalar" and isinstance(value, float):
+            parameters[name] = value / 2
+            replaced[name] = f"2*{name}"
+        elif kind == "vector" and value is not None:
+            replaced[name] = [Expression(f"unit*{float(entry)!r}") for entry in value]
+        elif kind == "motion" and isinstance(value, str):
+            replaced[name] = value.replace("0.9", "law")
+    if not replaced:
+        raise LeftOut("it has no numbers")
+    motion = random_motion(random, subject.space, 1)
+    written = subject.samples.element(subject.random(), values={**_values(plain), **replaced})
+    found = residual(group_of([written], subject.space, parameters), motion)
+    expected = residual(group_of([plain], subject.space), motion)
+    subject.same(found, expected, 1e-15, "values given as expressions of parameters are not the numbers")
+
+
+def _values(element: Any) -> dict[str, Any]:
+    return {name: getattr(element, name) for name in field_kinds(type(element))}
+
+
+def one_program(subject: Subject) -> None:
+    """Check that other values compile nothing again."""
+    random, calls = subject.random(), []
+
+    @jax.jit
+    def run(group: Any, pose: Any, time: Any) -> Any:
+        calls.append(None)
+        return group.residual(pose, time).dense().coefficients
+
+    pose = pose_of(random_motion(random, subject.space, 1))
+    elements = [subject.samples.element(random) for _ in range(2)]
+    first, second = (run(group_of([element], subject.space), pose, time_jet(1)) for element in elements)
+    if len(calls) > 1:
+        raise Broken("the residual is compiled anew for other values; does it look at them in Python?")
+    numbers = [kind in ("scalar", "vector") for kind in field_kinds(subject.samples.kind).values()]
+    if any(numbers) and not subject.samples.given and np.array_equal(first[0], second[0]):
+        raise Broken("the residual does not depend on the values of its fields")

@@ -1,0 +1,219 @@
+"""Random joints of a class, by its fields and facts alone, and random motions of bodies to put them on."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.constraints.facts import facts_of, field_kinds, value_fields
+from jounce.errors import MechanismError
+from jounce.jet import Jet, sqrt, stack
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
+from jounce.rigid import PlanarPose, SpatialPose
+
+BODIES = ("ground", "one", "two", "three", "four")
+INDEX = {name: k for k, name in enumerate(BODIES)}
+LAW = "0.9 + 0.4*sin(1.3*t + 0.2) + 0.1*t**2"
+INSTANT = 0.3
+
+Motion = Mapping[str, np.ndarray]
+"""Taylor coefficients of the coordinates of all bodies, the ground first: order, component, body, batch."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Samples:
+    """Random joints or drivers of a class.
+
+    Parameters
+    ----------
+    kind : type
+        The class.
+    space : str
+        planar or spatial.
+    given : mapping, optional
+        Values of fields that are not random.
+    optional : bool, default False
+        Whether fields that may be left out have values, too; an offset always has.
+    """
+
+    kind: type[Any]
+    space: str
+    given: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    optional: bool = False
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of the bodies that the joint is between, all of them moving."""
+        return BODIES[1 : 1 + self.count]
+
+    @property
+    def count(self) -> int:
+        """How many bodies the joint is between."""
+        counts: tuple[int, ...] = self.kind.body_counts or (self.kind.body_count,)
+        return counts[0]
+
+    def element(
+        self, random: np.random.Generator, bodies: Sequence[str] = (), values: Mapping[str, Any] | None = None
+    ) -> Any:
+        """Return a random joint between bodies; `values` replaces some of its values."""
+        known = {**self.given, **(values or {})}
+        chosen = {}
+        for name, field in value_fields(self.kind).items():
+            left_out = field.default is not dataclasses.MISSING and not self.optional and name != "offset"
+            if name in known or not left_out:
+                chosen[name] = known[name] if name in known else self._value(name, random)
+        return self.kind(tuple(bodies) or self.bodies, **chosen)
+
+    def _value(self, name: str, random: np.random.Generator) -> Any:
+        kind, facts = field_kinds(self.kind)[name], facts_of(self.kind)
+        if kind == "motion":
+            return LAW
+        if kind == "vector":
+            return random.uniform(0.2, 1.0, POSITION_COMPONENTS[self.space]).tolist()
+        if kind == "scalar":
+            return float(random.uniform(0.5, 1.5))
+        if name in facts.choices:
+            return facts.choices[name][0]
+        message = f"no value of this field of {self.kind.__qualname__} is known that makes sense; give one in `values`"
+        raise MechanismError(message, name=name)
+
+
+def group_of(elements: Sequence[Any], space: str, parameters: Mapping[str, Any] | None = None) -> Group:
+    """Return the one group that joints of one kind are stacked in."""
+    named = {f"joints.{k}": e for k, e in enumerate(elements)}
+    (group,), _ = group_elements(named, parameters or {}, INDEX, POSITION_COMPONENTS[space])
+    return group
+
+
+def time_jet(order: int, batch: int = 1) -> Jet:
+    """Return the jet of time at the instant of all samples, s."""
+    return Jet.variable(jnp.full((1, batch), INSTANT), order)
+
+
+def random_motion(
+    random: np.random.Generator, space: str, order: int, batch: int = 1, degree: int | None = None
+) -> dict[str, np.ndarray]:
+    """Return coefficients of a random motion of all bodies: polynomials of time, the ground at rest.
+
+    Planar: position (2, bodies, batch) and angle (bodies, batch); spatial: position and a quaternion, not normalised.
+    """
+    degree = order if degree is None else degree
+    count, components = len(BODIES), POSITION_COMPONENTS[space]
+    shapes = {"position": (components, count, batch), "angle" if components == 2 else "quaternion": (count, batch)}
+    if components == 3:
+        shapes["quaternion"] = (4, count, batch)
+    motion = {}
+    for name, shape in shapes.items():
+        series = random.uniform(-1, 1, (degree + 1, *shape)) * 0.5 ** np.arange(degree + 1).reshape(
+            -1, *[1] * len(shape)
+        )
+        series = np.concatenate([series, np.zeros((max(order - degree, 0), *shape))])[: order + 1]
+        series[..., 0, :] = 0
+        if name == "quaternion":
+            series[0, 0] = 1.5 * np.sign(series[0, 0] + 1e-9)
+            series[0, 0, 0] = 1.0
+        motion[name] = series
+    return motion
+
+
+def pose_of(motion: Motion) -> Any:
+    """Return the pose with the given coefficients of position and angle, or position and quaternion."""
+    position = Jet(map(jnp.asarray, motion["position"]))
+    if "angle" in motion:
+        return PlanarPose.from_jets(position, Jet(map(jnp.asarray, motion["angle"])))
+    quaternion, rate = unit_quaternion_and_rate([list(c) for c in motion["quaternion"]])
+    given = {"position": position, "quaternion": quaternion}
+    return SpatialPose.from_coordinates({**given, "angular_velocity": rate} if rate is not None else given)
+
+
+def unit_quaternion_and_rate(series: Sequence[Sequence[Any]]) -> tuple[Jet, Jet | None]:
+    """Return the jets of the normalised quaternion and of the body-fixed angular velocity ``2 conj(p) p'``."""
+    q = [Jet([jnp.asarray(level[k]) for level in series]) for k in range(4)]
+    length = sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    p = [x / length for x in q]
+    whole = stack(p)
+    if whole.order == 0:
+        return whole, None
+    a, b = p, [x.differentiate() for x in p]
+    rate = [
+        2.0 * (a[0] * b[1] - a[1] * b[0] - a[2] * b[3] + a[3] * b[2]),
+        2.0 * (a[0] * b[2] - a[2] * b[0] - a[3] * b[1] + a[1] * b[3]),
+        2.0 * (a[0] * b[3] - a[3] * b[0] - a[1] * b[2] + a[2] * b[1]),
+    ]
+    return whole.dense(), stack(rate).dense()
+
+
+def coordinates_of(space: str) -> int:
+    """Return how many coordinates a body has: shifts and turns."""
+    return 3 if space == "planar" else 6
+
+
+def directions(space: str) -> np.ndarray:
+    """Return every coordinate of every moving body in turn, along a batch: shape (coordinates, bodies, batch)."""
+    c, moving = coordinates_of(space), len(BODIES) - 1
+    each = np.eye(c * moving).reshape(moving, c, moving * c)
+    return np.concatenate([np.zeros((c, 1, moving * c)), np.swapaxes(each, 0, 1)], axis=1)
+
+
+def repeated(motion: Motion, batch: int) -> dict[str, np.ndarray]:
+    """Return the motion at order zero, the same in every lane of a batch."""
+    return {name: np.repeat(series[:1], batch, axis=-1) for name, series in motion.items()}
+
+
+def with_unknowns(motion: Motion, unknowns: np.ndarray) -> Any:
+    """Return the pose that starts as the motion does, with x[k] = (r[k], phi[k]) or (r[k], w'[k-1] / k) given.
+
+    The unknowns have the shape (order + 1, c, bodies, batch); those of order zero are not used.
+    """
+    start, shifts = repeated(motion, unknowns.shape[-1]), motion["position"].shape[1]
+    position = Jet(map(jnp.asarray, [start["position"][0], *unknowns[1:, :shifts]]))
+    if "angle" in motion:
+        return PlanarPose.from_jets(position, Jet(map(jnp.asarray, [start["angle"][0], *unknowns[1:, 2]])))
+    rate = Jet(jnp.asarray(k * x) for k, x in enumerate(unknowns[:, shifts:]) if k)
+    quaternion = Jet([jnp.asarray(start["quaternion"][0])])
+    return SpatialPose.from_coordinates({"position": position, "quaternion": quaternion, "angular_velocity": rate})
+
+
+def displaced(motion: Motion, steps: np.ndarray) -> dict[str, np.ndarray]:
+    """Return coefficients of order zero with coordinates changed: shifts, turns about body axes, (c, bodies, batch)."""
+    moved = repeated(motion, steps.shape[-1])
+    shifts = moved["position"].shape[1]
+    moved["position"][0] += steps[:shifts]
+    if "angle" in moved:
+        moved["angle"][0] += steps[2]
+    else:
+        angle = np.linalg.norm(steps[3:], axis=0)
+        half = np.concatenate([np.cos(angle / 2)[None], steps[3:] * (0.5 * np.sinc(angle / 2 / np.pi))])
+        moved["quaternion"][0] = quaternion_product(moved["quaternion"][0], half)
+    return moved
+
+
+def quaternion_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Return the product of quaternions, shape (4, ...)."""
+    v = p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:], axis=0)
+    return np.concatenate([(p[0] * q[0] - (p[1:] * q[1:]).sum(axis=0))[None], v])
+
+
+def moved_together(motion: Motion, random: np.random.Generator, order: int) -> dict[str, np.ndarray]:
+    """Return the motion as seen after a common rigid motion of all bodies, itself a random function of time."""
+    turned = {name: series.copy() for name, series in motion.items()}
+    common = random_motion(random, "planar" if "angle" in motion else "spatial", order)
+    common = {name: series[..., 1:2, :] for name, series in common.items()}
+    frame, local = pose_of(common), Jet(map(jnp.asarray, motion["position"]))
+    turned["position"] = np.array(frame.point(local).dense().coefficients)
+    if "angle" in motion:
+        turned["angle"] = motion["angle"] + common["angle"]
+        return turned
+    a, b = ([Jet(jnp.asarray(level[k]) for level in s["quaternion"]) for k in range(4)] for s in (common, motion))
+    product = stack(
+        [
+            a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+            a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+            a[0] * b[2] + a[2] * b[0] + a[3] * b[1] - a[1] * b[3],
+            a[0] * b[3] + a[3] * b[0] + a[1] * b[2] - a[2] * b[1],
+        ]
+    )
+    turned["quaternion"] = np.array(product.dense().coefficients)
+    return turned

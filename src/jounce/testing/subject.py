@@ -1,0 +1,101 @@
+"""What contracts of joints are about: samples of a class, what is claimed of it, and how a contract fails."""
+
+import dataclasses
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from jounce.jet import Jet
+from jounce.mechanism.system import Group
+from jounce.testing.samples import Motion, Samples, group_of, pose_of, random_motion, time_jet
+
+
+class LeftOut(Exception):  # noqa: N818 - it is no error
+    """A contract that says nothing of a joint, and why."""
+
+
+class Broken(Exception):  # noqa: N818 - `ContractError` says of which contract, too
+    """What is wrong where a joint does not keep a contract."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Subject:
+    """A class of joints or drivers, and what is claimed of it.
+
+    Parameters
+    ----------
+    samples : Samples
+        Random joints of the class.
+    order : int
+        Up to which derivatives are looked at.
+    relative : bool
+        Whether it depends on how its bodies lie to each other, and on nothing else.
+    period : str or float or None
+        Of the last row of the residual, where that is known up to whole periods: a number, or the field that has it.
+    equations : int or None
+        How many independent equations it stands for; None for as many as its residual has rows.
+    seed : int
+        Of all random numbers.
+    positions : list
+        In which the joint holds, once they are found.
+    """
+
+    samples: Samples
+    order: int
+    relative: bool
+    period: str | float | None
+    equations: int | None
+    seed: int
+    positions: list[Any] = dataclasses.field(default_factory=list)
+
+    @property
+    def space(self) -> str:
+        """Planar or spatial."""
+        return self.samples.space
+
+    def random(self) -> np.random.Generator:
+        """Return a new source of random numbers, the same each time."""
+        return np.random.default_rng(self.seed)
+
+    def period_of(self, group: Group) -> float | None:
+        """Return the period of the last row of a residual."""
+        if isinstance(self.period, str):
+            return float(np.squeeze(getattr(group.element, self.period)))
+        return 2 * np.pi if self.period is None and self.samples.kind.periodic else self.period
+
+    @cached_property
+    def scale(self) -> float:
+        """Size that residuals have: all tolerances are in it."""
+        random = self.random()
+        group = group_of([self.samples.element(random)], self.space)
+        largest = float(np.abs(residual(group, random_start(self, random))).max())
+        return largest if largest > 10 else 1.0
+
+    def same(self, found: Any, expected: Any, tolerance: float, words: str) -> None:
+        """Raise Broken unless numbers agree within a tolerance, in sizes of the residual."""
+        found, expected = np.asarray(found, float), np.asarray(expected, float)
+        if found.shape != expected.shape:
+            raise Broken(f"{words}: shapes {found.shape} and {expected.shape}")
+        if not (np.isfinite(found) & np.isfinite(expected)).all():
+            raise Broken(f"{words}: there are values that are not finite")
+        worst = float(np.abs(found - expected).max(initial=0.0))
+        if worst > tolerance * self.scale:
+            raise Broken(f"{words}: they differ by {worst:.3g}, where {tolerance * self.scale:.3g} is allowed")
+
+
+def random_start(subject: Subject, random: np.random.Generator) -> Motion:
+    """Return a random position of all bodies."""
+    return random_motion(random, subject.space, 0)
+
+
+def residual(group: Group, motion: Motion, time: Jet | None = None) -> np.ndarray:
+    """Return coefficients of the residual on a motion, shape (order + 1, rows, instances, batch)."""
+    order = len(motion["position"]) - 1
+    time = time_jet(order, motion["position"].shape[-1]) if time is None else time
+    return evaluated(group, pose_of(motion), time)
+
+
+def evaluated(group: Group, pose: Any, time: Jet) -> np.ndarray:
+    """Return coefficients of the residual at a pose, shape (order + 1, rows, instances, batch)."""
+    return np.array(group.residual(pose, time).dense().coefficients)
