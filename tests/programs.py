@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Iterator
 
+import jounce.integrate  # noqa: F401 - the compiled functions of all rooms are there from the start
 from jounce.kinematics.compilation import Compiled
 from jounce.kinematics.side_by_side import SideBySide
 
