@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Iterator
 
+import jounce.integrate  # noqa: F401 - the compiled functions of all rooms are there from the start
 from jounce.execution.compilation import Compiled
 from jounce.execution.mapped import Mapped
 

@@ -73,6 +73,17 @@ print([*{name for name in sys.modules if name.startswith(tuple(f"{room}." for ro
     assert printed(code) == "[]\n"
 
 
+def test_types_of_joints_are_taken_before_a_user_can_take_them():
+    code = """
+import jounce as jn
+try:
+    class Mine(jn.AbstractConstraint, type="coupled", space="spatial"):
+        pass
+except jn.MechanismError as error:
+    print(error.message)"""
+    assert "that of jounce.robot.coupling.CoupledJoints already" in printed(code)
+
+
 def test_everything_can_be_imported_by_a_star():
     assert printed("from jounce import *; print(solve.__name__, planar.Revolute.__name__)") == "solve Revolute\n"
 
@@ -85,7 +96,10 @@ names = "solve load simulate Robot planar motion_profile Mechanism forces io".sp
 start, found = threading.Event(), []
 def use(name):
     start.wait()
-    found.append(getattr(jounce, name))
+    offered = getattr(jounce, name)
+    if name == "load":
+        offered("examples/four_bar.yaml")  # which imports more
+    found.append(offered)
 threads = [threading.Thread(target=use, args=(name,)) for name in names * 3]
 for thread in threads: thread.start()
 start.set()

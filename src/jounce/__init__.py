@@ -41,6 +41,8 @@ def __getattr__(name: str) -> Any:
             value = importlib.import_module(f"{__name__}.{name}")
         else:
             value = getattr(importlib.import_module(room), name)
+        if name == "AbstractConstraint":  # a joint of the user's own must not take the type of one of robots
+            from jounce import robot as robot
         if "jounce.settings" in sys.modules:
             from jounce.settings import cover_new_modules
 
@@ -50,7 +52,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*_offered(), *(name for name in globals() if name.startswith("__") or not name.startswith("_"))})
+    return sorted({*_offered(), *(name for name in globals() if name.startswith("__"))})
 
 
 @lru_cache(maxsize=1)
