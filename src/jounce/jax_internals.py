@@ -10,26 +10,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
-from jax._src import config, core
+from jax._src import config as config, core as core
 from jax.core import Tracer
 
 TRIED = (0, 10), (0, 11)  # releases of JAX
 MISSING = "equinox._module._flatten._Missing"  # in a tree, the value of a field that has none
-
-__all__ = [
-    "TRIED",
-    "config",
-    "core",
-    "description_reader",
-    "is_missing",
-    "is_tried",
-    "processes_started",
-    "runs_at_once",
-    "sizes_of_scan",
-    "trace_settings",
-    "use_file_cache",
-    "without_sources",
-]
 
 
 def is_tried() -> bool:
