@@ -61,7 +61,8 @@ def files(subject: Subject) -> None:
     mechanism = Mechanism(
         space=space,
         bodies={name: Body([0.0] * (2 if space == "planar" else 3)) for name in BODIES[1:]},
-        **{f"{role}s": {"own": element}},
+        joints={"own": element} if role == "joint" else {},
+        drivers={"own": element} if role == "driver" else {},
     )
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore", UnitWarning)  # numbers are random

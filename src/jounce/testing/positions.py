@@ -155,11 +155,12 @@ def _dimensions(subject: Subject, element: Any, motion: Motion) -> None:
     for name, kind in field_kinds(type(element)).items():
         value = getattr(element, name)
         dimension = dimension_of_field(element, name)
-        if kind not in ("scalar", "vector", "motion") or value is None:
+        stretched = dimension in ("length", "length per angle", "direction")
+        if kind not in ("scalar", "vector", "motion") or (value is None and not stretched):
             continue
-        if dimension not in ("length", "length per angle", "direction", "angle", "ratio"):
-            return  # nothing is said of a field
-        if dimension in ("length", "length per angle", "direction"):
+        if value is None or not (stretched or dimension in ("angle", "ratio")):
+            return  # nothing is said of a field, or it stands for a length that is not seen
+        if stretched:
             changed[name] = f"{STRETCH}*({value})" if kind == "motion" else (STRETCH * np.asarray(value)).tolist()
     wide = {**motion, "position": STRETCH * motion["position"]}
     gap = residual(group_of([dataclasses.replace(element, **changed)], subject.space), wide)[0]
