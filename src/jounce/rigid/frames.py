@@ -30,8 +30,8 @@ class AbstractFrame:
 
     def to_body(self, vector: Jet | Numbers | Refused) -> Float[Jet, "3 *batch"]:
         """Return the components, in the moving frame, of a vector given in the frame of the base."""
-        vector = vector if isinstance(vector, Jet) else real_or_traced("vector", vector, JounceError)
-        return stack([dot(axis, vector) for axis in self.axes])
+        given: Any = vector if isinstance(vector, Jet) else real_or_traced("vector", vector, JounceError)
+        return stack([dot(axis, given) for axis in self.axes])
 
     @property
     def attitude(self) -> Float[Jet, "3 3 *batch"]:

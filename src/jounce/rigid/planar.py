@@ -1,7 +1,7 @@
 """Planar rigid bodies on jets: poses, points and directions. Sommer 2024, equations 9-20."""
 
 import dataclasses
-from typing import overload
+from typing import Any, overload
 
 import jax
 import jax.numpy as jnp
@@ -73,8 +73,8 @@ class PlanarPose:
 
     def to_body(self, vector: Jet | Numbers | Refused) -> Float[Jet, "2 *batch"]:
         """Return the body components, shape (2, ...), of a vector given in the global frame."""
-        vector = vector if isinstance(vector, Jet) else real_or_traced("vector", vector, JounceError)
-        return self.cosine * vector - self.sine * perpendicular(vector)
+        given: Any = vector if isinstance(vector, Jet) else real_or_traced("vector", vector, JounceError)
+        return self.cosine * given - self.sine * perpendicular(given)
 
     def take(self, bodies: tuple[int, ...]) -> "PlanarPose":
         """Return the poses of the given bodies, by index; body 0 is the ground, which never moves."""

@@ -167,10 +167,10 @@ def product_of_exponentials(screws: Sequence[ScrewAxis], coordinates: JetLike, h
     (q,), finish = uniform(coordinates=coordinates)
     transforms = [screw.transform(part) for screw, part in zip(screws, q, strict=True)]
     if home is not None:
-        home = real_or_traced("home", home, JounceError)
-        if np.shape(home) != (4, 4):
-            raise JounceError("a transform needs 4 rows and 4 columns", name="home", value=f"shape {np.shape(home)}")
-        start = jnp.reshape(jnp.asarray(home, float), (4, 4, *[1] * (len(shape) - 1)))
+        last: Any = real_or_traced("home", home, JounceError)
+        if np.shape(last) != (4, 4):
+            raise JounceError("a transform needs 4 rows and 4 columns", name="home", value=f"shape {np.shape(last)}")
+        start = jnp.reshape(jnp.asarray(last, float), (4, 4, *[1] * (len(shape) - 1)))
         transforms.append(Jet.constant(start, q.order))
     return finish(reduce(matmul, transforms))
 
