@@ -135,6 +135,22 @@ def test_peaks_of_a_simulation():
     assert -rate.minimum == pytest.approx(np.sqrt(2 * 9.81 * 2.0 / 2.5), rel=1e-8)  # energy, at the lowest point
 
 
+@pytest.mark.slow
+def test_knots_of_laws_count_in_simulations_backward():
+    driven = jn.Mechanism(
+        space="planar",
+        bodies={name: jn.Body([k, 0], mass=1.0, inertia=0.1) for k, name in enumerate(("rod", "bob"))},
+        joints={
+            "O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0]),
+            "A": jn.planar.Revolute(("rod", "bob"), [1, 0], [0, 0]),
+        },
+        drivers={"motor": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", jn.TrapezoidalMotion())},
+        outputs={"angle": jn.AngleOutput("rod")},
+    )
+    _, rate = peaks(jn.simulate(driven, [1.0, 0.6, 0.4, 0.0], order=1), refine=False)
+    assert rate.maximum == pytest.approx(1.75, abs=1e-9)  # from 3/7 to 4/7 of the duration, between the instants
+
+
 def test_peaks_at_the_instants_only(run, tmp_path):
     time = np.linspace(0.0, 4.0, 8)
     found = peaks(jn.solve(CRANK, time, order=2), refine=False)

@@ -1,6 +1,11 @@
 """Where the laws of a mechanism jump or bend: no series goes on beyond, and peaks may be limits from one side."""
 
+from collections.abc import Iterable
+from typing import Any
+
+import jax
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.mechanism.held_outputs import with_outputs_held
@@ -38,6 +43,31 @@ def breaks_of_laws(mechanism: Mechanism, first: float, last: float, order: int) 
 def laws_may_break(mechanism: Mechanism) -> bool:
     """Tell whether a law of a mechanism may jump or bend anywhere, whatever the values of its parameters."""
     return any(map(may_break, laws_of(mechanism)))
+
+
+@under_own_settings
+def breaks_depend_on(mechanism: Mechanism, names: Iterable[str]) -> bool:
+    """Tell whether where the laws of a mechanism jump or bend may depend on some of its parameters.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> press = jn.load("examples/servo_press.yaml")
+    >>> breaks_depend_on(press, ["rod"]), breaks_depend_on(press, ["forming"])
+    (False, True)
+    """
+    values = {name: float(mechanism.parameter_values[name]) for name in names}
+    numbers = []
+
+    def resolved(given: dict[str, Any]) -> dict[str, Any]:
+        numbers.extend(jax.tree.leaves([law for law in laws_of(mechanism.with_parameters(**given)) if may_break(law)]))
+        return given
+
+    try:
+        jax.eval_shape(resolved, values)
+    except Exception:  # noqa: BLE001 - a law that needs numbers in the place of parameters
+        return True
+    return any(isinstance(number, Tracer) for number in numbers)
 
 
 def laws_of(mechanism: Mechanism) -> list[AbstractMotion]:

@@ -292,7 +292,7 @@ def _beside(motion: Motion | Stretches) -> tuple[Times, Times, Curves]:
     """Return where the laws of a motion jump or bend, at both sides of each, these sides, and the curves there."""
     if not len(motion.time):
         return np.zeros(0), np.zeros(0), np.zeros((0, 0))
-    first, last = float(motion.time[0]), float(motion.time[-1])
+    first, last = sorted((float(motion.time[0]), float(motion.time[-1])))  # a simulation may go backward
     outputs = motion.mechanism.outputs.values()
     lost = max((output.lost_orders for output in outputs), default=0)
     breaks = breaks_of_laws(motion.mechanism, first, last, motion.order + lost)
