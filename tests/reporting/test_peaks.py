@@ -144,7 +144,7 @@ def test_knots_of_laws_count_in_simulations_backward():
             "O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0]),
             "A": jn.planar.Revolute(("rod", "bob"), [1, 0], [0, 0]),
         },
-        drivers={"motor": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", jn.TrapezoidalMotion())},
+        drivers={"motor": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", jn.TrapezoidalMotion(0.0, 1.0, 1.0))},
         outputs={"angle": jn.AngleOutput("rod")},
     )
     _, rate = peaks(jn.simulate(driven, [1.0, 0.6, 0.4, 0.0], order=1), refine=False)
