@@ -24,6 +24,8 @@ import numpy as np
 from jax.core import Tracer
 from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal, jaxpr_as_fun
 
+from jounce.settings import under_own_settings
+
 KEPT = 1000  # programs at most, of functions read before
 _LIBRARIES = tuple(Path(str(module.__file__)).parent.as_posix() + "/" for module in (jax, eqx))
 _CALLERS = (_LIBRARIES[1], _LIBRARIES[0] + "_src/numpy/ufunc_api.py")  # which compile functions of users as their own
@@ -97,6 +99,7 @@ class ReadOff(NamedTuple):
     result: Any
 
 
+@under_own_settings
 def read_off(function: Callable[..., Any], *examples: Any) -> ReadOff:
     """Return what a function of arrays computes.
 
