@@ -135,6 +135,12 @@ def motion_doors() -> dict[str, tuple[Any, Callable[[float], Any]]]:
     def compiled(time: Any) -> Any:
         return cell[0] * jnp.sin(time)
 
+    @eqx.filter_jit
+    def compiled_by_equinox(time: Any) -> Any:
+        return cell[0] * jnp.sin(time)
+
+    universal = jnp.frompyfunc(of_list, 1, 1)  # JAX compiles it when it is called
+
     def table(time: Any) -> Any:  # an array that is captured
         return jnp.interp(time, np.array([0.0, 0.5, 2.0]), np.sin([0.0, 0.5, 2.0]) * cell[0])
 
@@ -152,6 +158,8 @@ def motion_doors() -> dict[str, tuple[Any, Callable[[float], Any]]]:
         "law of a function": (jn.FunctionMotion(of_list), set_list),
         "branch": (of_branch, set_wave),
         "compiled by its user": (compiled, set_list),
+        "compiled by Equinox": (compiled_by_equinox, set_list),
+        "universal function": (lambda t: universal(t), set_list),
         "table": (table, set_list),
         "part of a law": (jn.PiecewiseMotion([jn.FunctionMotion(of_list), "t"], until=[1.0]), set_list),
         "leader": (jn.FollowingMotion(jn.ExpressionMotion("t"), jn.FunctionMotion(of_list)), set_list),

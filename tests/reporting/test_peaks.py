@@ -158,6 +158,41 @@ def test_peaks_of_a_simulation():
     assert -rate.minimum == pytest.approx(np.sqrt(2 * 9.81 * 2.0 / 2.5), rel=1e-8)  # energy, at the lowest point
 
 
+def test_a_motion_keeps_its_peaks_when_the_code_of_its_law_changes():
+    gain = [1.0]
+    crank = jn.Mechanism(
+        space="planar",
+        bodies={"rod": jn.Body([0, 0])},
+        joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
+        drivers={"motor": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", lambda t: gain[0] * t * (1 - t))},
+        outputs={"angle": jn.AngleOutput("rod")},
+    )
+    time = [0.0, 0.2, 0.6, 1.0]
+    (before,) = peaks(jn.solve(crank, time, order=0))
+    later = jn.solve(crank, time, order=0)
+    gain[0] = 3.0
+    (after,) = peaks(later)
+    assert before.maximum == pytest.approx(0.25, abs=1e-12)
+    assert after.maximum == pytest.approx(0.24, abs=1e-12)  # at its own instants
+
+
+@pytest.mark.slow
+def test_knots_of_laws_count_in_simulations_backward():
+    law = jn.TrapezoidalMotion(0.0, 1.0, duration=1.0)
+    driven = jn.Mechanism(
+        space="planar",
+        bodies={name: jn.Body([k, 0], mass=1.0, inertia=0.1) for k, name in enumerate(("rod", "bob"))},
+        joints={
+            "O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0]),
+            "A": jn.planar.Revolute(("rod", "bob"), [1, 0], [0, 0]),
+        },
+        drivers={"motor": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", law)},
+        outputs={"angle": jn.AngleOutput("rod")},
+    )
+    _, rate, *_ = peaks(jn.simulate(driven, [1.0, 0.6, 0.4, 0.0], order=3), refine=False)
+    assert rate.maximum == pytest.approx(1.75, abs=1e-9)  # from 3/7 to 4/7 of the duration, between the instants
+
+
 def test_peaks_at_the_instants_only(run, tmp_path):
     time = np.linspace(0.0, 4.0, 8)
     found = peaks(jn.solve(CRANK, time, order=2), refine=False)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.trajectory import breaks
 from jounce.trajectory.breaks import at_breaks, both_sides, law_breaks, may_break, with_sides
 
 BENT = jn.PiecewiseMotion(["t", "2*t - 0.25"], until=[0.25])
@@ -41,12 +42,21 @@ def test_those_of_several_laws_are_told_once():
     assert law_breaks(laws, 0.0, 1.0, 4).tolist() == pytest.approx([0.5], abs=1e-11)
 
 
+def test_a_leader_of_several_laws_is_looked_at_once(monkeypatch):
+    looked, seen = [], breaks._seen
+    monkeypatch.setattr(breaks, "_seen", lambda law, *x: looked.append(law) or seen(law, *x))
+    leader = jn.FunctionMotion(lambda t: abs(t - 0.7))
+    laws = [jn.FollowingMotion(own, leader) for own in (expression("sin(t)"), jn.CycloidalMotion(0.0, 1.0))]
+    assert law_breaks(laws, 0.0, 0.9, 2).tolist() == pytest.approx([0.7], abs=1e-11)
+    assert looked == [leader]
+
+
 @pytest.mark.parametrize("first, last", [(0.0, 1.0), (-3.0, 1e4), (1e6, 1e6 + 1.0)])
 def test_sides_are_beside_and_within(first, last):
-    breaks = np.array([first, (first + last) / 2, last])
-    sides, which = both_sides(breaks, first, last)
+    between = np.array([first, (first + last) / 2, last])
+    sides, which = both_sides(between, first, last)
     assert which.tolist() == [0, 1, 1, 2]
-    assert first < sides[0] < sides[1] < breaks[1] < sides[2] < sides[3] < last
-    np.testing.assert_allclose(sides, breaks[which], rtol=1e-14, atol=1e-10 * (last - first))
-    np.testing.assert_array_equal(at_breaks(sides, breaks, first, last), breaks[which])
-    assert len(with_sides(np.array([first, last]), breaks)) == 6
+    assert first < sides[0] < sides[1] < between[1] < sides[2] < sides[3] < last
+    np.testing.assert_allclose(sides, between[which], rtol=1e-14, atol=1e-10 * (last - first))
+    np.testing.assert_array_equal(at_breaks(sides, between, first, last), between[which])
+    assert len(with_sides(np.array([first, last]), between)) == 6

@@ -24,8 +24,11 @@ import numpy as np
 from jax.core import Tracer
 from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal, jaxpr_as_fun
 
+from jounce.settings import under_own_settings
+
 KEPT = 1000  # programs at most, of functions read before
 _LIBRARIES = tuple(Path(str(module.__file__)).parent.as_posix() + "/" for module in (jax, eqx))
+_CALLERS = (_LIBRARIES[1], _LIBRARIES[0] + "_src/numpy/ufunc_api.py")  # which compile functions of users as their own
 _CALLS = ("jit", "pjit")
 _BY_IDENTITY = frozenset("cond scan while".split())  # whose functions JAX traces once for each object
 _OF_ARRAYS = ("_searchsorted_scan_impl",)  # functions of JAX with loops that are no user's
@@ -96,6 +99,7 @@ class ReadOff(NamedTuple):
     result: Any
 
 
+@under_own_settings
 def read_off(function: Callable[..., Any], *examples: Any) -> ReadOff:
     """Return what a function of arrays computes.
 
@@ -177,7 +181,8 @@ def _may_be_old(jaxpr: Jaxpr, within: str = "") -> bool:
         if name in _BY_IDENTITY and within not in _OF_ARRAYS:
             return True
         for inner in _inner(equation):
-            if not _is_of_libraries(inner) or _may_be_old(inner, str(equation.params.get("name", ""))):
+            known = _is_of_libraries(inner) and not _origin(inner).startswith(_CALLERS)
+            if not known or _may_be_old(inner, str(equation.params.get("name", ""))):
                 return True
     return False
 
@@ -190,8 +195,12 @@ def _inner(equation: JaxprEqn) -> Iterator[Jaxpr]:
 
 
 def _is_of_libraries(jaxpr: Jaxpr) -> bool:
-    origin = getattr(jaxpr.debug_info, "func_filename", None)
-    return origin is not None and Path(origin).as_posix().startswith(_LIBRARIES)
+    return _origin(jaxpr).startswith(_LIBRARIES)
+
+
+def _origin(jaxpr: Jaxpr) -> str:
+    """Return the file of the function that a program was traced from; nothing if it is not known."""
+    return Path(getattr(jaxpr.debug_info, "func_filename", None) or "").as_posix()
 
 
 class Pass(abc.ABC):

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError
 from jounce.mechanism import Mechanism
-from jounce.mechanism.law_breaks import breaks_of_laws, laws_may_break
+from jounce.mechanism.law_breaks import breaks_depend_on, breaks_of_laws, laws_may_break
 from jounce.settings import under_own_settings
 from jounce.trajectory.breaks import both_sides
 
@@ -42,8 +42,11 @@ def sides_of_designs(
     A design with fewer of them than others has the first instant in their place.
     """
     count = len(next(iter(parameters.values())))
+    different = 0
+    if laws_may_break(mechanism):
+        different = count if breaks_depend_on(mechanism, parameters) else 1
     found = []
-    for k in range(count if laws_may_break(mechanism) else 0):
+    for k in range(different):
         try:
             design = mechanism.with_parameters(**{name: float(values[k]) for name, values in parameters.items()})
             breaks = breaks_of_laws(design, first, last, order)
@@ -53,6 +56,6 @@ def sides_of_designs(
         found.append((breaks[which], sides))
     most = max((len(sides) for _, sides in found), default=0)
     both = np.full((2, count, most), first)
-    for k, pair in enumerate(found):
+    for k, pair in enumerate(found * (count // max(different, 1))):
         both[:, k, : len(pair[0])] = pair
     return both[0], both[1]

@@ -1,9 +1,11 @@
 """Where the laws of a mechanism jump or bend: no series goes on beyond, and peaks may be limits from one side."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
+import jax
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.constraints.base import field_kinds
@@ -12,9 +14,9 @@ from jounce.mechanism.held_outputs import with_outputs_held
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.resolve import resolve_motion
 from jounce.settings import under_own_settings
-from jounce.trajectory import Expression
 from jounce.trajectory.breaks import apart, law_breaks, may_break
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion
+from jounce.units.expression import Expression
 
 ANYWHERE = 0.7310585786300049  # of a displacement and its rate, where laws of forces are looked at for jumps in time
 OF_FORCES = 2  # derivatives by which forces are ahead of the motion
@@ -57,9 +59,33 @@ def breaks_of_laws(
 @under_own_settings
 def laws_may_break(mechanism: Mechanism) -> bool:
     """Tell whether a law of a mechanism may jump or bend anywhere, whatever the values of its parameters."""
-    return any(map(may_break, laws_of(mechanism))) or (
-        _shows_forces(mechanism) and any(map(may_break, laws_of_forces(mechanism)))
-    )
+    return any(map(may_break, _laws_that_count(mechanism)))
+
+
+@under_own_settings
+def breaks_depend_on(mechanism: Mechanism, names: Iterable[str]) -> bool:
+    """Tell whether where the laws of a mechanism jump or bend may depend on some of its parameters.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> press = jn.load("examples/servo_press.yaml")
+    >>> breaks_depend_on(press, ["rod"]), breaks_depend_on(press, ["forming"])
+    (False, True)
+    """
+    values = {name: float(mechanism.parameter_values[name]) for name in names}
+    numbers = []
+
+    def resolved(given: dict[str, Any]) -> dict[str, Any]:
+        laws = _laws_that_count(mechanism.with_parameters(**given))
+        numbers.extend(jax.tree.leaves([law for law in laws if may_break(law)]))
+        return given
+
+    try:
+        jax.eval_shape(resolved, values)
+    except Exception:  # noqa: BLE001 - a law that needs numbers in the place of parameters
+        return True
+    return any(isinstance(number, Tracer) for number in numbers)
 
 
 def laws_of(mechanism: Mechanism) -> list[AbstractMotion]:
@@ -76,6 +102,10 @@ def laws_of_forces(mechanism: Mechanism) -> list[AbstractMotion]:
         fields = [name for name, kind in field_kinds(type(force)).items() if kind in ("law", "laws")]
         found += [law for name in fields for law in _in_time(getattr(force, name), force, mechanism.parameter_values)]
     return found
+
+
+def _laws_that_count(mechanism: Mechanism) -> list[AbstractMotion]:
+    return laws_of(mechanism) + (laws_of_forces(mechanism) if _shows_forces(mechanism) else [])
 
 
 def _shows_forces(mechanism: Mechanism) -> bool:

@@ -10,6 +10,7 @@ from jounce.dynamics.highest import highest_of, local_heights
 Times = Float[np.ndarray, " time"]
 Curves = Float[np.ndarray, "time curves"]
 Peaks = Float[np.ndarray, "peaks curves"]
+ALIKE = 1e-6  # of the largest value of a curve
 
 
 class Highest:
@@ -76,3 +77,10 @@ class Highest:
             order = np.argsort(-both[0], axis=0, kind="stable")[: self._count]  # of equal ones the earlier
             found = [np.take_along_axis(x, order, axis=0) for x in both]
         return found
+
+
+def alike(first: Curves, second: Curves) -> bool:
+    """Tell whether two samples of the same curves differ by no more than rounding and solving make of them."""
+    size = np.max(np.abs(second), axis=0, initial=0.0, where=np.isfinite(second))
+    with np.errstate(invalid="ignore"):  # where both are unknown
+        return bool(np.all((first == second) | (np.abs(first - second) <= ALIKE * size)))

@@ -15,7 +15,8 @@ from jounce.integrate import Simulation
 from jounce.kinematics import Motion, Stretches, solve
 from jounce.mechanism import AbstractQuantity
 from jounce.mechanism.law_breaks import breaks_of_laws
-from jounce.reporting.maxima import Curves, Highest, Peaks, Times
+from jounce.mechanism.user_code import holds_users_code
+from jounce.reporting.maxima import Curves, Highest, Peaks, Times, alike
 from jounce.trajectory.breaks import both_sides
 from jounce.units.shown_units import ShownUnits, derivative_unit
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 NAMES = ("position", "velocity", "acceleration", "jerk", "jounce")
 LEAST = 200  # instants that are looked at, at least
 PEAKS, POINTS, ROUNDS = 2, 7, 3  # highest maxima of each curve, instants around each, and how often these close in
-CHUNK = 1000  # instants solved together
+CHUNK, COMPARED = 1000, 50  # instants solved together, and compared
 ROUNDING = 1e-9
 SMALLEST = 1e-15  # share of the size of an output
 _Around = Float[np.ndarray, "points peaks curves"]
@@ -133,7 +134,7 @@ def peaks(motion: Motion | Stretches, *, refine: bool = True) -> list[Peak]:
     refine : bool, default True
         Find peaks between its instants too: the motion is solved at more instants where it has few, and then, as often
         as it takes, around the highest of them. Otherwise only its own instants count, and both sides of the instants
-        at which its laws jump or bend, which count always.
+        at which its laws jump or bend. Where users' code has changed since it was solved, only its own ones do.
 
     Returns
     -------
@@ -268,10 +269,11 @@ def _extremes(
     """
     times, sizes = highest.times.copy(), highest.sizes.copy()
     rounding = ROUNDING * highest.scales
+    changed = _has_changed(motion)
     breaks, sides, beside = _beside(motion)
-    if len(sides):
+    if len(sides) and not changed:
         _keep_best(times, sizes, 0 * rounding, np.repeat(breaks[:, None], len(sizes), axis=1), beside)
-    if refine and len(motion.time) > 1:
+    if refine and len(motion.time) > 1 and not changed:
         low, high = _around_maxima(motion, highest)
         share = np.linspace(0.0, 1.0, POINTS)[:, None, None]
         near = []
@@ -288,11 +290,21 @@ def _extremes(
     return np.where(solved, times, np.nan), np.where(solved, sizes, np.nan)
 
 
+def _has_changed(motion: Motion | Stretches) -> bool:
+    """Tell whether code of users computes something else by now than when the motion was solved."""
+    elements = (element for part in motion.mechanism.elements.values() for element in part.values())
+    if type(motion) is not Motion or not len(motion.time) or not holds_users_code(elements):
+        return False
+    places = np.unique(np.linspace(0, len(motion.time) - 1, COMPARED).astype(int))
+    now, then = _at(motion, motion.time[places]), _curves(motion)[places]
+    return not alike(now, then)
+
+
 def _beside(motion: Motion | Stretches) -> tuple[Times, Times, Curves]:
     """Return where the laws of a motion jump or bend, at both sides of each, these sides, and the curves there."""
     if not len(motion.time):
         return np.zeros(0), np.zeros(0), np.zeros((0, 0))
-    first, last = float(motion.time[0]), float(motion.time[-1])
+    first, last = sorted((float(motion.time[0]), float(motion.time[-1])))  # a simulation may go backward
     outputs = motion.mechanism.outputs.values()
     lost = max((output.lost_orders for output in outputs), default=0)
     free = isinstance(motion, Simulation)

@@ -4,7 +4,7 @@ import abc
 import dataclasses
 import functools
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -40,6 +40,7 @@ from jounce.trajectory.joint_trajectory import JointTrajectory
 from jounce.units.values import parse_value
 
 Designs = Mapping[str, Float[np.ndarray, " design"]]
+MORE_INSTANTS = 4  # times those asked for, at most, at which designs are simulated side by side
 
 
 @dataclasses.dataclass(frozen=True)
@@ -209,10 +210,20 @@ class Simulations(_OfMechanism):
     def histories(self, designs: Designs, threads: int) -> Histories:
         """Simulate some designs side by side; their threads are as many as the machine has cores."""
         del threads
-        settings = {"method": self.method, "tolerance": self.tolerance, "longest_step": self.longest_step}
-        count = len(next(iter(designs.values())))
         first, last = sorted((float(self.instants[0]), float(self.instants[-1])))
         breaks, beside = sides_of_designs(self.mechanism, designs, first, last, self.order)
+        parts = [
+            self._simulated({name: values[lot] for name, values in designs.items()}, beside[lot])
+            for lot in _lots(beside, MORE_INSTANTS * len(self.instants))
+        ]
+        values, others, status = zip(*parts, strict=True)
+        return Histories(_joined(values), np.concatenate(status), sides=Sides(breaks, _joined(others)))
+
+    def _simulated(
+        self, designs: Designs, beside: Float[np.ndarray, "design side"]
+    ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], Int[np.ndarray, "design time"]]:
+        """Return outputs at the instants and beside the breaks of laws, and the status at the instants."""
+        settings = {"method": self.method, "tolerance": self.tolerance, "longest_step": self.longest_step}
         every, forward = np.union1d(self.instants, beside), self.instants[0] <= self.instants[-1]
         grid = every if forward else every[::-1]
         found = simulate_batch(self.mechanism, designs, grid, self.order, **settings)
@@ -224,9 +235,23 @@ class Simulations(_OfMechanism):
         unknown = found.status != Status.OK
         for array in whole.values():
             array[unknown] = np.nan
-        own = np.arange(count)[:, None]
-        sides = Sides(breaks, {name: array[own, there] for name, array in whole.items()})
-        return Histories({name: array[:, here] for name, array in whole.items()}, found.status[:, here], sides=sides)
+        others = {name: array[np.arange(len(beside))[:, None], there] for name, array in whole.items()}
+        return {name: array[:, here] for name, array in whole.items()}, others, found.status[:, here]
+
+
+def _lots(beside: Float[np.ndarray, "design side"], most: int) -> Iterator[slice]:
+    """Yield designs that are simulated together, since each is at the instants of all: these are not many."""
+    start, known = 0, set()
+    for k, own in enumerate(beside.tolist()):
+        known.update(own)
+        if k > start and len(known) > most:
+            yield slice(start, k)
+            start, known = k, set(own)
+    yield slice(start, len(beside))
+
+
+def _joined(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order: int) -> tuple[Quantity, ...]:

@@ -49,7 +49,8 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
     [0.1, 0.25, 0.75]
     """
     found = [np.zeros(0)]
-    for law in _with_leaders(laws) if last > first else ():
+    every = {id(law): law for law in _with_leaders(laws)}.values()  # several laws may have one leader
+    for law in every if last > first else ():
         level = min(order + 1, HIGHEST)
         instants, jumps, _ = known_jumps(law, first, last, level)
         jump, bend = np.any(jumps[:-1] != 0, axis=0), jumps[-1] != 0
@@ -124,9 +125,12 @@ def may_break(law: AbstractMotion) -> bool:
 
 
 def _may_bend(law: Any) -> bool:
-    """Tell whether a law may have a kink that is not known: one that is no spline, profile or smooth expression."""
+    """Tell whether a law may have a kink that is not known: one that is no spline, profile or smooth expression.
+
+    Kinks of its leader are looked for there.
+    """
     if parts := getattr(law, "parts", ()):
-        return any(map(_may_bend, parts))
+        return any(map(_may_bend, parts[:1] if isinstance(law, FollowingMotion) else parts))
     if isinstance(law, ExpressionMotion):
         used: set[str] = set()
         law.expression.folded(lambda _: None, lambda _: None, lambda word, _: used.add(word))

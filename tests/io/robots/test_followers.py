@@ -4,7 +4,10 @@ import pytest
 
 import jounce as jn
 from jounce.errors import RobotFileError
+from jounce.io.robots import followers
+from jounce.io.robots.faults import Faults
 from jounce.io.robots.loader import load_robot
+from jounce.robot.model import has_room
 
 FULL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 KEPT = {  # range of the leader; of each follower: range, multiplier, offset; what the leader keeps
@@ -135,3 +138,24 @@ def test_a_leader_that_is_held_in_one_place_by_its_own_range():
     joints.append(jn.Joint("f0", "base", "b", "prismatic", limits=limits, mimic=jn.Mimic("lead")))
     robot = jn.Robot("gripper", [jn.Link("base"), *(jn.Link(name, jn.Inertia(1.0)) for name in "ab")], joints)
     assert (robot.limits["lead"].lower, robot.limits["lead"].upper) == (0.4, 0.4)
+
+
+@pytest.mark.parametrize("against", [False, True])
+def test_ranges_are_compared_in_proportion_to_the_joints(monkeypatch, against):
+    seen = []
+    monkeypatch.setattr(followers, "has_room", lambda limits, some: seen.extend(some) or has_room(limits, some))
+    left_out = []
+    for count in (50, 200):
+        rest = [
+            jn.Joint(f"f{k}", "b", f"l{k}", limits=jn.Limits(lower=0.2, upper=1.0), mimic=jn.Mimic("lead"))
+            for k in range(count)
+        ]
+        turned = jn.Joint("turned", "b", "t", limits=jn.Limits(lower=-1.0, upper=-0.2), mimic=jn.Mimic("lead"))
+        alone = [jn.Joint(f"a{k}", "b", f"c{k}") for k in range(count)]
+        lead = jn.Joint("lead", "b", "l", limits=jn.Limits(lower=-1.0, upper=1.0))
+        seen.clear()
+        faults, every = Faults("robot.urdf"), [lead, *rest, *alone, *([turned] if against else [])]
+        followers.with_room(every, faults, lambda error: RobotFileError(error.message))
+        left_out.append(len(faults.unread.get(followers.NO_ROOM, ())))
+        assert len(seen) <= 12 * count  # each with itself, with the tightest, and all together
+    assert left_out == ([51, 201] if against else [0, 0])

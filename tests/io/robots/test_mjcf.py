@@ -511,6 +511,23 @@ def test_repeated_bodies_are_counted_before_they_are_made(tmp_path, count, withi
         load_robot(path)
 
 
+@pytest.mark.parametrize("repeated", [False, True])
+def test_bodies_of_files_within_files_are_counted(tmp_path, repeated):
+    frames = "".join(f'<frame><attach model="m" prefix="p{k}"/></frame>' for k in range(1 if repeated else 3))
+    body = '<body><joint/><geom size="0.1"/></body>'
+    leaf = f'<replicate count="1500" offset="1 0 0">{body}</replicate>' if repeated else body
+    if repeated:  # by one file, and by the one that attaches it
+        frames = f'<replicate count="2" offset="1 0 0">{frames}</replicate>'
+    text = "<mujoco>{}<worldbody>{}</worldbody></mujoco>"
+    depth = 1 if repeated else 7  # 3**7 bodies
+    for k in range(depth):
+        path = tmp_path / f"level{k}.xml"
+        path.write_text(text.format(f'<asset><model name="m" file="level{k + 1}.xml"/></asset>', frames))
+    (tmp_path / f"level{depth}.xml").write_text(text.format("", leaf))
+    with pytest.raises(RobotFileError, match="more than 2000 bodies"):
+        load_robot(tmp_path / "level0.xml")
+
+
 def test_a_few_repeated_bodies_are_a_robot(tmp_path):
     text = '<replicate count="3" offset="0 1 0"><body name="b"><joint/><geom size="0.1"/></body></replicate>'
     assert len(load_robot(written(tmp_path, text)).joint_names) == 3

@@ -38,18 +38,26 @@ def with_room(
         If such a range is an error.
     """
     found = {joint.name: joint for joint in joints}
+    following: dict[str, list[Joint]] = {}
+    for joint in joints:
+        ranged = (joint.limits.lower, joint.limits.upper) != (None, None)
+        if joint.moving and joint.mimic is not None and joint.mimic.multiplier and ranged:
+            following.setdefault(joint.mimic.joint, []).append(joint)
     for leader in joints:
-        followers = [joint for joint in joints if _follows(joint, leader)]
-        if not followers or leader.name in held:
+        followers = following.get(leader.name, [])
+        if not followers or leader.name in held or has_room(leader.limits, followers):
             continue
-        bad = [joint for joint in followers if not has_room(leader.limits, [joint])]
-        rest = [joint for joint in followers if joint not in bad]
+        bad = {joint.name for joint in followers if not has_room(leader.limits, [joint])}
+        rest = [joint for joint in followers if joint.name not in bad]
+        narrowing = _narrowing(leader, rest)
         for joint in followers:
-            beside = [x.name for x in rest if x is not joint and not has_room(leader.limits, [joint, x])]
-            if not (joint in bad or beside):
+            suits = joint.name not in bad
+            others = [x for x in narrowing if x is not joint] if suits else []
+            beside = [x.name for x in others if not has_room(leader.limits, [joint, x])]
+            if suits and not beside:
                 continue
             own, (low, high) = ranges_at_leader(leader.limits, [joint])
-            against = f" beside {', '.join(beside)}" if joint in rest else ""
+            against = f" beside {', '.join(beside)}" if beside else ""
             message = (
                 f"its range leaves {leader.name}, which it follows, {low:.6g} to {high:.6g} of "
                 f"{own[0]:.6g} to {own[1]:.6g}{against}: no room to move; correct the limits or the multiplier, "
@@ -63,7 +71,12 @@ def with_room(
     return list(found.values())
 
 
-def _follows(joint: Joint, leader: Joint) -> bool:
-    """Whether a joint follows another, with a range of its own."""
-    ranged = (joint.limits.lower, joint.limits.upper) != (None, None)
-    return joint.moving and joint.mimic is not None and joint.mimic.joint == leader.name and ranged
+def _narrowing(leader: Joint, followers: Sequence[Joint]) -> list[Joint]:
+    """Return the two followers whose ranges begin last at their leader, and the two whose ranges end first there.
+
+    If a joint has no room beside another follower, it has none beside one of these.
+    """
+    ranges = [ranges_at_leader(leader.limits, [joint])[1] for joint in followers]
+    places = range(len(followers))
+    ends = (sorted(places, key=lambda k: -ranges[k][0])[:2], sorted(places, key=lambda k: ranges[k][1])[:2])
+    return [followers[k] for k in sorted({*ends[0], *ends[1]})]

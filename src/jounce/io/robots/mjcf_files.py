@@ -17,6 +17,8 @@ from jounce.io.robots.xml_elements import Element, read_markup
 
 MOST_BODIES = 2000
 """Of a robot, with those that are repeated; MuJoCo's own time grows with their square."""
+MOST_NESTED = 50
+"""Files within files."""
 
 
 @contextmanager
@@ -61,35 +63,67 @@ def included(root: Element, allow: Iterable[str | PathLike[str]] = ()) -> list[E
 
 
 def check_copies(parts: Iterable[Element]) -> None:
-    """Refuse more bodies than a robot has, which few lines of an MJCF file can ask for, before MuJoCo makes them.
+    """Refuse more bodies than a robot has, which few lines of MJCF files can ask for, before MuJoCo makes them.
 
     Raises
     ------
     RobotFileError
-        Repeated parts hold too many bodies together.
+        Repeated, attached and included parts hold too many bodies together.
     """
-    roots = list(parts)
-    models = {Path(root.path).name: root for root in roots}
-    total = 0
-    for root in roots:
-        named = {element.attributes.get("name"): element for element in root.walk() if element.tag == "model"}
+    copies = _Copies(list(parts))
+    for root in copies.roots:
+        copies.bodies(root)
+
+
+class _Copies:
+    """Counts the bodies that files stand for, each file once however often it is attached or included."""
+
+    def __init__(self, roots: list[Element]):
+        self.roots = roots
+        self._files: dict[str, list[Element]] = {}  # by their names without folders
+        for root in roots:
+            self._files.setdefault(Path(root.path).name, []).append(root)
+        self._models: dict[str | None, list[Element]] = {}
+        for model in (element for root in roots for element in root.walk() if element.tag == "model"):
+            for root in self._files.get(_file_of(model), []):
+                name = model.attributes.get("name", root.attributes.get("model"))
+                self._models.setdefault(name, []).append(root)
+        self._counts: dict[int, int] = {}
+
+    def bodies(self, root: Element, depth: int = 0) -> int:
+        """Return how many bodies a file stands for, with all that it repeats, attaches and includes."""
+        if id(root) in self._counts:
+            return self._counts[id(root)]
+        if depth > MOST_NESTED:
+            raise root.error(f"files attach or include one another more than {MOST_NESTED} deep")
+        self._counts[id(root)] = total = 0  # a file within itself is for MuJoCo to refuse
         waiting = [(root, 1)]
         while waiting:
             element, copies = waiting.pop()
             if element.tag == "replicate":
                 copies *= max(1, int(element.number("count", "replicate", "count")))
-            elif element.tag in ("body", "attach"):
-                total += copies * _bodies(element, named, models)
+            total += copies * self._held(element, depth)
             if total > MOST_BODIES or copies > MOST_BODIES:
-                raise element.error(f"more than {MOST_BODIES} bodies with all that is repeated", "replicate")
+                message = f"more than {MOST_BODIES} bodies or copies with all that is repeated"
+                raise element.error(message, "replicate")
             waiting.extend((child, copies) for child in element.children)
+        self._counts[id(root)] = total
+        return total
+
+    def _held(self, element: Element, depth: int) -> int:
+        """Return how many bodies an element is or brings from other files, those of its children left out."""
+        if element.tag == "attach":
+            others = self._models.get(element.attributes.get("model"), [])
+        elif element.tag == "include":
+            others = self._files.get(_file_of(element), [])
+        else:
+            return element.tag == "body"
+        return max((self.bodies(other, depth + 1) for other in others), default=0)
 
 
-def _bodies(element: Element, named: dict[str | None, Element], models: dict[str, Element]) -> int:
-    """Return how many bodies an element stands for: those of the model that it attaches, else itself."""
-    model = named.get(element.attributes.get("model"))
-    root = None if model is None else models.get(Path(model.attributes.get("file", "")).name)
-    return 1 if element.tag == "body" or root is None else sum(part.tag == "body" for part in root.walk())
+def _file_of(element: Element) -> str:
+    """Return the name of the file of an element, without folders."""
+    return Path(element.attributes.get("file", "")).name
 
 
 def _named(

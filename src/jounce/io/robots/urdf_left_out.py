@@ -87,6 +87,7 @@ def rotors(root: Element, faults: Faults) -> dict[str, float]:
     several joints or actuators is left out.
     """
     found: dict[str, float] = {}
+    known = dict.fromkeys(element.attributes.get("name", "") for element in root.every("joint"))
     for transmission in root.every("transmission"):
         actuators, joints = transmission.every("actuator"), transmission.every("joint")
         for actuator in actuators:
@@ -105,7 +106,6 @@ def rotors(root: Element, faults: Faults) -> dict[str, float]:
                 faults.leave_out(ROTORS, name, rotor.error(left_out(ROTORS), *where, ROTOR, value=inertia))
                 continue
             joint = joints[0].text("name", *where, "joint")
-            known = [element.attributes.get("name", "") for element in root.every("joint")]
             if joint not in known:
                 raise joints[0].error(no_such("joint", joint, known), *where, "joint", value=joint)
             found[joint] = found.get(joint, 0.0) + inertia * ratio**2
@@ -131,6 +131,8 @@ def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]],
     RobotFileError
         Something is left out and that is an error.
     """
+    elements = {element.attributes.get("name", ""): element for element in root.every("joint")}
+    moving = bool(robot.moving_joints)
     for element in root.children:
         if element.tag in OF_FILE:
             heading = OF_FILE[element.tag]
@@ -138,7 +140,7 @@ def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]],
         elif element.tag == "joint":
             _note_dynamics(element, faults)
         elif element.tag == "gazebo":
-            for heading, shown, part in _of_gazebo(element, root, robot, names):
+            for heading, shown, part in _of_gazebo(element, elements, robot, names, moving=moving):
                 _leave(faults, heading, shown, part, LEAVE)
         elif element.tag == "transmission":
             for part in (part for actuator in element.every("actuator") for part in actuator.children):
@@ -173,7 +175,12 @@ def _note_mujoco(part: Element, faults: Faults) -> None:
 
 
 def _of_gazebo(
-    gazebo: Element, root: Element, robot: Robot, names: Mapping[str, list[Joint]]
+    gazebo: Element,
+    joints: Mapping[str, Element],
+    robot: Robot,
+    names: Mapping[str, list[Joint]],
+    *,
+    moving: bool,
 ) -> Iterator[tuple[str, str, Element]]:
     """Give what an element for Gazebo changes: the heading, of which link or joint, and where it stands."""
     about = gazebo.attributes.get("reference", "").strip()
@@ -181,7 +188,6 @@ def _of_gazebo(
     frame, link = robot.frames.get(about), robot.links.get(about)
     carried = frame is not None and frame.body >= 0
     heavy = carried and link is not None and link.inertia is not None and link.inertia.mass > 0
-    moving = bool(robot.moving_joints)
     table: dict[str, tuple[str, bool, Callable[[Element], bool]]] = {
         **dict.fromkeys(SPRINGS, (JOINT_SPRINGS, moves, _counts)),
         "gravity": (WEIGHTLESS, heavy, lambda x: x.content.strip() in NO),
@@ -192,7 +198,7 @@ def _of_gazebo(
         "velocity_decay": (DECAY, carried, lambda x: any(map(_counts, x.children))),
         "joint": (IN_GAZEBO, not about, lambda _: True),
         "link": (IN_GAZEBO, not about, lambda _: True),
-        "plugin": (PLUGINS, True, lambda x: _followed(x, root)),
+        "plugin": (PLUGINS, True, lambda x: _followed(x, joints)),
     }
     for part in gazebo.children:
         heading, bears, counts = table.get(part.tag, ("", False, _counts))
@@ -209,7 +215,7 @@ def _counts(element: Element) -> bool:
         return True
 
 
-def _followed(plugin: Element, root: Element) -> bool:
+def _followed(plugin: Element, joints: Mapping[str, Element]) -> bool:
     """Whether a plugin makes a joint follow another that does not do so by itself."""
-    joint = next((x for x in root.every("joint") if x.attributes.get("name") == follower(plugin)), None)
+    joint = joints.get(follower(plugin))
     return joint is not None and joint.first("mimic") is None

@@ -81,7 +81,7 @@ def _ends(
 ) -> tuple[TrajectoryEnd, ...]:
     """Return what is met at both ends, with the limits that are told here among those that are broken."""
     robot, limits, points = source.robot, source.limits, source.limits.points
-    followed = FollowedTrajectory(robot, trajectory)
+    followed = FollowedTrajectory(robot, trajectory, given=False)
     jumps = end_jumps(followed, followed.coordinates(np.linspace(trajectory.start, trajectory.stop, 2001), 4))
     if np.array_equal(jumps.before, jumps.after):
         return ends
