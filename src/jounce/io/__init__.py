@@ -11,12 +11,8 @@ if TYPE_CHECKING:
     from jounce.io.mechanisms.json_schema import json_schema as json_schema
     from jounce.io.mechanisms.loader import load as load
     from jounce.io.mechanisms.writer import write_mechanism as write_mechanism
-    from jounce.io.results import (
-        check_writable as check_writable,
-        read as read,
-        write as write,
-        write_parts as write_parts,
-    )
+    from jounce.io.result_reading import read as read
+    from jounce.io.results import check_writable as check_writable, write as write, write_parts as write_parts
     from jounce.io.robots.controller_files import export_trajectory as export_trajectory
     from jounce.io.robots.drives import load_drives as load_drives
     from jounce.io.robots.limits import load_limits as load_limits, load_motion_limits as load_motion_limits
@@ -30,7 +26,7 @@ _HOMES = {
     "json_schema": "mechanisms.json_schema",
     "load_cam": "mechanisms.cam_files",
     "check_writable": "results",
-    "read": "results",
+    "read": "result_reading",
     "write": "results",
     "load_drives": "robots.drives",
     "export_trajectory": "robots.controller_files",
