@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import pathlib
 import random
 import re
 import signal
+import sys
+import tempfile
 import time
 import traceback
 import warnings
@@ -15,18 +18,24 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from jounce.errors import JounceError
-from tests.fuzz.mutations import mutated
+from tests.fuzz.mutations import mutated, swollen
 from tests.fuzz.readers import READERS
+from tests.fuzz.results import changed_table
 
-__all__ = ["ALLOWED", "Outcome", "case", "judged", "shrunk"]
+__all__ = ["ALLOWED", "Outcome", "case", "clocked", "is_clocked", "judged", "shrunk"]
 
 ALLOWED = ("result", "error")
-TIME_LIMIT = 10.0  # s, for one case; they take milliseconds
+TIME_LIMIT = 10.0  # s of the processor, for one case; they take milliseconds
+WAIT = 6  # times as long on the clock on the wall, where other processes take the processor
+LEAST = 0.5  # s; what takes less is no trouble
+MOST = 10.0  # of the time for four times the size; 4 is in proportion, 16 the square
+SIZE = 10_000  # characters of a text that is timed; then it has four times as many
+EVERY = 100  # cases, of which one is timed
 WHOLE = re.compile(
     # what is said of a file as a whole, or by MuJoCo, which names no line then
     r"the file is empty|the file of samples is empty|has \d+ lines, at most|has \d+(\.\d+)? MB|MuJoCo cannot use|"
     r"is in no encoding|needs? at least \d+ samples|at least two samples are needed|no spline goes through|"
-    r"the JSON cannot be read: a number has too many digits|The (YAML|TOML) cannot be read"
+    r"the JSON cannot be read: a number has too many digits|The (YAML|TOML) cannot be read|is not a table of results"
 )
 
 
@@ -45,7 +54,30 @@ class Outcome:
 
 def case(reader: str, seed: int, index: int) -> bytes:
     """Return the text of a case, the same ever after."""
-    return mutated(random.Random(f"{seed}/{reader}/{index}"), READERS[reader].texts)
+    chance = random.Random(f"{seed}/{reader}/{index}")
+    if is_clocked(reader, index):
+        return swollen(chance, READERS[reader].texts)(4 * SIZE)
+    return READERS[reader].change(chance, READERS[reader].texts)
+
+
+def is_clocked(reader: str, index: int) -> bool:
+    """Tell whether a case is one that is timed: a piece of a good text many times over."""
+    return index % EVERY == EVERY - 1 and READERS[reader].change in (mutated, changed_table)
+
+
+def clocked(reader: str, seed: int, index: int, folder: pathlib.Path) -> Outcome:
+    """Read a long text, and where it takes a while another one of a quarter of the size, and compare the times."""
+    content, started = case(reader, seed, index), time.process_time()
+    found = judged(reader, content, folder)
+    took = time.process_time() - started
+    if found.kind not in ALLOWED or took < LEAST:
+        return found
+    small = swollen(random.Random(f"{seed}/{reader}/{index}"), READERS[reader].texts)(SIZE)
+    started = time.process_time()
+    judged(reader, small, folder)
+    share = took / (time.process_time() - started)
+    words = f"{took:.2f} s, {share:.1f} times as long as for a quarter of the text"
+    return found if share < MOST else Outcome("out of proportion", words, f"out of proportion: {reader}")
 
 
 def judged(reader: str, content: bytes, folder: pathlib.Path, limit: float = TIME_LIMIT) -> Outcome:
@@ -62,13 +94,15 @@ def judged(reader: str, content: bytes, folder: pathlib.Path, limit: float = TIM
                 (folder / name).write_text(text)
     before = {path.name for path in folder.iterdir()}
     printed = io.StringIO()
+    said: list[bytes] = []
     try:
-        with _limited(limit), warnings.catch_warnings(), contextlib.redirect_stdout(printed):
+        with _heard(said), _limited(limit), warnings.catch_warnings(), contextlib.redirect_stdout(printed):
             warnings.simplefilter("error", RuntimeWarning)  # a user would be shown lines of our source
             warnings.simplefilter("ignore", UserWarning)
             subject.read(given)
     except JounceError as error:
-        return _judged_error(error, subject.ending is not None)
+        if not said:
+            return _judged_error(error, subject.ending is not None, subject.lines)
     except TooLong as error:
         return _failure("hang", error)
     except Exception as error:  # noqa: BLE001 - the very question
@@ -77,12 +111,33 @@ def judged(reader: str, content: bytes, folder: pathlib.Path, limit: float = TIM
         left = {path.name for path in folder.iterdir()} - before
         for name in left:
             (folder / name).unlink()
-    if left or printed.getvalue():
-        return Outcome("leaves or prints something", f"{sorted(left)} {printed.getvalue()[:200]}")
+    if left or said or printed.getvalue():
+        words = f"{sorted(left)} {printed.getvalue()[:200]} {b''.join(said)[:500]!r}"
+        return Outcome("leaves or prints something", words, f"leaves or prints something: {reader}")
     return Outcome("result")
 
 
-def _judged_error(error: JounceError, from_file: bool) -> Outcome:
+@contextlib.contextmanager
+def _heard(said: list[bytes]) -> Iterator[None]:
+    """Put what is written to standard error meanwhile, by Python or by a library below, into a list."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    try:
+        with tempfile.TemporaryFile() as file:
+            os.dup2(file.fileno(), 2)
+            try:
+                yield
+            finally:
+                sys.stderr.flush()
+                os.dup2(kept, 2)
+                if file.seek(0, os.SEEK_END):
+                    file.seek(0)
+                    said.append(file.read(2000))
+    finally:
+        os.close(kept)
+
+
+def _judged_error(error: JounceError, from_file: bool, with_line: bool) -> Outcome:
     """Tell whether an error of the family says what a user needs."""
     try:
         words = str(error)
@@ -93,7 +148,7 @@ def _judged_error(error: JounceError, from_file: bool) -> Outcome:
         kind = "message is no line of text"
     elif from_file and error.path is None:
         kind = "names no file"
-    elif from_file and error.line is None and not WHOLE.search(words):
+    elif from_file and with_line and error.line is None and not WHOLE.search(words):
         kind = "names no line"
     return Outcome(kind, words, kind if kind == "error" else f"{kind}: {re.sub(r'[0-9]+', '0', error.message)[:60]}")
 
@@ -109,13 +164,16 @@ def _limited(seconds: float) -> Iterator[None]:
     def stop(_number: int, _frame: object) -> None:
         raise TooLong
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    clocks = ((signal.SIGVTALRM, signal.ITIMER_VIRTUAL, seconds), (signal.SIGALRM, signal.ITIMER_REAL, WAIT * seconds))
+    before = [signal.signal(number, stop) for number, _, _ in clocks]
+    for _, clock, limit in clocks:
+        signal.setitimer(clock, limit)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        for (number, clock, _), handler in zip(clocks, before, strict=True):
+            signal.setitimer(clock, 0)
+            signal.signal(number, handler)
 
 
 def shrunk(reader: str, content: bytes, folder: pathlib.Path, seconds: float = 5.0) -> bytes:

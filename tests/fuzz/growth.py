@@ -7,6 +7,7 @@ not take longer, either.
 from __future__ import annotations
 
 import contextlib
+import json
 import pathlib
 import tempfile
 import time
@@ -15,9 +16,11 @@ from collections.abc import Callable
 
 import jounce as jn
 from jounce.errors import JounceError
+from tests.fuzz.cases import LEAST, MOST
+from tests.fuzz.folders import grown_sweep
+from tests.fuzz.forks import forked
+from tests.fuzz.results import netcdf_of
 
-LEAST = 0.5  # s; what takes less is no trouble
-MOST = 10.0  # of the time for four times the size; 4 is in proportion, 16 the square
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
 
@@ -38,7 +41,7 @@ def _chain(count: int, *, followers: bool) -> str:
     return _robot("".join(parts))
 
 
-TEXTS: dict[str, Callable[[int], str]] = {
+TEXTS: dict[str, Callable[[int], str | bytes]] = {
     "a string.toml": lambda n: f'title = "{"a" * n}"\n',
     "escapes in a string.toml": lambda n: 'title = "' + '\\"' * (n // 2) + '"\n',
     "quotes in a string.toml": lambda n: 'title = "' + "'a" * (n // 2) + '"\n',
@@ -71,23 +74,55 @@ TEXTS: dict[str, Callable[[int], str]] = {
     "text between elements.sdf": lambda n: f'<sdf version="1.9"><model name="m">{"aaaa<x/>" * (n // 8)}</model></sdf>',
     "numbers.csv": lambda n: "time,a\n" + "".join(f"{k},1\n" for k in range(n // 8)),
     "a row.csv": lambda n: "time," + ",".join(f"c{k}" for k in range(n // 6)) + "\n",
+    "rows of results.csv": lambda n: "time,a,a_d1\n" + "0,1,2\n" * (n // 6),
+    "columns of results.csv": lambda n: f"time,{','.join(f'c{k}' for k in range(n // 8))}\n0{',1' * (n // 8)}\n",
+    "derivatives of results.csv": lambda n: f"time,a{''.join(f',a_d{k + 1}' for k in range(n // 8))}\n",
+    "brackets of results.csv": lambda n: f"time,{'[a' * (n // 2)}]\n0,1\n",
+    "blanks of results.csv": lambda n: f"time,a{' ' * n}[m\n0,1\n",
+    "quotes of results.csv": lambda n: "time," + '""' * (n // 2) + "\n0,1\n",
+    "instants.nc": lambda n: netcdf_of(n // 16),
+    "quantities.nc": lambda n: netcdf_of(2, names=n // 500),
+    "an attribute.nc": lambda n: netcdf_of(2, attribute="a" * min(n, 60_000)),
+    "half of a file.nc": lambda n: (content := netcdf_of(n // 16))[: len(content) // 2],
+    "zeros.nc": lambda n: netcdf_of(2)[:200] + bytes(n),
+    "chunks.sweep": lambda n: json.dumps({"chunks": n // 500}),
+    "an attribute.sweep": lambda n: json.dumps({"comment": "a" * n}),
+    "nested attributes.sweep": lambda n: json.dumps({"comment": [[[]]] * (n // 8)}),
+    "other files.sweep": lambda n: json.dumps({"files": n // 100}),
+}
+
+
+def _result(path: pathlib.Path) -> None:
+    with forked():
+        jn.io.read(path)
+
+
+READS: dict[str, Callable[[pathlib.Path], object]] = {
+    "urdf": jn.load_robot,
+    "sdf": jn.load_robot,
+    "csv": jn.load_trajectory,
+    "nc": _result,
 }
 
 
 def seconds(name: str, size: int) -> float:
     """Return the least time of two readings of a text."""
     kind = name.rpartition(".")[2]
-    read = {"urdf": jn.load_robot, "sdf": jn.load_robot, "csv": jn.load_trajectory}.get(kind, jn.load)
+    read = jn.io.read if "of results" in name else READS.get(kind, jn.load)
+    clock = time.perf_counter if kind == "nc" else time.process_time  # another process reads it first
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         path = pathlib.Path(folder, f"text.{kind}")
-        path.write_text(TEXTS[name](size), encoding="utf-8")
+        content = TEXTS[name](size)
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        if kind == "sweep":
+            path, read = grown_sweep(path)
         found = []
         for _ in range(2):
-            started = time.process_time()
+            started = clock()
             with contextlib.suppress(JounceError):
                 read(path)
-            found.append(time.process_time() - started)
+            found.append(clock() - started)
     return min(found)
 
 

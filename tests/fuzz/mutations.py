@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import random
 import re
+from collections.abc import Callable
 
-__all__ = ["mutated"]
+__all__ = ["HOSTILE", "mutated", "swollen"]
 
 HOSTILE = [
     *(
@@ -37,6 +38,38 @@ def mutated(chance: random.Random, seeds: list[str]) -> bytes:
     if chance.random() < 0.06:
         content = _bytes(chance, content)
     return content
+
+
+def swollen(chance: random.Random, seeds: list[str]) -> Callable[[int], bytes]:
+    """Return what makes a good text of about a size, by a piece that it has many times over, numbered or not."""
+    text = chance.choice(seeds)
+    if chance.random() < 0.3:
+        text = chance.choice(CHANGES)(chance, text, seeds) or text
+    lines = text.splitlines(keepends=True)
+    kind = chance.randrange(4)
+    if kind < 2:  # lines
+        first = chance.randrange(len(lines))
+        last = min(len(lines), first + chance.choice([1, 1, 2, 4]))
+        head, piece, tail = "".join(lines[:first]), "".join(lines[first:last]), "".join(lines[last:])
+    else:
+        start = chance.randrange(len(text))
+        stop = min(len(text), start + 1 + int(chance.expovariate(0.1)))
+        head, piece, tail = text[:start], text[start:stop], text[stop:]
+        if kind == 3:
+            piece = (
+                chance.choice([chance.choice(HOSTILE), chance.choice("abc019.,:;'\"\\/-+*()[]{}<>#&%=_ \t\n")]) or " "
+            )
+    words = list(re.finditer(r"[A-Za-z_][A-Za-z0-9_]*", piece))
+    place = chance.choice(words).end() if words and chance.random() < 0.5 else None
+
+    def of(size: int) -> bytes:
+        count = max(1, (size - len(head) - len(tail)) // len(piece))
+        many = piece * count
+        if place is not None:
+            many = "".join(f"{piece[:place]}{k}{piece[place:]}" for k in range(count))
+        return f"{head}{many}{tail}".encode("utf-8", "surrogatepass")
+
+    return of
 
 
 def _token(chance: random.Random, text: str, seeds: list[str]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import pathlib
+import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,6 +18,9 @@ from jounce.io.robots.limits import load_limits
 from jounce.io.robots.payloads import with_payloads
 from jounce.trajectory import Expression
 from jounce.units.values import parse_value
+from tests.fuzz.folders import edits, read_sweep, sweeps
+from tests.fuzz.mutations import mutated
+from tests.fuzz.results import changed_netcdf, changed_table, netcdfs, read_netcdf, read_table, tables
 
 __all__ = ["READERS", "Reader"]
 
@@ -84,16 +88,19 @@ def _drive(text: str) -> None:
 class Reader:
     """What reads, and good texts for it.
 
-    ``ending`` of the file that is read; None where text is read, which has no lines.
+    ``ending`` of the file that is read; None where text is read, which has no lines. ``change`` makes a case of the
+    texts, which are bytes where a file is none, and need no ``lines`` in messages then.
     """
 
     read: Callable[[Any], Any]
-    seeds: Callable[[], list[str]]
+    seeds: Callable[[], list[Any]]
     ending: str | None = None
     beside: dict[str, str] = field(default_factory=dict)
+    change: Callable[[random.Random, list[Any]], bytes] = mutated
+    lines: bool = True
 
     @functools.cached_property
-    def texts(self) -> list[str]:
+    def texts(self) -> list[Any]:
         return self.seeds()
 
 
@@ -155,6 +162,9 @@ READERS = {
     "limits": Reader(lambda path: load_limits(path, _scara()), lambda: [LIMITS], ".yaml"),
     "trajectory": Reader(jn.load_trajectory, lambda: _read(*MOVES), ".yaml"),
     "table": Reader(jn.load_trajectory, lambda: [WIDE], ".csv", CAM_BESIDE),
+    "results": Reader(read_table, tables, ".csv", change=changed_table),
+    "netcdf": Reader(read_netcdf, netcdfs, ".nc", change=changed_netcdf, lines=False),
+    "sweep": Reader(read_sweep, sweeps, ".txt", change=edits, lines=False),
     "expression": Reader(
         _expression,
         lambda: [

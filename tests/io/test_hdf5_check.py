@@ -53,7 +53,12 @@ def test_a_file_that_is_whole_is_read_to_the_bit(tmp_path, content):
     assert zlib.crc32(path.read_bytes()) == zlib.crc32(content)
 
 
-def test_a_column_that_is_named_twice_is_refused(tmp_path):
-    (tmp_path / "twice.csv").write_text("time,psi,psi\n0,1,2\n")
-    with pytest.raises(OutputError, match="names a column twice"):
-        io.read(tmp_path / "twice.csv")
+def test_no_other_program_is_started_for_it(tmp_path, monkeypatch, content):
+    """Where Python is within an application, that would be the application."""
+    marked = tmp_path / "application"
+    marked.write_text(f"#!/bin/sh\ntouch {tmp_path}/mark\n")
+    marked.chmod(0o700)
+    monkeypatch.setattr("sys.executable", str(marked))
+    with pytest.raises(OutputError, match=r"no process can be started .* is no interpreter of Python"):
+        hdf5_check.check_readable(content, "result.nc")
+    assert not (tmp_path / "mark").exists()

@@ -8,46 +8,15 @@ import tempfile
 import warnings
 from contextlib import contextmanager
 
-import numpy as np
 import pytest
 import xarray
 
 import jounce as jn
 from jounce.errors import JounceError, OutputError
-from jounce.kinematics import Status
 from jounce.sweeps import layout, manifest
-from jounce.sweeps.problems import Histories, Problem, Quantity
 from jounce.sweeps.store import find
-from jounce.sweeps.sweep import opened, prepare, run
-
-TIME = np.linspace(0.0, 1.0, 3)
-VARY = {"size": [1.0, 2.0, 3.0], "phase": [0.25]}
-
-
-class Waves(Problem):
-    """A size times a sine, and a pair of numbers: what takes no time, and needs no compilation."""
-
-    instants, levels = TIME, 2
-    nominal = {"size": 1.0, "phase": 0.0}
-
-    def reader(self, name, text):
-        raise AssertionError("values are given as numbers")
-
-    def quantities(self):
-        return (Quantity("wave", "m"), Quantity("pair", "m", (("component", ("x", "y")),)))
-
-    def options(self):
-        return {"order": 1}
-
-    def histories(self, designs, threads):
-        size, angle = designs["size"][:, None], TIME + designs["phase"][:, None]
-        wave = np.stack([size * np.sin(angle), size * np.cos(angle)], axis=2)
-        values = {"wave": wave, "pair": np.stack([wave, 2 * wave], axis=-1)}
-        return Histories(values, np.full(wave.shape[:2], Status.OK))
-
-
-def swept(folder, vary=VARY, **given):
-    return run(prepare(Waves(), vary, folder, "waves", {}, **{"chunk": 2} | given), workers=0)
+from jounce.sweeps.sweep import opened, prepare
+from tests.problems.waves import ROOT, VARY, Waves, contents, swept
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +101,6 @@ CHANGES = (
     remove, empty, cut, lengthen, scramble, turn_bits, nest, number, make_folder, fill_folder, link_to_nothing,
     link_to_itself, link_to_pipe, pipe,
 )  # fmt: skip
-ROOT = "zarr.json"
 FILES = (
     "wave_peak/zarr.json",
     "wave_peak/c/0/0",
@@ -142,12 +110,6 @@ FILES = (
     "chunks/digest/zarr.json",
     "chunks/digest/c/0",
 )
-
-
-def contents(folder):
-    """Return what the files of a sweep say; not their modes and places."""
-    found = {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    return {str(name): json.loads(x) if name.name == ROOT else x for name, x in found.items()}
 
 
 @contextmanager

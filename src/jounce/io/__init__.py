@@ -12,12 +12,8 @@ if TYPE_CHECKING:
     from jounce.io.mechanisms.json_schema import json_schema as json_schema
     from jounce.io.mechanisms.loader import load as load
     from jounce.io.mechanisms.writer import write_mechanism as write_mechanism
-    from jounce.io.results import (
-        check_writable as check_writable,
-        read as read,
-        write as write,
-        write_parts as write_parts,
-    )
+    from jounce.io.result_reading import read as read
+    from jounce.io.results import check_writable as check_writable, write as write, write_parts as write_parts
     from jounce.io.robots.controller_files import export_trajectory as export_trajectory
     from jounce.io.robots.drives import load_drives as load_drives
     from jounce.io.robots.limits import load_limits as load_limits, load_motion_limits as load_motion_limits
@@ -74,7 +70,9 @@ def _of_robots(name: str) -> ModuleType | None:
 def _of_results(name: str) -> ModuleType | None:
     """Return the file that a name of results is from."""
     match name:
-        case "check_writable" | "read" | "write" | "write_parts":
+        case "read":
+            from jounce.io import result_reading as home
+        case "check_writable" | "write" | "write_parts":
             from jounce.io import results as home
         case "in_units":
             from jounce.io.files import column_units as home

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 from jounce.errors import OutputError
 
@@ -17,13 +18,26 @@ try:
     import resource
     used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + int(sys.argv[1]) + 8 * len(content),) * 2)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 except (ImportError, OSError, ValueError):
-    pass  # no such limit on this system
-import xarray
+    pass  # no such limits on this system
+import h5py, xarray
+
+def elsewhere(name, item):
+    if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
+        return name
+
+def leading(name, link):
+    if isinstance(link, h5py.ExternalLink):
+        return name
+
 try:
-    xarray.load_dataset(io.BytesIO(content), engine="h5netcdf")
+    with h5py.File(io.BytesIO(content), "r") as file:
+        if (name := file.visititems_links(leading) or file.visititems(elsewhere)) is not None:
+            raise ValueError(f"{name} is in another file, and no others are opened")
+    xarray.load_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False)
 except Exception as error:
-    print(f"{type(error).__name__}: {error}"[:int(sys.argv[2])])
+    print(ascii(f"{type(error).__name__}: {error}"[:int(sys.argv[2])])[1:-1])
     sys.exit(3)
 """
 
@@ -41,18 +55,26 @@ def check_readable(content: bytes, path: str) -> None:
     Raises
     ------
     OutputError
-        The content is damaged, or not one of NetCDF.
+        The content is damaged, or not one of NetCDF, or names other files.
     """
-    command = [sys.executable, "-P", "-c", _PROGRAM, str(MEMORY), str(LONGEST)]
     seconds = SECONDS + len(content) / BYTES_A_SECOND
     try:
-        done = subprocess.run(command, input=content, capture_output=True, timeout=seconds, check=False)
+        status, said = _read_by_another(content, seconds)
     except subprocess.TimeoutExpired:
         raise OutputError(f"is damaged: HDF5 does not come to an end with it in {seconds:.0f} s", path=path) from None
     except OSError as error:
         raise OutputError(f"cannot be read: no process can be started to look at it: {error}", path=path) from None
-    if done.returncode == 3:
-        said = ascii(" ".join(done.stdout.decode(errors="replace").split()))[1:-1]
-        raise OutputError(f"is damaged, or no file of results: {said}", path=path)
-    if done.returncode != 0:
+    if status == 3:
+        words = " ".join(said.decode(errors="replace").split())
+        raise OutputError(f"is damaged, or no file of results: {words}", path=path)
+    if status != 0:
         raise OutputError("is damaged: HDF5 ends the process that reads it", path=path)
+
+
+def _read_by_another(content: bytes, seconds: float) -> tuple[int, bytes]:
+    """Return the status of a process that reads a file, and what it says."""
+    if not Path(sys.executable or "").name.startswith("python"):  # it may be an application that has Python within
+        raise OSError("this program is no interpreter of Python")
+    command = [sys.executable, "-P", "-c", _PROGRAM, str(MEMORY), str(LONGEST)]
+    done = subprocess.run(command, input=content, capture_output=True, timeout=seconds, check=False)
+    return done.returncode, done.stdout

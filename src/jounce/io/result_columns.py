@@ -82,28 +82,48 @@ def column_units(dataset: xarray.Dataset, names: Iterable[str]) -> list[str | No
 
 
 def dataset_of(header: list[str], table: Float[np.ndarray, "time columns"], units: dict[str, str]) -> xarray.Dataset:
-    """Build the dataset of a table; what its heading says to have other units is no component of the same."""
+    """Build the dataset of a table; what its heading says to have other units is no component of the same.
+
+    Raises
+    ------
+    OutputError
+        A column has the name of an axis.
+    """
     import xarray
 
     levels = _derivative_count(header[1:])
     stems = {header[k]: list(table.T[k : k + levels]) for k in range(1, len(header), levels)}
     variables: dict[str, Any] = {}
     coordinates = time_axes(table[:, 0], levels)
+    if "time" in units:
+        coordinates["time"][2]["units"] = units["time"]
     for (name, _), group in itertools.groupby(stems, lambda column: (_name_of(column), units.get(column))):
         members = list(group)
-        for axes, labels in AXES.items():
-            counts = (2, 3) if axes == ("component",) else (len(labels),)
-            if members in ([f"{name}_{label}" for label in labels[:count]] for count in counts):
-                sizes = (len(members),) if len(axes) == 1 else (3, 3)
-                values = np.stack([np.stack(stems[member], axis=1) for member in members], axis=2)
-                variables[name] = (("time", "derivative", *axes), values.reshape(*values.shape[:2], *sizes))
-                for axis in axes:
-                    known = labels[: sizes[0]] if len(axes) == 1 else AXES[("component",)]
-                    coordinates[axis] = list(max(known, tuple(coordinates.get(axis, ())), key=len))
-                break
-        else:
-            variables |= {member: (("time", "derivative"), np.stack(stems[member], axis=1)) for member in members}
+        axes, labels = _axes_of(name, members, len(coordinates.get("component", ())))
+        unit = {"units": units[members[0]]} if members[0] in units else {}
+        if not axes or name in stems or name in variables:  # each is an output by itself
+            variables |= {x: (("time", "derivative"), np.stack(stems[x], axis=1), dict(unit)) for x in members}
+            continue
+        values = np.stack([np.stack(stems[member], axis=1) for member in members], axis=2)
+        sizes = (len(members),) if len(axes) == 1 else (3, 3)
+        variables[name] = (("time", "derivative", *axes), values.reshape(*values.shape[:2], *sizes), unit)
+        coordinates |= {axis: list(labels if len(axes) == 1 else AXES[("component",)]) for axis in axes}
+    if taken := [name for name in variables if name in coordinates]:
+        raise OutputError("the column has the name of an axis; give it another", name=taken[0])
     return xarray.Dataset(variables, coords=coordinates)
+
+
+def _axes_of(name: str, members: list[str], components: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the axes that neighbouring columns have as one output, and the labels along them; none if they are not.
+
+    All vectors have as many components as the first one; what has others is several outputs.
+    """
+    for axes, labels in AXES.items():
+        for count in (2, 3) if axes == ("component",) else (len(labels),):
+            fits = axes != ("component",) or components in (0, count)
+            if fits and members == [f"{name}_{label}" for label in labels[:count]]:
+                return axes, labels[:count]
+    return (), ()
 
 
 def _derivative_count(columns: list[str]) -> int:

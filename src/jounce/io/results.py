@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from os import PathLike, fspath
 from pathlib import Path
@@ -15,10 +13,9 @@ import numpy as np
 from jounce.errors import OutputError
 from jounce.io.files.column_units import heading, is_si, name_and_unit
 from jounce.io.files.netcdf_parts import NetcdfParts
-from jounce.io.files.reading import is_result, known_name, read_file, reason_of, written_name
+from jounce.io.files.reading import written_name
 from jounce.io.files.writing import check_target, replacing
-from jounce.io.hdf5_check import check_readable
-from jounce.io.result_columns import AXES, column_units, columns, dataset_of
+from jounce.io.result_columns import column_units, columns
 from jounce.settings import under_own_settings
 
 if TYPE_CHECKING:
@@ -248,57 +245,3 @@ def _version() -> str:
         return metadata.version("jounce")
     except metadata.PackageNotFoundError:
         return "(not installed)"
-
-
-def read(path: str | PathLike[str]) -> xarray.Dataset:
-    """Read a file that `write` wrote back into a dataset; values come back to the bit.
-
-    A CSV file may say units in its heading, which become those of the variables: values stay as they are. It does not
-    say what is a vector: neighbouring columns ``NAME_x, NAME_y`` (and ``NAME_z``) of one unit become the vector NAME,
-    and those of Euler parameters, Euler angles and rotation matrices likewise.
-
-    Returns
-    -------
-    xarray.Dataset
-        In memory, with dimensions time, derivative, and those of components.
-
-    Raises
-    ------
-    OutputError
-        The file cannot be read, or is not one of results.
-    """
-    import xarray
-
-    name = fspath(path)
-    suffix = Path(name).suffix.lower()
-    if suffix not in SUFFIXES:
-        raise OutputError(f"the kind of results is given by the extension; valid: {', '.join(SUFFIXES)}", path=name)
-    content = read_file(name, None, error=OutputError, is_input=False)
-    if suffix == ".nc":
-        if not is_result(name):
-            check_readable(content, name)
-        return xarray.load_dataset(io.BytesIO(content), engine="h5netcdf")
-    try:
-        lines = csv.reader(io.StringIO(content.decode(), newline=""))
-        header, units = _named_columns(next(lines, []))
-        rows = [[float(entry) for entry in row] for row in lines]
-    except (OSError, ValueError, csv.Error) as error:
-        raise OutputError(f"cannot be read: {reason_of(error)}", path=name) from None
-    if header[:1] != ["time"] or not rows:
-        raise OutputError("is not a table of results, whose first column is time", path=name)
-    if repeated := [column for column, count in Counter(header).items() if count > 1]:
-        raise OutputError("names a column twice", path=name, value=repeated[0])
-    for line, row in enumerate(rows, start=2):
-        if len(row) != len(header):
-            raise OutputError(f"must have {len(header)} entries", path=name, line=line, value=len(row))
-    dataset = dataset_of(header, np.array(rows), units)
-    for name, variable in dataset.data_vars.items():
-        if (unit := units.get(str(name), units.get(f"{name}_{AXES.get(variable.dims[2:], ('',))[0]}"))) is not None:
-            variable.attrs["units"] = unit
-    return dataset
-
-
-def _named_columns(header: list[str]) -> tuple[list[str], dict[str, str]]:
-    """Return the names of columns, and the units of those that say one."""
-    pairs = [name_and_unit(known_name(entry)) for entry in header]
-    return [name for name, _ in pairs], {name: unit for name, unit in pairs if unit is not None}

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from jounce.errors import UnitError
 from jounce.settings import under_own_settings
 from jounce.units.shown_units import ShownUnits, unit_size
 
@@ -56,14 +57,17 @@ def in_units(dataset: xarray.Dataset, units: Mapping[str, str] | ShownUnits) -> 
 
 
 def is_si(unit: str | None) -> bool:
-    """Tell whether a unit is one of SI; what says none is taken to be.
+    """Tell whether a unit is one of SI; what says none is taken to be, and what is no unit of mechanics is none.
 
     Examples
     --------
     >>> is_si("rad/s"), is_si("mm"), is_si("1")
     (True, False, True)
     """
-    return unit in (None, "", "1") or unit_size(str(unit))[0] == 1.0
+    try:
+        return unit in (None, "", "1") or unit_size(str(unit))[0] == 1.0
+    except UnitError:
+        return False
 
 
 def heading(name: str, unit: str) -> str:

@@ -225,12 +225,12 @@ def read_rows(path: str | PathLike[str], error: type[JounceError]) -> Iterator[t
                 raise error(message, path=name, line=reader.line_num)
             yield reader.line_num, [entry.strip() for entry in row]
     except UnicodeDecodeError:
-        raise error("the samples cannot be read: no text in UTF-8", path=name, line=_bad_line(content)) from None
+        raise error("the samples cannot be read: no text in UTF-8", path=name, line=bad_line(content)) from None
     except (csv.Error, ValueError) as reason:
         raise error(f"the samples cannot be read: {reason}", path=name, line=reader.line_num + 1) from None
 
 
-def _bad_line(content: bytes) -> int | None:
+def bad_line(content: bytes) -> int | None:
     """Return the line that is not text in UTF-8."""
     try:
         content.decode()
