@@ -12,7 +12,7 @@ import pytest
 import jounce as jn
 from jounce import drivers, forces, planar
 from jounce.constraints.base import ROLES, catalogue
-from jounce.testing.reactions import acting, convolved, resultant, spins_of, worked
+from jounce.testing.reactions import acting, convolved, cross, resultant, spins_of, worked
 from jounce.testing.samples import BODIES
 from tests.contracts.test_frames import MECHANISMS
 from tests.problems.bank import OWN

@@ -24,7 +24,7 @@ from jounce.testing.subject import Broken, LeftOut, Subject, evaluated, random_s
 
 STARTS, STEPS = 8, 40
 WANTED = 2  # positions
-CLOSED = 1e-13
+CLOSED, NEARLY = 1e-13, 1e-10  # last corrections, m or rad: while they fall, and where rounding keeps them up
 DEPENDENT = 1e-9  # smallest singular value over the largest
 STRETCH = 3.0  # by which lengths, and directions, are multiplied
 PAIRS = {"revolute": planar.Revolute, "rod": planar.DoubleRevolute, "prismatic": planar.Prismatic}
@@ -89,21 +89,21 @@ def _closed(subject: Subject, group: Group, motion: Motion) -> tuple[Motion, np.
     unit = directions(subject.space)
     unknowns = np.stack([np.zeros_like(unit), unit])
     still = Jet.constant(jnp.full((1, unit.shape[-1]), INSTANT), 1)
-    for _ in range(STEPS):
+    for k in range(STEPS + 1):
         values = evaluated(group, with_unknowns(motion, unknowns), still)[..., 0, :]
         gap, slopes = values[0, :, 0], values[1]
         if not np.isfinite(values).all():
             return None
         step = np.linalg.lstsq(slopes, -gap, rcond=1e-12)[0]
         size = float(np.abs(step).max())
-        if size <= CLOSED:
+        if size <= (CLOSED if k < STEPS else NEARLY):
             return motion, slopes
         along = step * min(1.0, 0.5 / size)
         whole = np.tensordot(unit, along, axes=1)[..., None]
         motion = displaced(motion, whole)
         if "quaternion" in motion:
             motion["quaternion"][0] /= np.linalg.norm(motion["quaternion"][0], axis=0)
-    return (motion, slopes) if size <= 1e3 * CLOSED else None
+    return None
 
 
 def _held_parallel(group: Group, motion: Motion) -> None:

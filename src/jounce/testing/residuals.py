@@ -111,7 +111,11 @@ def derivatives(subject: Subject) -> None:
 def _around(subject: Subject, group: Group, motion: Motion, jets: Any, reach: float) -> tuple[np.ndarray, np.ndarray]:
     """Return instants around, less the instant, and the residual there, shape (rows, instances, instants)."""
     steps = reach * np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-    around = {name: sum(c * steps**k for k, c in enumerate(series))[None] for name, series in motion.items()}
+    powers = steps ** np.arange(len(motion["position"]))[:, None]
+    around = {
+        name: (series * powers.reshape(-1, *[1] * (series.ndim - 2), NODES)).sum(axis=0)[None]
+        for name, series in motion.items()
+    }
     around["position"][..., 0, :] = 0
     values = residual(group, around, Jet([jnp.asarray(INSTANT + steps)[None]]))[0]
     if period := subject.period_of(group):
