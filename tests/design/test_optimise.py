@@ -165,6 +165,17 @@ def test_knots_are_those_that_no_design_moves():
     assert law_knots(LIFT, {"T": (0.4, 0.6)}, 0.0, 1.0).tolist() == pytest.approx([0.2])
 
 
+@pytest.mark.parametrize("count, knots", [(5, [0.2, 0.5, 0.7]), (400, [0.2, 0.7])])
+def test_knots_of_forces_count_unless_they_are_too_many(count, knots):
+    t = np.linspace(0.0, 1.0, count)  # of five samples only the middle one is a knot: the others are not-a-knot
+    load = jn.forces.Torque(("ground", "crank"), law=jn.SplineMotion(t, np.sin(9 * t), degree=3))
+    loaded = dataclasses.replace(LIFT, forces={"load": load}, outputs={"torque": jn.DriverTorqueOutput("theta")})
+    loaded = dataclasses.replace(
+        loaded, bodies={"crank": dataclasses.replace(LIFT.bodies["crank"], mass=1.0, inertia=0.1)}
+    )
+    assert law_knots(loaded, {"lift": (0.1, 0.3)}, 0.0, 1.0).tolist() == pytest.approx(knots)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("dwell", [0.2, 0.2123])
 def test_a_peak_at_a_knot_of_the_law_is_that_of_the_handbook(dwell):

@@ -33,8 +33,8 @@ def test_laws_of_forces_count_where_forces_are_shown_or_move_the_bodies():
     assert laws_may_break(ROD)
     assert not len(breaks_of_laws(UNSEEN, 0.0, 1.0, 4))
     assert not laws_may_break(UNSEEN)
-    assert len(breaks_of_laws(UNSEEN, 0.0, 1.0, 4, free=True)) == 3
-    assert not len(breaks_of_laws(UNSEEN, 0.0, 1.0, 2, free=True))  # the force has no corner, its rates have
+    assert len(breaks_of_laws(UNSEEN, 0.0, 1.0, 4, forces=True)) == 3
+    assert not len(breaks_of_laws(UNSEEN, 0.0, 1.0, 2, forces=True))  # the force has no corner, its rates have
 
 
 def test_each_design_has_its_own():

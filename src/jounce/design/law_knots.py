@@ -1,4 +1,4 @@
-"""Where derivatives of motion laws jump, whatever the design: no series about an instant goes on beyond."""
+"""Where derivatives of laws jump, whatever the design: no series about an instant goes on beyond."""
 
 from collections.abc import Mapping
 
@@ -18,6 +18,8 @@ def law_knots(
 ) -> Float[np.ndarray, " knots"]:
     """Return the instants at which laws of drivers, or of the outputs they follow from, jump in some derivative, s.
 
+    Laws of forces count where outputs are forces, unless there are too many knots.
+
     Parameters
     ----------
     mechanism : Mechanism
@@ -26,14 +28,20 @@ def law_knots(
     first, last : float
         s.
     """
-    found = _of_design(mechanism, first, last)
-    ends = [mechanism.with_parameters(**{name: bound}) for name, pair in bounds.items() for bound in pair]
-    for design in ends if len(found) else ():
-        there = _of_design(design, first, last)
-        apart = np.abs(found[:, None] - there).min(axis=1, initial=np.inf)
-        found = found[apart <= SAME * (abs(first) + abs(last))]
+    found = _common(mechanism, bounds, first, last, None)
+    if len(found) > MOST_KNOTS:
+        found = _common(mechanism, bounds, first, last, False)
     return found if len(found) <= MOST_KNOTS else found[:0]
 
 
-def _of_design(mechanism: Mechanism, first: float, last: float) -> Float[np.ndarray, " knots"]:
-    return breaks_of_laws(mechanism, first, last, HIGHEST)
+def _common(
+    mechanism: Mechanism, bounds: Mapping[str, tuple[float, float]], first: float, last: float, forces: bool | None
+) -> Float[np.ndarray, " knots"]:
+    """Return the knots of all designs, those of laws of forces as `breaks_of_laws` takes them."""
+    found = breaks_of_laws(mechanism, first, last, HIGHEST, forces=forces)
+    ends = [mechanism.with_parameters(**{name: bound}) for name, pair in bounds.items() for bound in pair]
+    for design in ends if len(found) else ():
+        there = breaks_of_laws(design, first, last, HIGHEST, forces=forces)
+        apart = np.abs(found[:, None] - there).min(axis=1, initial=np.inf)
+        found = found[apart <= SAME * (abs(first) + abs(last))]
+    return found

@@ -27,15 +27,7 @@ from jounce.jet.coefficients import (
     total,
 )
 from jounce.settings import in_full
-from jounce.shapes import (
-    ArrayLike,
-    Labelled,
-    Numbers,
-    Real,
-    no_numbers,
-    real_derivatives,
-    real_or_traced,
-)
+from jounce.shapes import ArrayLike, Labelled, Numbers, Real, no_numbers, real_derivatives, real_or_traced
 
 
 @jax.tree_util.register_pytree_node_class
@@ -80,10 +72,7 @@ class Jet:
 
     @classmethod
     def variable(cls, value: ArrayLike, order: int) -> "Jet":
-        """Return the jet of time itself at the instant (or instants) `value`, in seconds.
-
-        Durations become seconds. A ValueError tells what else is no real number.
-        """
+        """Return the jet of time itself at the instant (or instants) `value`, in seconds; durations are converted."""
         value = in_full(real_or_traced("value", value, no_numbers, timed=True))
         return cls((value, jnp.ones_like(value), *[None] * (order - 1))[: _checked(order) + 1])
 

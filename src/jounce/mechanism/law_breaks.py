@@ -24,11 +24,11 @@ OF_FORCES = 2  # derivatives by which forces are ahead of the motion
 
 @under_own_settings
 def breaks_of_laws(
-    mechanism: Mechanism, first: float, last: float, order: int, *, free: bool = False
+    mechanism: Mechanism, first: float, last: float, order: int, *, forces: bool | None = None
 ) -> Float[np.ndarray, " time"]:
     """Return the instants at which laws of drivers, or of outputs they follow from, jump or bend, s.
 
-    Laws of forces count as laws of time, where outputs depend on forces: not where a displacement or its rate, or a
+    Laws of forces count as laws of time: not where a displacement or its rate, or a
     Python function, makes them jump.
 
     Parameters
@@ -39,8 +39,8 @@ def breaks_of_laws(
         s.
     order : int
         Of the highest derivative of the motion that matters.
-    free : bool, default False
-        Whether forces move the mechanism, so that all outputs depend on them.
+    forces : bool, optional
+        Whether laws of forces count; unless given, where an output is a force.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def breaks_of_laws(
     [0.05, 0.35, 0.55, 0.65, 0.75, 1.15]
     """
     found = law_breaks(laws_of(mechanism), first, last, order)
-    if order < OF_FORCES or not (free or _shows_forces(mechanism)):
+    if order < OF_FORCES or not (_shows_forces(mechanism) if forces is None else forces):
         return found
     of_forces = law_breaks(laws_of_forces(mechanism), first, last, order - OF_FORCES)
     return apart(np.concatenate([found, of_forces]), first, last)

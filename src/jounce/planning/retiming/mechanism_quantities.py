@@ -18,6 +18,7 @@ from jounce.errors import MechanismError, check_name
 from jounce.jet import Jet
 from jounce.kinematics import Motion, solve
 from jounce.mechanism import Mechanism
+from jounce.mechanism.angle_laws import settle
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.time import instants_of
 from jounce.planning.retiming.path import Path
@@ -275,4 +276,6 @@ def _following(mechanism: Mechanism, laws: Mapping[str, AbstractMotion], progres
         name: dataclasses.replace(driver, motion=FollowingMotion(laws[name], progress))
         for name, driver in mechanism.drivers.items()
     }
+    for driver in drivers.values():
+        settle(driver)  # their units were told where the mechanism was solved
     return dataclasses.replace(mechanism, drivers=drivers)
