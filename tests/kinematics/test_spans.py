@@ -22,12 +22,15 @@ def _wanted(monkeypatch):
 @pytest.mark.parametrize("width", [2, 4, 8])
 @pytest.mark.parametrize("stride", [1, 2, 8, 64, 256])
 @pytest.mark.parametrize("count", [1, 7, 64, 65, 1025, 3000, 20_000])
-def test_each_instant_comes_after_what_it_starts_from(count, stride, width):
+@pytest.mark.parametrize("full", [False, True])
+def test_each_instant_comes_after_what_it_starts_from(count, stride, width, full):
     solved = np.zeros(count, bool)
-    for span in spans_of(0, count, stride, width):
+    for span in spans_of(0, count, stride, width, full=full):
         seen = np.zeros(count, bool)  # what other spans solve, it cannot count on
-        for lanes in span.first + rounds(span.count, stride, width):
-            sources = (lanes & (lanes - 1))[lanes % stride != 0]
+        turns = rounds(span.count, span.stride, width)
+        assert not full or turns.size < 2 * max(span.count, width)  # half of a round is in use at least
+        for lanes in span.first + turns:
+            sources = (lanes & (lanes - 1))[lanes % span.stride != 0]
             assert seen[sources].all()
             assert not solved[lanes].any()
             seen[lanes] = True

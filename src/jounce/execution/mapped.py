@@ -27,6 +27,7 @@ from jounce.shapes import is_traced
 
 WIDTHS = (8, 256)  # instants that XLA's programs are for: each compiles once
 GPU_WIDTH = 2**15  # the same on a GPU, which they have to fill
+STARTS = 64  # instants from which others start, in the arrays of rounds of XLA
 SIDE_BY_SIDE = 128  # samples along the first axis that XLA computes side by side, so that the cache holds them
 Rounds = Callable[[Int[np.ndarray, "round lane"]], None]
 _published: dict[str, Program] = {}  # by the names under which other machine code calls them
@@ -148,12 +149,12 @@ class OnXla:
     def room(self, count: int) -> int:
         """Return of how many instants the arrays of rounds are to be, where so many are solved: one of few numbers.
 
-        Each of them compiles once.
+        Each of them compiles once. Beside full rounds there are some that others start from.
         """
-        room = 2 * self.width
-        while room < count:
-            room *= 4
-        return room
+        rounds = self.width
+        while rounds + STARTS < count:
+            rounds *= 4
+        return rounds + STARTS
 
     def rounds(self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"]) -> Rounds:
         """Return what solves instants in rounds, as that of `OnLlvm`; the arrays are written when all are solved."""

@@ -25,7 +25,7 @@ from jounce.kinematics.path_following import (
     follow,
 )
 from jounce.kinematics.solver import SMALL_BATCH, Solver
-from jounce.kinematics.spans import LONG_GRID, neighbours, solve_spans, spans_of, stride_of
+from jounce.kinematics.spans import LONG_GRID, neighbours, solve_spans, spans_for, stride_of
 from jounce.kinematics.status import Status
 from jounce.mechanism.time import nearest_instants
 
@@ -116,7 +116,7 @@ class GridSolver:
             self._keep(place, state)
             self.status[place] = status
 
-        spans = spans_of(0, count, stride, self.solver.program.width)
+        spans = spans_for(self.solver, 0, count, stride)
         for solved in solve_spans(self.solver, self.path, self.time, spans, put, pool.map):
             tell(solved)
         failed = left & (self.status != Status.OK)

@@ -14,7 +14,7 @@ from jounce.kinematics.change_points import half_width, spoiled_width
 from jounce.kinematics.grid import GridSolver, room_for
 from jounce.kinematics.path_following import FollowedPath
 from jounce.kinematics.solver import Solver
-from jounce.kinematics.spans import LONG_GRID, solve_spans, spans_of, stride_of
+from jounce.kinematics.spans import LONG_GRID, solve_spans, spans_for, stride_of
 from jounce.kinematics.status import Status
 from jounce.mechanism.time import Instants
 
@@ -121,7 +121,7 @@ def _solved_at_once(
         near = any(begin - width < point.instant < end + width for point, width in points)
         if count > LONG_GRID and end < path.ended_at and not near:
             stride = stride_of(solver, count, count, len(path.anchors_around(begin, end)))
-            spans[first] = spans_of(first, count, stride, solver.program.width)
+            spans[first] = spans_for(solver, first, count, stride)
     done, wanted = 0, [*itertools.chain(*spans.values())]
 
     def put(place: slice, state: SolvedState, outcome: Int[np.ndarray, " lane"]) -> None:

@@ -68,10 +68,23 @@ def stride_of(solver: Solver, left: int, count: int, anchors: int) -> int:
     return stride
 
 
-def spans_of(first: int, count: int, stride: int, width: int) -> list[Span]:
-    """Return the spans of so many instants of a grid from an index on, for vectors of a width."""
+def spans_of(first: int, count: int, stride: int, width: int, *, full: bool = False) -> list[Span]:
+    """Return the spans of so many instants of a grid from an index on, for rounds of a width.
+
+    To have `full` rounds, the last span has a stride of its own, so short that its instants fill them.
+    """
     size = stride * width
-    return [Span(first + k, min(size, count - k), stride) for k in range(0, count, size)]
+    spans = [Span(first + k, min(size, count - k), stride) for k in range(0, count, size)]
+    if full and spans:
+        while stride > 1 and stride * width >= 2 * spans[-1].count:
+            stride //= 2
+        spans[-1] = spans[-1]._replace(stride=stride)
+    return spans
+
+
+def spans_for(solver: Solver, first: int, count: int, stride: int) -> list[Span]:
+    """Return the spans of so many instants for what solves them; a round of XLA is too wide to be left half empty."""
+    return spans_of(first, count, stride, solver.program.width, full=not solver.is_compiled)
 
 
 @lru_cache(maxsize=16)
