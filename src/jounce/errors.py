@@ -10,6 +10,8 @@ import copy
 import difflib
 import numbers
 import operator
+import sys
+import warnings
 from collections.abc import Collection, Iterable
 from typing import Any
 
@@ -325,6 +327,17 @@ class _BoundedWarning(UserWarning):
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*(shortened(x) if isinstance(x, str) else x for x in arguments))
+
+
+def warn_caller(warning: Warning) -> None:
+    """Give a warning at the line of the user's program that called this package, through however many functions."""
+    frame, level, caller = sys._getframe(1), 1, 1
+    while frame is not None:
+        level += 1
+        if str(frame.f_globals.get("__name__")).partition(".")[0] == "jounce":
+            caller = level + 1
+        frame = frame.f_back
+    warnings.warn(warning, stacklevel=caller)
 
 
 class RobotWarning(_BoundedWarning):

@@ -55,6 +55,21 @@ def real_numbers(
     return _checked(name, values, error, wanted, timed=False)
 
 
+def real_or_traced(name: str | None, values: Any, error: Callable[..., Exception], *, timed: bool = False) -> Any:
+    """Return values as they are where JAX traces them, or takes them for the real numbers that they are.
+
+    Lists of what JAX traces become arrays. Others are read as `real_numbers` does, or, where they are times, as
+    `seconds` does.
+    """
+    if is_real(values) or type(values) in _PLAIN or (type(values) is np.ndarray and values.dtype.kind in "fiu"):
+        return values
+    if isinstance(values, Tracer) and values.dtype.kind == "b":
+        return values
+    if not isinstance(values, Tracer) and is_traced(values):
+        return jnp.asarray(values, float)  # a list of them
+    return (seconds if timed else real_numbers)(name, values, error)
+
+
 def seconds(name: str | None, values: Any, error: Callable[..., Exception], wanted: str = "real numbers") -> np.ndarray:
     """Return instants as `real_numbers` does, durations and quantities of time converted to seconds.
 
@@ -148,11 +163,12 @@ _SI = re.compile(rf"|dimensionless|{_UNIT}(?: ?[*/ ] ?{_UNIT})*")
 
 def real_derivatives(derivatives: Iterable[Any]) -> list[Any]:
     """Return derivatives as a list of arrays; a ValueError if one is not of real numbers, as `real_numbers` says."""
+    return [x if is_real(x) else real_numbers("derivatives", x, no_numbers) for x in derivatives]
 
-    def error(message: str, name: str, value: object) -> ValueError:
-        return ValueError(f"{name} {message}, got {type(value).__name__}")
 
-    return [x if is_real(x) else real_numbers("derivatives", x, error) for x in derivatives]
+def no_numbers(message: str, name: str, value: object) -> ValueError:
+    """Return the error of a jet for what is no array of real numbers."""
+    return ValueError(f"{name} {message}, got {type(value).__name__}")
 
 
 def is_real(x: Any) -> TypeGuard[jax.Array]:

@@ -2,6 +2,7 @@
 
 import datetime
 
+import jax
 import numpy as np
 import pint
 import pytest
@@ -19,7 +20,9 @@ ROBOT = jn.Robot("two", [jn.Link("base"), jn.Link("rod", ROD), jn.Link("end", RO
 ])  # fmt: skip
 TRAJECTORY = jn.JointTrajectory({"a": "t", "b": "t**2"}, 0.0, 2.0)
 TIMES = np.linspace(0.0, 1.0, 8)
-PAIR = np.array([0.1, 0.2])
+STILL = jn.Jet([np.zeros(2)])
+PLANAR = jn.rigid.PlanarPose.from_jets(STILL, STILL[0])
+SPATIAL = jn.rigid.SpatialPose.at(np.zeros(3), np.array([1.0, 0, 0, 0]))
 UNITS = pint.UnitRegistry()
 
 
@@ -44,6 +47,7 @@ TIME_DOORS = {
     "limits": lambda t: jn.check_limits(ROBOT, TRAJECTORY, times=t) and None,
     "attitudes": lambda t: jn.rigid.AttitudeSamples(t, np.tile([1.0, 0, 0, 0], (8, 1))) and None,
     "simulation of a robot": lambda t: jn.simulate(ROBOT, t, order=2, state=np.zeros((2, 2))).time,
+    "jet of time": lambda t: jn.Jet.variable(t, 2).coefficients[0],
     "tool path": lambda t: jn.ToolPath.through(t, np.stack([TIMES, TIMES, TIMES], axis=1)) and None,
 }
 NUMBER_DOORS = {
@@ -63,6 +67,28 @@ NUMBER_DOORS = {
     "origin of a joint": lambda x: jn.Joint("a", "base", "rod", position=x[:3]),
     "derivatives": lambda x: jn.Jet.from_derivatives(x),
     "goal": lambda x: jn.inverse_kinematics(ROBOT, "end", x[:3]),
+    "constant": lambda x: jn.Jet.constant(x, 2),
+    "turn": lambda x: jn.rigid.simple_rotation("z", x),
+    "angles": lambda x: jn.rigid.rotation_matrix("XYZ", x[:3]),
+    "one of three angles": lambda x: jn.rigid.rotation_matrix("XYZ", [x, jn.Jet.constant(TIMES, 1), TIMES]),
+    "axis": lambda x: jn.rigid.rotation_about(x[:3], 0.1),
+    "angle about an axis": lambda x: jn.rigid.rotation_about([0, 0, 1], x),
+    "transfer matrix": lambda x: jn.rigid.transfer_matrix("XYZ", x[:3]),
+    "angular velocity": lambda x: jn.rigid.angle_rates("XYZ", [0.1, 0.2, 0.3], x[:3]),
+    "orientation": lambda x: jn.rigid.singularity_distance("XYZ", x[:3]),
+    "attitude": lambda x: jn.rigid.euler_angles("XYZ", x[:3]),
+    "point of a screw": lambda x: jn.rigid.ScrewAxis([0, 0, 1], x[:3]),
+    "coordinate of a screw": lambda x: jn.rigid.ScrewAxis([0, 0, 1]).transform(x),
+    "coordinates of screws": lambda x: jn.rigid.product_of_exponentials([jn.rigid.ScrewAxis([0, 0, 1])] * 2, x[:2]),
+    "home": lambda x: jn.rigid.product_of_exponentials([jn.rigid.ScrewAxis([0, 0, 1])], [0.1], x[:4]),
+    "vector of the plane": lambda x: jn.rigid.perpendicular(x[:2]),
+    "vector of a planar pose": lambda x: PLANAR.to_body(x[:2]),
+    "point of a planar body": lambda x: PLANAR.point(x[:2]),
+    "point of a spatial body": lambda x: SPATIAL.point(x[:3]),
+    "vector of a spatial pose": lambda x: SPATIAL.to_body(x[:3]),
+    "pose": lambda x: jn.rigid.SpatialPose.at(x[:3], np.array([1.0, 0, 0, 0])),
+    "attitude of a pose": lambda x: jn.rigid.SpatialPose.at(np.zeros(3), x[:4]),
+    "axes of a body": lambda x: jn.rigid.body_axes(x[:4]),
     "point to point": lambda x: jn.JointTrajectory.point_to_point(["a", "b"], x[:2], [1.0, 1.0], duration=1.0),
 }  # fmt: skip
 SINGLE_DOORS = {
@@ -153,3 +179,12 @@ def test_a_missing_duration_is_told():
 def test_a_quantity_that_is_no_time_is_refused():
     with pytest.raises(jn.MechanismError, match="have the unit meter, which is none of time"):
         jn.solve(MECHANISM, UNITS.Quantity([0.0, 1.0], "m"), order=0)
+
+
+def test_jets_and_rotations_take_what_jax_traces():
+    def tip(angle):
+        turn = jn.rigid.rotation_about([0.0, 0.0, angle], angle) @ np.array([1.0, 0.0, 0.0])
+        return turn[1] + jn.rigid.rotation_matrix("XYZ", [angle, 0.0, 0.0])[2, 1] + jn.Jet.constant(angle, 1)
+
+    slope = jax.jit(jax.grad(lambda angle: tip(angle).coefficients[0]))(0.3)
+    assert slope == pytest.approx(1 + 2 * np.cos(0.3), abs=1e-14)

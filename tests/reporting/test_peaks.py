@@ -66,6 +66,29 @@ def test_a_peak_at_a_knot_is_the_limit_from_its_side(law, order, value, count):
     assert at == pytest.approx(KNOT, abs=1e-11)
 
 
+RISING = f"2 + 6*(t - {KNOT}) + 4*(t - {KNOT})**2"  # a force that ends at the knot
+JUMPING = f"({RISING})*(1 - sign(t - {KNOT}))/2 + (1 + sign(t - {KNOT}))/2"
+TORQUES = [
+    jn.PiecewiseMotion([RISING, "1"], until=[KNOT]),
+    jn.forces.TimeLaw(jn.PiecewiseMotion([RISING, "1"], until=[KNOT])),
+    JUMPING,
+    JUMPING.replace(str(KNOT), "knot") + " + 0*x*v",
+]
+
+
+@pytest.mark.parametrize("shown, law", [*(("torque", law) for law in TORQUES), ("reaction", TORQUES[0])])
+def test_a_peak_at_a_knot_of_a_force_is_the_limit_from_its_side(shown, law):
+    """What brakes a crank that turns evenly is taken up by its driver, and what pulls at its pin by the pin."""
+    forces = {"torque": jn.forces.Torque(("ground", "a"), law), "reaction": jn.forces.PointForce("a", [0, 0], [law, 0])}
+    outputs = {"torque": jn.DriverTorqueOutput("turn"), "reaction": jn.JointForceOutput("O", "ground")}
+    even = {"turn": dataclasses.replace(CRANK.drivers["turn"], motion="w*t")}
+    parts = {"drivers": even, "parameters": {"w": 3.0, "knot": KNOT}, "outputs": {"load": outputs[shown]}}
+    braked = dataclasses.replace(CRANK, forces={"load": forces[shown]}, **parts)
+    found = peaks(jn.solve(braked, np.linspace(0.0, 0.5, 6), order=2))
+    largest = [max(peak.maximum, -peak.minimum) for peak in found if peak.output in ("load", "load_x")]
+    assert largest == pytest.approx([2.0, 6.0, 8.0], rel=1e-8)
+
+
 def test_the_end_of_a_law_at_the_end_of_the_time_is_seen_from_before():
     """A 3-4-5 profile ends with the jerk that it begins with, 60 by way and duration, where the law is at rest."""
     law = jn.SegmentedMotion([jn.Segment("polynomial_3_4_5", 0.5, by=0.1)], beyond="hold")

@@ -20,6 +20,8 @@ def expression(text):
     [
         (expression("sin(3*t) + t**5"), []),
         (expression("abs(t - 0.3)"), [0.3]),
+        (expression("t*sign(t - 0.3)"), [0.3]),
+        (expression("0.1*(t - 0.4)**2*sign(t - 0.4)"), [0.4]),
         (expression("abs(sin(7*t))"), [np.pi / 7, 2 * np.pi / 7]),
         (expression("abs(t - 0.3)**3*t"), [0.3]),
         (jn.FunctionMotion(lambda t: abs(t - 0.7)), [0.7]),

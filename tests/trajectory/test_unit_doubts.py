@@ -66,6 +66,24 @@ def test_values_by_numpy_are_those_of_the_law(law):
     np.testing.assert_allclose(values_of(law, 0.0, 2.0), own, rtol=0, atol=1e-12 * np.abs(own).max())
 
 
+@pytest.mark.parametrize(
+    "law, told",
+    [
+        ("8*sin(3.1*t)", "goes from -8 to 8 rad, 2.5 turns: degrees?"),
+        ("3 + 9*sin(4*t)", "goes from -6 to 12 rad, 2.9 turns: degrees?"),
+        ("-7.5*sin(4*t)", "goes from -7.5 to 7.5 rad, 2.4 turns: degrees?"),
+        ("8*(3*t**2/4 - t**3/4)", "goes from 0 to 8 rad, 1.3 turns: degrees?"),
+        ("8*t", ""),  # a shaft that goes on
+        ("5*sin(5*t)", ""),  # less than a turn to each side
+        ("7.3*sin(5*t)", ""),
+        ("450*deg*sin(5*t)", ""),
+        ("2.5*pi*sin(3*t)", ""),
+    ],
+)
+def test_swings_to_whole_and_half_degrees_of_more_than_a_turn_are_told(law, told):
+    assert degrees_meant(values_of(jn.ExpressionMotion(law), 0.0, 2.0)) == told
+
+
 def test_a_law_that_says_nothing_of_the_run_has_no_values():
     assert values_of(jn.ExpressionMotion("log(t - 1)"), 0.0, 2.0) is None
 

@@ -27,7 +27,15 @@ from jounce.jet.coefficients import (
     total,
 )
 from jounce.settings import in_full
-from jounce.shapes import ArrayLike, Numbers, Real, real_derivatives
+from jounce.shapes import (
+    ArrayLike,
+    Labelled,
+    Numbers,
+    Real,
+    no_numbers,
+    real_derivatives,
+    real_or_traced,
+)
 
 
 @jax.tree_util.register_pytree_node_class
@@ -67,13 +75,16 @@ class Jet:
 
     @classmethod
     def constant(cls, value: ArrayLike, order: int) -> "Jet":
-        """Return the jet of a quantity that does not change in time."""
-        return cls((in_full(value), *[None] * _checked(order)))
+        """Return the jet of a quantity that does not change in time; a ValueError for what is no real number."""
+        return cls((in_full(real_or_traced("value", value, no_numbers)), *[None] * _checked(order)))
 
     @classmethod
     def variable(cls, value: ArrayLike, order: int) -> "Jet":
-        """Return the jet of time itself at the instant (or instants) `value`, in seconds."""
-        value = in_full(value)
+        """Return the jet of time itself at the instant (or instants) `value`, in seconds.
+
+        Durations become seconds. A ValueError tells what else is no real number.
+        """
+        value = in_full(real_or_traced("value", value, no_numbers, timed=True))
         return cls((value, jnp.ones_like(value), *[None] * (order - 1))[: _checked(order) + 1])
 
     @classmethod
@@ -232,7 +243,7 @@ class Jet:
 Quantity = Jet | Real
 """A jet, or what does not change in time: an array or a number."""
 
-JetLike = Quantity | Sequence[Any]
+JetLike = Quantity | Sequence[Any] | Labelled
 """A jet, or what becomes one: an array, a number, or a sequence of them."""
 
 

@@ -94,7 +94,7 @@ class Composed(Module):
         else:
             result = _nested(lambda t: self.program(captured, t)[0], x)
         if not isinstance(result, Jet):
-            result = Jet.constant(jnp.asarray(result), x.order)
+            result = Jet.constant(jnp.asarray(result, float), x.order)
         return result.map(lambda c: c.astype(float))
 
 

@@ -1,6 +1,6 @@
 """Where the laws of a mechanism jump or bend: no series goes on beyond, and peaks may be limits from one side."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import jax
@@ -8,17 +8,28 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
+from jounce.constraints.base import field_kinds
+from jounce.forces import AbstractForce, ExpressionLaw, TimeLaw, VectorLaw
 from jounce.mechanism.held_outputs import with_outputs_held
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.resolve import resolve_motion
 from jounce.settings import under_own_settings
-from jounce.trajectory.breaks import law_breaks, may_break
-from jounce.trajectory.motion import AbstractMotion
+from jounce.trajectory import Expression
+from jounce.trajectory.breaks import apart, law_breaks, may_break
+from jounce.trajectory.motion import AbstractMotion, ExpressionMotion
+
+ANYWHERE = 0.7310585786300049  # of a displacement and its rate, where laws of forces are looked at for jumps in time
+OF_FORCES = 2  # derivatives by which forces are ahead of the motion
 
 
 @under_own_settings
-def breaks_of_laws(mechanism: Mechanism, first: float, last: float, order: int) -> Float[np.ndarray, " time"]:
+def breaks_of_laws(
+    mechanism: Mechanism, first: float, last: float, order: int, *, free: bool = False
+) -> Float[np.ndarray, " time"]:
     """Return the instants at which laws of drivers, or of outputs they follow from, jump or bend, s.
+
+    Laws of forces count as laws of time, where outputs depend on forces: not where a displacement or its rate, or a
+    Python function, makes them jump.
 
     Parameters
     ----------
@@ -28,6 +39,8 @@ def breaks_of_laws(mechanism: Mechanism, first: float, last: float, order: int) 
         s.
     order : int
         Of the highest derivative of the motion that matters.
+    free : bool, default False
+        Whether forces move the mechanism, so that all outputs depend on them.
 
     Examples
     --------
@@ -36,13 +49,19 @@ def breaks_of_laws(mechanism: Mechanism, first: float, last: float, order: int) 
     >>> breaks_of_laws(press, 0.0, 1.2, 3).round(9).tolist()
     [0.05, 0.35, 0.55, 0.65, 0.75, 1.15]
     """
-    return law_breaks(laws_of(mechanism), first, last, order)
+    found = law_breaks(laws_of(mechanism), first, last, order)
+    if order < OF_FORCES or not (free or _shows_forces(mechanism)):
+        return found
+    of_forces = law_breaks(laws_of_forces(mechanism), first, last, order - OF_FORCES)
+    return apart(np.concatenate([found, of_forces]), first, last)
 
 
 @under_own_settings
-def laws_may_break(mechanism: Mechanism) -> bool:
-    """Tell whether a law of a mechanism may jump or bend anywhere, whatever the values of its parameters."""
-    return any(map(may_break, laws_of(mechanism)))
+def laws_may_break(mechanism: Mechanism, *, free: bool = False) -> bool:
+    """Tell whether a law that `breaks_of_laws` looks at may jump or bend anywhere, whatever its parameters are."""
+    return any(map(may_break, laws_of(mechanism))) or (
+        (free or _shows_forces(mechanism)) and any(map(may_break, laws_of_forces(mechanism)))
+    )
 
 
 @under_own_settings
@@ -60,7 +79,9 @@ def breaks_depend_on(mechanism: Mechanism, names: Iterable[str]) -> bool:
     numbers = []
 
     def resolved(given: dict[str, Any]) -> dict[str, Any]:
-        numbers.extend(jax.tree.leaves([law for law in laws_of(mechanism.with_parameters(**given)) if may_break(law)]))
+        design = mechanism.with_parameters(**given)
+        laws = [law for law in (*laws_of(design), *laws_of_forces(design)) if may_break(law)]
+        numbers.extend(jax.tree.leaves(laws))
         return given
 
     try:
@@ -75,3 +96,39 @@ def laws_of(mechanism: Mechanism) -> list[AbstractMotion]:
     values, drivers = mechanism.parameter_values, with_outputs_held(mechanism).drivers.values()
     motions = (getattr(driver, "motion", None) for driver in drivers)
     return [resolve_motion(motion, values) for motion in motions if motion is not None]
+
+
+def laws_of_forces(mechanism: Mechanism) -> list[AbstractMotion]:
+    """Return the laws of forces that depend on time, as laws of time alone."""
+    found = []
+    for force in mechanism.forces.values():
+        fields = [name for name, kind in field_kinds(type(force)).items() if kind in ("law", "laws")]
+        found += [law for name in fields for law in _in_time(getattr(force, name), force, mechanism.parameter_values)]
+    return found
+
+
+def _shows_forces(mechanism: Mechanism) -> bool:
+    return any(output.of_forces for output in mechanism.outputs.values())
+
+
+def _in_time(law: Any, force: AbstractForce, parameters: dict[str, Any]) -> Iterator[AbstractMotion]:
+    """Yield a law of a force, or its components, where it depends on time, as a law of time alone."""
+    if isinstance(law, VectorLaw):
+        law = law.parts
+    if isinstance(law, Sequence | np.ndarray) and not isinstance(law, str):
+        for part in law:
+            yield from _in_time(part, force, parameters)
+        return
+    if isinstance(law, TimeLaw):
+        law = law.motion
+    if isinstance(law, AbstractMotion):
+        yield resolve_motion(law, parameters)
+        return
+    names = (*force.displacement_names, *force.velocity_names)
+    if isinstance(law, ExpressionLaw):
+        law, parameters, names = law.expression, law.parameters, (*law.displacements, *law.velocities)
+    if isinstance(law, str):
+        law = Expression(law)
+    if isinstance(law, Expression) and "t" in law.names:
+        values = {**parameters, **dict.fromkeys(names, ANYWHERE)}
+        yield ExpressionMotion(law, {name: values[name] for name in law.names - {"t"}})

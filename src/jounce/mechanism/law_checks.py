@@ -1,14 +1,14 @@
 """What the laws of a mechanism say of the instants that are asked for: checked before any computing."""
 
-import warnings
 from collections.abc import Iterator
 
 import numpy as np
 
 from jounce.constraints import AbstractConstraint
 from jounce.constraints.base import value_fields
-from jounce.errors import JounceError, SampleWarning
+from jounce.errors import JounceError, SampleWarning, warn_caller
 from jounce.forces import AbstractForce, TimeLaw, VectorLaw
+from jounce.mechanism.angle_laws import warn_of_degrees
 from jounce.mechanism.mechanism import Mechanism
 from jounce.trajectory import AbstractMotion, SplineMotion
 from jounce.trajectory.sample_errors import unsupported_derivative, unsupported_words
@@ -35,10 +35,13 @@ def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces
 
     Warns
     -----
+    UnitWarning
+        A law of an angle is likely in degrees, told once for each driver.
     SampleWarning
         The estimated error of a derivative of samples exceeds a tenth of its peak, as for a `JointTrajectory`.
     """
     first, last = float(np.min(instants)), float(np.max(instants))
+    warn_of_degrees(mechanism, first, last)
     begin = float(instants[0])
     parts = [("drivers", first, last, order)]
     if forces:
@@ -72,4 +75,4 @@ def _warn(place: str, law: SplineMotion, order: int) -> None:
     """Warn of the lowest derivative that the samples of a law do not support."""
     if (doubt := unsupported_derivative(law.errors, order)) is not None:
         words = unsupported_words(place, *doubt, law.degree)
-        warnings.warn(SampleWarning(words), stacklevel=4)
+        warn_caller(SampleWarning(words))

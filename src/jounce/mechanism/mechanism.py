@@ -291,6 +291,11 @@ class Mechanism(Displayed):
                 )
         return values
 
+    @cached_property
+    def spans_looked_at(self) -> set[tuple[float, float]]:
+        """The first and last instants between which its laws were looked at for units other than of SI, s."""
+        return set()
+
     def with_parameters(self, **values: Any) -> "Mechanism":
         """Return the mechanism with other values of some parameters.
 

@@ -307,7 +307,8 @@ def _beside(motion: Motion | Stretches) -> tuple[Times, Times, Curves]:
     first, last = sorted((float(motion.time[0]), float(motion.time[-1])))  # a simulation may go backward
     outputs = motion.mechanism.outputs.values()
     lost = max((output.lost_orders for output in outputs), default=0)
-    breaks = breaks_of_laws(motion.mechanism, first, last, motion.order + lost)
+    free = isinstance(motion, Simulation)
+    breaks = breaks_of_laws(motion.mechanism, first, last, motion.order + lost, free=free)
     if isinstance(motion, Simulation):
         breaks = np.unique(np.concatenate([breaks, [time for time, _ in motion.kinks]]))
     sides, which = both_sides(breaks, first, last)

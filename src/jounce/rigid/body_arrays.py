@@ -8,9 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.errors import JounceError
 from jounce.jet import Jet
 from jounce.jet.algebra import JetLike
-from jounce.shapes import Numbers
+from jounce.shapes import Numbers, real_or_traced
 
 
 def each_jet(function: Callable[[Jet], Any], tree: Any) -> Any:
@@ -44,6 +45,7 @@ def body_vector(local: JetLike, batch_axes: int) -> Any:
     """Return a vector given in a body frame with the batch axes of a pose behind its components; a jet as it is."""
     if isinstance(local, Jet):
         return local
+    local = real_or_traced("vector", local, JounceError)
     if not isinstance(local, jax.Array | np.ndarray):
         local = np.asarray(local, float)
     missing = 1 + batch_axes - local.ndim

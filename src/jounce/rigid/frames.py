@@ -6,10 +6,11 @@ from typing import Any
 import jax
 from jaxtyping import Float, Int
 
+from jounce.errors import JounceError
 from jounce.jet import Jet, components, dot, stack, transpose
 from jounce.jet.algebra import JetLike, total
 from jounce.rigid.body_arrays import body_vector
-from jounce.shapes import Numbers
+from jounce.shapes import Numbers, Refused, real_or_traced
 
 
 class AbstractFrame:
@@ -27,9 +28,10 @@ class AbstractFrame:
         parts = components(body_vector(local, len(self.position.shape) - 1))
         return total(axis * part for axis, part in zip(self.axes, parts, strict=True))
 
-    def to_body(self, vector: Jet | Numbers) -> Float[Jet, "3 *batch"]:
+    def to_body(self, vector: Jet | Numbers | Refused) -> Float[Jet, "3 *batch"]:
         """Return the components, in the moving frame, of a vector given in the frame of the base."""
-        return stack([dot(axis, vector) for axis in self.axes])
+        given: Any = vector if isinstance(vector, Jet) else real_or_traced("vector", vector, JounceError)
+        return stack([dot(axis, given) for axis in self.axes])
 
     @property
     def attitude(self) -> Float[Jet, "3 3 *batch"]:

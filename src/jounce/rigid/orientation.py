@@ -191,9 +191,9 @@ def angle_rates(sequence: str, angles: JetLike, angular_velocity: JetLike, frame
     rank = max(np.ndim(value), np.ndim(given))
     angular_velocity, value = body_vector(angular_velocity, rank - 1), body_vector(value, rank - 1)
     if isinstance(angles, Jet):
-        (angles, velocity), finish = uniform(angles, angular_velocity)
+        (angles, velocity), finish = uniform(angles=angles, angular_velocity=angular_velocity)
         return finish(_marked(_solved(transfer_matrix(sequence, angles, frame), velocity), regular))
-    (velocity,), finish = uniform(angular_velocity)
+    (velocity,), finish = uniform(angular_velocity=angular_velocity)
     known = Jet([value])
     while True:
         rates = _solved(transfer_matrix(sequence, known, frame), velocity.truncate(known.order)).dense()
@@ -298,7 +298,7 @@ def euler_angles(sequence: str, attitude: JetLike) -> Any:
     [0.3, 0.2, 0.1]
     """
     check_sequence(sequence)
-    (matrix,), finish = uniform(attitude)
+    (matrix,), finish = uniform(attitude=attitude)
     check_rotation(matrix.coefficients[0])
     letters = sequence.lower() if is_moving(sequence) else sequence[::-1]
     i, j, k = (AXES.index(letter) for letter in letters)

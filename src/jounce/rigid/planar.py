@@ -1,25 +1,32 @@
 """Planar rigid bodies on jets: poses, points and directions. Sommer 2024, equations 9-20."""
 
 import dataclasses
-from typing import overload
+from typing import Any, overload
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.errors import JounceError
 from jounce.jet import Jet, next_sine_cosine, sine_cosine
 from jounce.jet.algebra import JetLike
 from jounce.rigid.body_arrays import body_vector, each_jet, take_bodies
-from jounce.shapes import Numbers, Real
+from jounce.shapes import Numbers, Real, Refused, real_or_traced
 
 
 @overload
 def perpendicular(vector: Jet) -> Jet: ...
 @overload
 def perpendicular(vector: Numbers) -> jax.Array: ...
-def perpendicular(vector: Jet | Numbers) -> Jet | jax.Array:
+def perpendicular(vector: Jet | Numbers | Refused) -> Jet | jax.Array:
     """Turn a plane vector by +90 degrees: the matrix R of Sommer 2024, equation 9."""
-    return jnp.stack([-vector[1], vector[0]]) if not isinstance(vector, Jet) else vector.map(perpendicular)
+    if isinstance(vector, Jet):
+        return vector.map(_turned)
+    return _turned(real_or_traced("vector", vector, JounceError))
+
+
+def _turned(vector: Numbers) -> jax.Array:
+    return jnp.stack([-vector[1], vector[0]])
 
 
 @jax.tree_util.register_dataclass
@@ -64,9 +71,10 @@ class PlanarPose:
         vector = body_vector(local, len(self.angle.shape))
         return self.cosine * vector + self.sine * perpendicular(vector)
 
-    def to_body(self, vector: Float[Jet, "2 *batch"]) -> Float[Jet, "2 *batch"]:
+    def to_body(self, vector: Jet | Numbers | Refused) -> Float[Jet, "2 *batch"]:
         """Return the body components, shape (2, ...), of a vector given in the global frame."""
-        return self.cosine * vector - self.sine * perpendicular(vector)
+        given: Any = vector if isinstance(vector, Jet) else real_or_traced("vector", vector, JounceError)
+        return self.cosine * given - self.sine * perpendicular(given)
 
     def take(self, bodies: tuple[int, ...]) -> "PlanarPose":
         """Return the poses of the given bodies, by index; body 0 is the ground, which never moves."""

@@ -10,7 +10,7 @@ import numpy as np
 from jounce.errors import JounceError, check_choice
 from jounce.jet import Jet, components, cos, matmul, sin, sqrt, stack
 from jounce.jet.algebra import JetLike, total
-from jounce.shapes import is_traced
+from jounce.shapes import is_traced, real_or_traced
 
 AXES = "xyz"
 
@@ -59,7 +59,7 @@ def simple_rotation(axis: str, angle: JetLike) -> Any:
     """
     letter = str(axis).lower()
     check_choice("axis", letter, tuple(AXES), JounceError)
-    (turn,), finish = uniform(angle)
+    (turn,), finish = uniform(angle=angle)
     delta = [int(letter == u) for u in AXES]  # Delta_u of equation 14; Delta_vw of equation 13 is 1 - Delta_u
     one = Jet.constant(jnp.ones_like(turn.coefficients[0]), turn.order)
     zero = one.map(jnp.zeros_like)
@@ -99,7 +99,7 @@ def rotation_about(axis: JetLike, angle: JetLike) -> Any:
     >>> jn.rigid.rotation_about([1, 1, 1], 2 * pi / 3).round().astype(int).tolist()
     [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
     """
-    (chi, turn), finish = uniform(checked_direction(axis), angle)
+    (chi, turn), finish = uniform(axis=checked_direction(axis), angle=angle)
     x, y, z = unit(chi)
     c, s = cos(turn), sin(turn)
     versine = 2.0 * sin(0.5 * turn).square()  # 1 - cos, without cancellation at small angles
@@ -153,7 +153,7 @@ def rotation_matrix(sequence: str, angles: JetLike) -> Any:
 def simple_rotations(sequence: str, angles: JetLike) -> tuple[list[Jet], Any]:
     """Return the three turns of a sequence as jets, in the order of its letters, and what `uniform` returns."""
     check_sequence(sequence)
-    (angles,), finish = uniform(checked_angles(angles))
+    (angles,), finish = uniform(angles=checked_angles(angles))
     return [simple_rotation(axis, angle) for axis, angle in zip(sequence, angles, strict=True)], finish
 
 
@@ -172,16 +172,22 @@ def check_sequence(sequence: str, error: type[JounceError] = JounceError, name: 
         raise error(message, name=name, value=sequence)
 
 
-def stacked_if_jets(values: JetLike) -> Any:
-    """Return a sequence with jets in it as one jet, what else there is as it is."""
+def stacked_if_jets(name: str, values: JetLike) -> Any:
+    """Return a sequence with jets in it as one jet, others as they are; a JounceError for what is no real number."""
+    if isinstance(values, Jet):
+        return values
     if isinstance(values, Sequence) and any(isinstance(value, Jet) for value in values):
-        return stack([value if isinstance(value, Jet) else jnp.asarray(value, float) for value in values])
-    return values
+        return stack([x if isinstance(x, Jet) else jnp.asarray(_real(name, x), float) for x in values])
+    return _real(name, values)
+
+
+def _real(name: str, values: Any) -> Any:
+    return real_or_traced(name, values, JounceError)
 
 
 def checked_angles(angles: JetLike) -> Any:
     """Return three angles as one jet or array of shape (3, ...)."""
-    angles = stacked_if_jets(angles)
+    angles = stacked_if_jets("angles", angles)
     shape = angles.shape if isinstance(angles, Jet) else np.shape(angles)
     if shape[:1] != (3,):
         message = "needs three angles along the first axis; batch axes come last"
@@ -191,6 +197,7 @@ def checked_angles(angles: JetLike) -> Any:
 
 def checked_direction(axis: JetLike, name: str = "axis") -> Any:
     """Return the direction of an axis, after a check of its size and, where it is known, of its length."""
+    axis = axis if isinstance(axis, Jet) else _real(name, axis)
     shape = axis.shape if isinstance(axis, Jet) else np.shape(axis)
     if shape[:1] != (3,):
         message = "an axis needs three components along the first axis"
@@ -211,17 +218,17 @@ def unit(vector: Jet) -> list[Jet]:
     return [part / length for part in parts]
 
 
-def uniform(*arguments: JetLike) -> tuple[list[Jet], Any]:
+def uniform(**arguments: JetLike) -> tuple[list[Jet], Any]:
     """Return arguments as jets of one order, and the function that turns the result into what the caller expects.
 
     Where no argument is a jet, the result is the array of its values. Batch axes of all arguments must agree, or be
-    missing, and stand last.
+    missing, and stand last. A JounceError names an argument that is not of real numbers.
     """
-    orders = [argument.order for argument in arguments if isinstance(argument, Jet)]
+    orders = [argument.order for argument in arguments.values() if isinstance(argument, Jet)]
     order = min(orders, default=0)
     jets = [
-        argument.truncate(order) if isinstance(argument, Jet) else Jet.constant(jnp.asarray(argument, float), order)
-        for argument in arguments
+        x.truncate(order) if isinstance(x, Jet) else Jet.constant(jnp.asarray(_real(name, x), float), order)
+        for name, x in arguments.items()
     ]
     return jets, (lambda jet: jet) if orders else (lambda jet: jet.coefficients[0])
 

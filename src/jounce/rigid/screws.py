@@ -13,7 +13,7 @@ from jounce.errors import JounceError, check_choice
 from jounce.jet import Jet, concatenate, cross, dot, matmul, sin, stack
 from jounce.jet.algebra import JetLike
 from jounce.rigid.rotations import checked_direction, rotation_about, stacked_if_jets, uniform, unit
-from jounce.shapes import ArrayLike, is_traced
+from jounce.shapes import ArrayLike, is_traced, real_or_traced
 
 KINDS = ("revolute", "prismatic")
 
@@ -56,11 +56,12 @@ class ScrewAxis:
 
     def __post_init__(self) -> None:
         checked_direction(self.axis, "axis")
-        finite = is_traced(self.point) or np.isfinite(np.asarray(self.point, float)).all()
+        place = real_or_traced("point", self.point, JounceError)
+        finite = is_traced(place) or np.isfinite(np.asarray(place, float)).all()
         if np.shape(self.point) != (3,) or not finite:
             raise JounceError("a point needs three finite coordinates", name="point", value=self.point)
         check_choice("kind", self.kind, KINDS, JounceError)
-        if not np.isfinite(self.pitch):
+        if not np.isfinite(real_or_traced("pitch", self.pitch, JounceError)):
             raise JounceError("must be a finite number", name="pitch", value=self.pitch)
         if self.kind == "prismatic" and self.pitch != 0:
             message = "a prismatic axis has no pitch; leave it out, or make the axis revolute"
@@ -112,7 +113,7 @@ def screw_transform(
     [2, 0, 0]
     """
     ScrewAxis(axis, point, kind, pitch)  # its checks
-    (turn,), finish = uniform(coordinate)
+    (turn,), finish = uniform(coordinate=coordinate)
     batch = (1,) * len(turn.shape)
     direction = stack(unit(Jet([jnp.asarray(axis, float)]))).coefficients[0].reshape(3, *batch)
     if kind == "prismatic":
@@ -156,19 +157,20 @@ def product_of_exponentials(screws: Sequence[ScrewAxis], coordinates: JetLike, h
     >>> jn.rigid.product_of_exponentials(arm, [0.0, pi / 2], home)[:3, 3].round().astype(int).tolist()
     [1, 1, 0]
     """
-    coordinates = stacked_if_jets(coordinates)
+    coordinates = stacked_if_jets("coordinates", coordinates)
     shape = coordinates.shape if isinstance(coordinates, Jet) else np.shape(coordinates)
     if not screws or shape[:1] != (len(screws),):
         message = (
             f"needs one coordinate along the first axis for each of {len(screws)} screw axes, of which one at least"
         )
         raise JounceError(message, name="coordinates", value=f"shape {tuple(shape)}")
-    (q,), finish = uniform(coordinates)
+    (q,), finish = uniform(coordinates=coordinates)
     transforms = [screw.transform(part) for screw, part in zip(screws, q, strict=True)]
     if home is not None:
-        if np.shape(home) != (4, 4):
-            raise JounceError("a transform needs 4 rows and 4 columns", name="home", value=f"shape {np.shape(home)}")
-        start = jnp.reshape(jnp.asarray(home, float), (4, 4, *[1] * (len(shape) - 1)))
+        last: Any = real_or_traced("home", home, JounceError)
+        if np.shape(last) != (4, 4):
+            raise JounceError("a transform needs 4 rows and 4 columns", name="home", value=f"shape {np.shape(last)}")
+        start = jnp.reshape(jnp.asarray(last, float), (4, 4, *[1] * (len(shape) - 1)))
         transforms.append(Jet.constant(start, q.order))
     return finish(reduce(matmul, transforms))
 

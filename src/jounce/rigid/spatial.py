@@ -12,17 +12,18 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.errors import JounceError
 from jounce.jet import Jet, components, dot, matvec, stack, transpose
 from jounce.jet.coefficients import minus, plus, sum_of_products, total
 from jounce.rigid.body_arrays import each_jet, take_bodies
 from jounce.rigid.frames import AbstractFrame
-from jounce.shapes import Numbers, Real
+from jounce.shapes import Numbers, Real, Refused, real_or_traced
 
 Triad = tuple[Float[Numbers, "3 *batch"], Float[Numbers, "3 *batch"], Float[Numbers, "3 *batch"]]
 Quadruples = tuple[Float[Numbers, "4 *batch"], Float[Numbers, "4 *batch"], Float[Numbers, "4 *batch"]]
 
 
-def body_axes(quaternion: Float[Numbers, "4 *batch"]) -> Triad:
+def body_axes(quaternion: Float[Numbers, "4 *batch"] | Refused) -> Triad:
     """Return the axes of the body in the global frame, the columns of the attitude matrix A, each of shape (3, ...).
 
     Parameters
@@ -30,7 +31,7 @@ def body_axes(quaternion: Float[Numbers, "4 *batch"]) -> Triad:
     quaternion : array of shape (4, ...)
         Unit Euler parameters [e0, e1, e2, e3].
     """
-    e0, e1, e2, e3 = quaternion
+    e0, e1, e2, e3 = real_or_traced("quaternion", quaternion, JounceError)
     return (
         jnp.stack([e0 * e0 + e1 * e1 - e2 * e2 - e3 * e3, 2 * (e1 * e2 + e0 * e3), 2 * (e1 * e3 - e0 * e2)]),
         jnp.stack([2 * (e1 * e2 - e0 * e3), e0 * e0 - e1 * e1 + e2 * e2 - e3 * e3, 2 * (e2 * e3 + e0 * e1)]),
@@ -82,9 +83,12 @@ class SpatialPose(AbstractFrame):
     predictor = ("position", "quaternion")  # the jets that a prediction needs
 
     @classmethod
-    def at(cls, position: Float[Numbers, "3 *batch"], quaternion: Float[Numbers, "4 *batch"]) -> "SpatialPose":
+    def at(
+        cls, position: Float[Numbers, "3 *batch"] | Refused, quaternion: Float[Numbers, "4 *batch"] | Refused
+    ) -> "SpatialPose":
         """Build the pose of order zero; the quaternion is normalised."""
-        quaternion = _normalised(quaternion)
+        position = real_or_traced("position", position, JounceError)
+        quaternion = _normalised(real_or_traced("quaternion", quaternion, JounceError))
         spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
         return cls(Jet([position]), Jet([quaternion]), spins, axes, None)
 

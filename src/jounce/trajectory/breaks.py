@@ -15,7 +15,7 @@ from jounce.trajectory.seen_jumps import seen_jumps
 from jounce.trajectory.smoothness import HIGHEST, known_jumps
 from jounce.trajectory.stacking import law_derivatives
 
-BENDING = frozenset({"abs", "sqrt", "asin", "acos", "atan2"})  # functions that may have kinks
+BENDING = frozenset({"abs", "sign", "sqrt", "asin", "acos", "atan2"})  # functions that may have kinks or jumps
 LOOKS = 2001  # at a law that may bend anywhere
 BESIDE = 2e-11  # of a span of time: how far beside a break its sides are; kinks are found to half of that
 MOST = 1000  # breaks of the derivative above those asked for; of more, as of a spline through samples, none is told
@@ -57,7 +57,7 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
         found.append(instants[jump | bend if np.sum(jump | bend) <= MOST else jump])
         if _may_bend(law):
             found.append(_seen(law, first, last, order))
-    return _apart(np.concatenate(found), first, last)
+    return apart(np.concatenate(found), first, last)
 
 
 def both_sides(
@@ -103,8 +103,8 @@ def _beside(first: float, last: float) -> float:
     return max(BESIDE * (last - first), 8 * float(np.spacing(max(abs(first), abs(last)))))
 
 
-def _apart(instants: Float[np.ndarray, " instant"], first: float, last: float) -> Times:
-    """Return instants without those that are others but for rounding."""
+def apart(instants: Float[np.ndarray, " instant"], first: float, last: float) -> Times:
+    """Return instants in their sequence without those that are others but for rounding."""
     instants = np.unique(instants)
     return instants[np.diff(instants, prepend=-np.inf) > 2 * _beside(first, last)]
 

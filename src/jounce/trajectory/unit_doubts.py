@@ -1,13 +1,14 @@
 """Angles that are likely meant in degrees: told by the values that a law takes over a run, whatever its form.
 
-No rule can know what was meant. Told are values of many turns that go back and forth, or from rest to rest, as
-positions in degrees do; a shaft that goes on turning may take any value, and so may angles that are round in degrees
-once they are in rad: they had their unit.
+No rule can know what was meant. Told are values of many turns, or of more than one turn to a whole or half number,
+that go back and forth, or from rest to rest, as positions in degrees do; a shaft that goes on turning may take any
+value, and so may angles that are round in degrees once they are in rad: they had their unit.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -16,7 +17,7 @@ from jaxtyping import Float
 from jounce.errors import JounceError
 from jounce.jet import Jet
 from jounce.trajectory.composed import FollowingMotion, PiecewiseMotion
-from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
+from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion, SplineMotion
 from jounce.trajectory.profiles import AbstractProfile
 from jounce.trajectory.segments import SegmentedMotion
 
@@ -26,10 +27,24 @@ MANY_TURNS = 2 * TURN  # to which a value without a unit is rarely meant in rad
 AT_REST = 0.05  # of the fastest step, the first or the last one
 DWELL = 0.03  # of the run, for which a law stands still at what it was to reach
 ROUND = 1e-7  # of a value
+NEAR = 1e-3  # of a half degree, to which the largest value of a law is known
 OUTSIDE = 2.0  # times the limits of a joint
 SLACK = 0.05  # of a range of degrees, by which limits may be broken
 
 Values = Float[np.ndarray, " instants"]
+_OPERATIONS: dict[str, Any] = {
+    "+": np.add,
+    "-": np.subtract,
+    "*": np.multiply,
+    "/": np.divide,
+    "**": np.power,
+    "neg": np.negative,
+    "pos": np.positive,
+    "asin": np.arcsin,
+    "acos": np.arccos,
+    "atan": np.arctan,
+    "atan2": np.arctan2,
+}
 
 
 def looks_like_degrees(value: float) -> bool:
@@ -59,11 +74,15 @@ def values_of(law: AbstractMotion, first: float, last: float) -> Values | None:
 def _values(law: AbstractMotion, grid: Values) -> Values:
     """Return values of a law, by NumPy alone where it is a formula or made of polynomials: nothing is compiled.
 
+    A Python function is called once, with all instants where it takes them.
+
     A profile from rest to rest has those of a cubic with the same ends.
     """
     if isinstance(law, ExpressionMotion):
-        parameters = {name: float(value) for name, value in law.parameters.items()}
-        return np.array([law.expression.evaluate({**parameters, "t": t}) for t in grid.tolist()], float)
+        known = {name: float(value) for name, value in law.parameters.items()}
+        with np.errstate(all="ignore"):
+            found = law.expression.folded(float, {**known, "t": grid}.__getitem__, _operated)
+        return np.broadcast_to(np.asarray(found, float), grid.shape)
     if isinstance(law, FollowingMotion) and law.parts:
         own, leader = law.parts
         plain = isinstance(leader, ExpressionMotion | FollowingMotion) or _is_polynomial(leader)
@@ -79,7 +98,24 @@ def _values(law: AbstractMotion, grid: Values) -> Values:
         return float(law.start) + (float(law.end) - float(law.start)) * share**2 * (3 - 2 * share)
     if _is_polynomial(law):
         return _spline_values(law, grid)
+    if type(law) is FunctionMotion and (found := _of_all(law.function, grid)) is not None:
+        return found
     return np.asarray(law(Jet([grid])).coefficients[0], float)
+
+
+def _of_all(function: Callable[[Any], Any], grid: Values) -> Values | None:
+    """Return what a function of one instant is at all of them, None where it does not take them at once."""
+    try:
+        with np.errstate(all="ignore"):
+            found = np.asarray(function(grid), float)
+    except Exception:  # noqa: BLE001 - a user's function, of which nothing is known
+        return None
+    return found if found.shape == grid.shape else None
+
+
+def _operated(word: str, arguments: list[Any]) -> Any:
+    """Apply an operator or a function of expressions to arrays of NumPy."""
+    return _OPERATIONS[word](*arguments) if word in _OPERATIONS else getattr(np, word)(*arguments)
 
 
 def _is_polynomial(law: AbstractMotion) -> TypeGuard[SplineMotion]:
@@ -135,7 +171,9 @@ def degrees_meant(values: Values, lower: float | None = None, upper: float | Non
         within = math.degrees(lower) - slack <= low and high <= math.degrees(upper) + slack
     else:
         within = False
-    if not within and not (looks_like_degrees(low if -low > high else high) and _is_position(values)):
+    if not within and not (
+        (looks_like_degrees(low if -low > high else high) or _is_round(values)) and _is_position(values)
+    ):
         return ""
     turns = max(high - low, largest) / TURN
     told = f"goes from {_round(low)} to {_round(high)} rad" if high > low else f"is {_round(low)} rad"
@@ -144,6 +182,16 @@ def degrees_meant(values: Values, lower: float | None = None, upper: float | Non
 
 def _round(value: float) -> str:
     return f"{value + 0.0:.4g}"
+
+
+def _is_round(values: Values) -> bool:
+    """Tell whether values go to a whole or half number of more than one turn, at most two; their vertex counts."""
+    sizes = np.abs(values)
+    top = int(np.argmax(sizes))
+    left, largest, right = sizes[max(top - 1, 0)], sizes[top], sizes[min(top + 1, len(sizes) - 1)]
+    if 0 < top < len(sizes) - 1 and (bend := 2 * largest - left - right) > 0:
+        largest += (right - left) ** 2 / (8 * bend)
+    return bool(TURN < largest <= MANY_TURNS and abs(2 * largest - round(2 * largest)) <= NEAR)
 
 
 def _is_position(values: Values) -> bool:

@@ -15,13 +15,21 @@ from jounce.errors import JounceError, UnitWarning
 from jounce.io.files.located_data import Location, Source, dotted
 from jounce.io.files.samples import sampled_dimension
 from jounce.io.mechanisms.keys import ROLES, file_keys
-from jounce.mechanism import Mechanism, with_outputs_held
-from jounce.mechanism.driver_outputs import is_turning
-from jounce.mechanism.resolve import resolve, resolve_motion
+from jounce.mechanism import Mechanism
+from jounce.mechanism.angle_laws import (
+    IN_SI,
+    AngleLaw,
+    degrees_doubt,
+    laws_of_angles,
+    names_angle,
+    number_doubt,
+    settle,
+)
+from jounce.mechanism.resolve import resolve
 from jounce.mechanism.time import instants_of
-from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FollowingMotion, SplineMotion
+from jounce.trajectory import Expression
 from jounce.trajectory.dimensions import ANGLE, LENGTH, Dimension
-from jounce.trajectory.unit_doubts import TURN, degrees_meant, looks_like_degrees, values_of
+from jounce.trajectory.unit_doubts import values_of
 from jounce.trajectory.units import parse_value
 
 FAR_OFF = 100.0  # times the other lengths
@@ -31,7 +39,6 @@ LARGE = 5.0  # m, from which on a machine may be one in millimetres
 FAST = 120.0  # m/s, which nothing so large reaches
 LIGHT = 0.1  # kg/m, less than which nothing so large has
 SLENDER = 1e-5  # of the mass by the square of the size, less than which no body's inertia is
-IN_SI = "A number without a unit is in SI"
 
 
 def warn_of_units(source: Source, mechanism: Mechanism) -> None:
@@ -44,18 +51,18 @@ def warn_of_units(source: Source, mechanism: Mechanism) -> None:
     """
     told = set()
     for location, value in _angles(source.data, mechanism):
-        if looks_like_degrees(value):
+        if why := number_doubt(value):
             told.add(location[:3])
-            _warn(source, location, f"{value:g} rad is {abs(value) / TURN:.2g} turns: {value:g} deg?")
-    laws = list(_laws(mechanism))
-    for name, law, run in laws:
-        at: Location = ("drivers", name, "motion")
-        if at in told or _names_angle(law, mechanism.drivers[name], mechanism) or _has_unit(source, at):
-            continue
-        if why := _in_degrees(law, run):
+            _warn(source, location, why)
+    run, laws = _run(mechanism), list(laws_of_angles(mechanism))
+    angles = frozenset(name for name, dimensions in mechanism.dimensions.items() if ANGLE in dimensions)
+    for found in laws:
+        at: Location = ("drivers", found.name, "motion")
+        why = degrees_doubt(found.law, *run)
+        if at in told or why:
+            settle(found.driver)  # told now, or known to be meant as it stands
+        if why and at not in told and not names_angle(found, angles) and not _has_unit(source, at):
             _warn(source, at, why)
-        elif (span := _angle_of_leader(law)) and looks_like_degrees(span):
-            _warn(source, at, f"goes on over {span:g} rad of its leader, {span / TURN:.2g} turns: degrees?")
     _warn_of_lengths(source, mechanism, laws)
 
 
@@ -79,18 +86,23 @@ def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], op
     for name in given:
         dimensions, value = after.dimensions.get(name, ()), float(new[name])
         was = abs(float(old[name]))
-        if ANGLE in dimensions and looks_like_degrees(value):
-            hint = f"{value:g} rad is {abs(value) / TURN:.2g} turns: {value:g} deg?"
+        if ANGLE in dimensions and (hint := number_doubt(value)):
+            pass
         elif LENGTH in dimensions and was and _is_thousandfold(abs(value), was):
             hint = f"{value:g} m is {float(f'{abs(value) / was:.1g}'):g} times what it was: {value:g} mm?"
         else:
             continue
         told = True
         warnings.warn(UnitWarning(f"{option} {name}: {hint} {IN_SI}"), stacklevel=3)
-    known = {name for name, law, run in _laws(before) if _in_degrees(law, run)}
-    for name, law, run in () if told else _laws(after):
-        if name not in known and (why := _in_degrees(law, run)):
-            warnings.warn(UnitWarning(f"{option}: now the law of drivers.{name} {why} {IN_SI}"), stacklevel=3)
+    run = _run(before)
+    known = {found.name for found in laws_of_angles(before) if degrees_doubt(found.law, *run)}
+    run = _run(after)
+    for found in laws_of_angles(after):
+        if not (why := degrees_doubt(found.law, *run)):
+            continue
+        settle(found.driver)
+        if not told and found.name not in known:
+            warnings.warn(UnitWarning(f"{option}: now the law of drivers.{found.name} {why} {IN_SI}"), stacklevel=3)
 
 
 def _is_thousandfold(value: float, usual: float) -> bool:
@@ -98,41 +110,13 @@ def _is_thousandfold(value: float, usual: float) -> bool:
     return value > FAR_OFF * usual and usual / ALIKE < value / 1000 < ALIKE * usual
 
 
-_Law = tuple[str, AbstractMotion, tuple[float, float]]
-"""The name of a driver, its law, and the first and the last instant of the run, s."""
-
-
-def _in_degrees(law: AbstractMotion, run: tuple[float, float]) -> str:
-    values = values_of(law, *run)
-    return "" if values is None else degrees_meant(values)
-
-
-def _laws(mechanism: Mechanism) -> Iterator[_Law]:
-    """Return the laws of angles."""
+def _run(mechanism: Mechanism) -> tuple[float, float]:
+    """Return the first and the last instant of a mechanism, s; of one that has none, those of a second."""
     try:
-        held, parameters = with_outputs_held(mechanism), mechanism.parameter_values
-        instants = None if mechanism.time is None else instants_of(mechanism.time, parameters)
-        first, last = (0.0, 1.0) if instants is None else (float(instants[0]), float(instants[-1]))
+        instants = None if mechanism.time is None else instants_of(mechanism.time, mechanism.parameter_values)
     except JounceError:  # told where they are used
-        return
-    for name, driver in held.drivers.items():
-        motion = getattr(driver, "motion", None)
-        if motion is None or not is_turning(driver):
-            continue
-        try:
-            known = isinstance(motion, AbstractMotion)
-            law = motion.resolved(parameters) if known else resolve_motion(motion, parameters)
-        except JounceError:
-            continue
-        yield name, law, (first, last)
-
-
-def _names_angle(law: AbstractMotion, driver: Any, mechanism: Mechanism) -> bool:
-    """Tell whether the law of an angle is a formula with a unit of one, or with a parameter that is an angle."""
-    if not isinstance(law, ExpressionMotion) or not isinstance(getattr(driver, "motion", None), Expression | str):
-        return False
-    expression = law.expression
-    return "deg" in expression.text or any(ANGLE in mechanism.dimensions.get(x, ()) for x in expression.names)
+        instants = None
+    return (0.0, 1.0) if instants is None else (float(instants[0]), float(instants[-1]))
 
 
 def _has_unit(source: Source, at: Location) -> bool:
@@ -147,15 +131,7 @@ def _has_unit(source: Source, at: Location) -> bool:
         return False
 
 
-def _angle_of_leader(law: AbstractMotion) -> float | None:
-    """Return over which part of its leader's way a law is given, None where it follows none, or has no ends."""
-    if not isinstance(law, FollowingMotion) or not law.parts:
-        return None
-    own = law.parts[0]
-    return float(own.stop) - float(np.asarray(own.breakpoints)[0]) if isinstance(own, SplineMotion) else None
-
-
-def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[_Law]) -> None:
+def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[AngleLaw]) -> None:
     lengths = [(location, abs(value), plain) for location, value, plain in _lengths(source.data, mechanism) if value]
     in_order = sorted(value for _, value, _ in lengths)
     for location, value, plain in lengths:
@@ -172,10 +148,11 @@ def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[_Law])
         _warn(source, location, f"the lengths of this file go up to {in_order[-1]:g} m, {why}: millimetres?")
 
 
-def _too_large(mechanism: Mechanism, size: float, laws: Iterable[_Law]) -> str:
+def _too_large(mechanism: Mechanism, size: float, laws: Iterable[AngleLaw]) -> str:
     """Word why no mechanism of this one's motion or masses is of a size, m; nothing if there may be one."""
-    for _, law, (first, last) in laws:
-        values = values_of(law, first, last)
+    first, last = _run(mechanism)
+    for found in laws:
+        values = values_of(found.law, first, last)
         if values is not None and last > first:
             fastest = float(np.abs(np.diff(values)).max()) * (len(values) - 1) / (last - first)
             if fastest * size > FAST:
