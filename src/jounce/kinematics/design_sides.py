@@ -35,21 +35,28 @@ class Sides:
 
 @under_own_settings
 def sides_of_designs(
-    mechanism: Mechanism, parameters: Mapping[str, np.ndarray], first: float, last: float, order: int
+    mechanism: Mechanism,
+    parameters: Mapping[str, np.ndarray],
+    first: float,
+    last: float,
+    order: int,
+    *,
+    free: bool = False,
 ) -> tuple[Float[np.ndarray, "design side"], Float[np.ndarray, "design side"]]:
     """Return where the laws of each design jump or bend, and the instants on both sides of it.
 
-    A design with fewer of them than others has the first instant in their place.
+    A design with fewer of them than others has the first instant in their place. Laws of forces count where these move
+    the mechanism (`free`).
     """
     count = len(next(iter(parameters.values())))
     different = 0
-    if laws_may_break(mechanism):
+    if laws_may_break(mechanism, free=free):
         different = count if breaks_depend_on(mechanism, parameters) else 1
     found = []
     for k in range(different):
         try:
             design = mechanism.with_parameters(**{name: float(values[k]) for name, values in parameters.items()})
-            breaks = breaks_of_laws(design, first, last, order)
+            breaks = breaks_of_laws(design, first, last, order, free=free)
         except JounceError:  # told when the design is solved
             breaks = np.zeros(0)
         sides, which = both_sides(breaks, first, last)

@@ -57,9 +57,11 @@ def breaks_of_laws(
 
 
 @under_own_settings
-def laws_may_break(mechanism: Mechanism) -> bool:
-    """Tell whether a law of a mechanism may jump or bend anywhere, whatever the values of its parameters."""
-    return any(map(may_break, _laws_that_count(mechanism)))
+def laws_may_break(mechanism: Mechanism, *, free: bool = False) -> bool:
+    """Tell whether a law that `breaks_of_laws` looks at may jump or bend anywhere, whatever its parameters are."""
+    return any(map(may_break, laws_of(mechanism))) or (
+        (free or _shows_forces(mechanism)) and any(map(may_break, laws_of_forces(mechanism)))
+    )
 
 
 @under_own_settings
@@ -77,8 +79,9 @@ def breaks_depend_on(mechanism: Mechanism, names: Iterable[str]) -> bool:
     numbers = []
 
     def resolved(given: dict[str, Any]) -> dict[str, Any]:
-        laws = _laws_that_count(mechanism.with_parameters(**given))
-        numbers.extend(jax.tree.leaves([law for law in laws if may_break(law)]))
+        design = mechanism.with_parameters(**given)
+        laws = [law for law in (*laws_of(design), *laws_of_forces(design)) if may_break(law)]
+        numbers.extend(jax.tree.leaves(laws))
         return given
 
     try:
@@ -102,10 +105,6 @@ def laws_of_forces(mechanism: Mechanism) -> list[AbstractMotion]:
         fields = [name for name, kind in field_kinds(type(force)).items() if kind in ("law", "laws")]
         found += [law for name in fields for law in _in_time(getattr(force, name), force, mechanism.parameter_values)]
     return found
-
-
-def _laws_that_count(mechanism: Mechanism) -> list[AbstractMotion]:
-    return laws_of(mechanism) + (laws_of_forces(mechanism) if _shows_forces(mechanism) else [])
 
 
 def _shows_forces(mechanism: Mechanism) -> bool:
