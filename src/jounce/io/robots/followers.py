@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import RobotError, RobotFileError
 from jounce.io.robots.faults import Faults
-from jounce.robot.model import Joint, has_room, ranges_at_leader
+from jounce.robot.model import POINT, Joint, ranges_at_leader
 
 NO_ROOM = "ranges of joints that leave the joint that they follow no room to move"
+MOST_NAMED = 20
 
 
 def with_room(
@@ -38,18 +43,18 @@ def with_room(
         If such a range is an error.
     """
     found = {joint.name: joint for joint in joints}
+    following: dict[str, list[Joint]] = {}
+    for joint in joints:
+        if joint.mimic is not None and joint.mimic.multiplier and _has_range(joint):
+            following.setdefault(joint.mimic.joint, []).append(joint)
     for leader in joints:
-        followers = [joint for joint in joints if _follows(joint, leader)]
+        followers = following.get(leader.name, [])
         if not followers or leader.name in held:
             continue
-        bad = [joint for joint in followers if not has_room(leader.limits, [joint])]
-        rest = [joint for joint in followers if joint not in bad]
-        for joint in followers:
-            beside = [x.name for x in rest if x is not joint and not has_room(leader.limits, [joint, x])]
-            if not (joint in bad or beside):
-                continue
-            own, (low, high) = ranges_at_leader(leader.limits, [joint])
-            against = f" beside {', '.join(beside)}" if joint in rest else ""
+        own, *ranges = ranges_at_leader(leader.limits, followers)
+        for k, others in _crowded(np.array([own, *ranges])):
+            joint, (low, high) = followers[k], ranges[k]
+            against = f" beside {_named([followers[other].name for other in others])}" if others else ""
             message = (
                 f"its range leaves {leader.name}, which it follows, {low:.6g} to {high:.6g} of "
                 f"{own[0]:.6g} to {own[1]:.6g}{against}: no room to move; correct the limits or the multiplier, "
@@ -63,7 +68,35 @@ def with_room(
     return list(found.values())
 
 
-def _follows(joint: Joint, leader: Joint) -> bool:
-    """Whether a joint follows another, with a range of its own."""
-    ranged = (joint.limits.lower, joint.limits.upper) != (None, None)
-    return joint.moving and joint.mimic is not None and joint.mimic.joint == leader.name and ranged
+def _has_range(joint: Joint) -> bool:
+    return joint.moving and (joint.limits.lower, joint.limits.upper) != (None, None)
+
+
+def _crowded(ranges: Float[np.ndarray, "joint end"]) -> Iterator[tuple[int, list[int]]]:
+    """Yield the joints that leave the first one no room, and beside which others; by themselves where beside none.
+
+    As `jounce.robot.model.has_room` of each and of each two of them, for thousands at once.
+    """
+    with np.errstate(invalid="ignore"):  # between ends that are both infinite
+        widths = np.diff(ranges)[:, 0]
+        low, high = np.maximum(ranges[0, 0], ranges[1:, 0]), np.minimum(ranges[0, 1], ranges[1:, 1])
+        finite = np.where(np.isfinite(widths), widths, np.inf)
+        narrow, fixed = np.minimum(finite[0], finite[1:]), widths[0] == 0
+
+        def room(lower: Any, upper: Any, narrowest: Any) -> Any:
+            least = POINT * np.where(np.isfinite(narrowest), narrowest, 0.0)
+            return (upper - lower > least) | (fixed & (upper >= lower))
+
+        fits = room(low, high, narrow)
+        for k in range(len(low)):
+            if not fits[k]:
+                yield k, []
+                continue
+            beside = room(np.maximum(low[k], low), np.minimum(high[k], high), np.minimum(narrow[k], narrow))
+            if others := [int(other) for other in np.flatnonzero(fits & ~beside) if other != k]:
+                yield k, others
+
+
+def _named(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MOST_NAMED} others" if len(names) > MOST_NAMED else ""
+    return ", ".join(names[:MOST_NAMED]) + more
