@@ -19,7 +19,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-__all__ = ["end_on_signals", "is_command", "left_behind", "mark_forks", "raising", "undoing"]
+__all__ = ["end_on_signals", "is_command", "left_behind", "mark_forks", "raising", "shielding", "undoing"]
 
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 PATIENCE = 0.2  # s that the main thread has to come out of native code before another one ends the process
@@ -121,6 +121,23 @@ def raising() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, _end)
+
+
+@contextmanager
+def shielding() -> Iterator[None]:
+    """Keep Ctrl-C from the processes that threads started meanwhile will start: they end with the command, silently.
+
+    It goes to all processes of a terminal, and each would print where it was. The mask of a thread goes over to the
+    threads and processes that it starts; this process hears of the signal by the thread that watches for it.
+    """
+    if signal.getsignal(signal.SIGINT) is not _end or not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def mark_forks() -> None:

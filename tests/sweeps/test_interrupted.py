@@ -1,5 +1,6 @@
 """Sweeps that a signal ends: nothing is left behind, nothing is said, and the same command goes on."""
 
+import contextlib
 import os
 import pathlib
 import signal
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import time
 
+import psutil
 import pytest
 
 pytestmark = [
@@ -37,6 +39,11 @@ def wait_until(told, process=None):
         time.sleep(0.05)
 
 
+def workers_of(process):
+    with contextlib.suppress(psutil.Error):
+        return [child for child in psutil.Process(process.pid).children() if "spawn_main" in " ".join(child.cmdline())]
+
+
 def are_left(group):
     try:
         os.killpg(group, 0)
@@ -54,6 +61,7 @@ def folder(tmp_path_factory):
     "name, send, when",
     [
         ("SIGINT", "killpg", "computing"),
+        ("SIGINT", "killpg", "importing"),
         ("SIGTERM", "kill", "starting"),
         ("SIGHUP", "killpg", "computing"),
         ("SIGKILL", "kill", "starting"),
@@ -65,7 +73,9 @@ def test_nothing_is_left_and_nothing_is_said(folder, name, send, when):
     command = [sys.executable, "-m", "jounce", "sweep", str(FILE), "--order", "1", "--workers", "1", "--chunk", "16"]
     number = getattr(signal, name)
     process = started([*command, "--vary", "BC=13cm:15cm:4000", "--out", str(out)], folder)
-    wait_until(lambda: any(out.glob(".scratch-*" if when == "starting" else "chunks/digest/c/[0-9]*")), process)
+    wait_until(lambda: any(out.glob("chunks/digest/c/[0-9]*" if when == "computing" else ".scratch-*")), process)
+    if when == "importing":  # what its workers need, in which they would say where they were
+        wait_until(lambda: workers_of(process), process)
     assert any(out.glob(".scratch-*"))
     getattr(os, send)(process.pid, number)
     printed, told = process.communicate(timeout=60)

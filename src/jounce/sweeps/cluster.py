@@ -12,6 +12,7 @@ from typing import Any
 
 from jounce.errors import JounceError, UnsupportedError
 from jounce.execution.threads import thread_count
+from jounce.interrupts import shielding
 from jounce.sweeps.chunks import Plan, compute_on_worker
 from jounce.sweeps.manifest import versions
 
@@ -199,7 +200,7 @@ def _local(count: int, scratch: Path) -> Any:
     }
     try:
         _track_quietly()
-        with dask.config.set(lean):
+        with dask.config.set(lean), shielding():
             return LocalCluster(n_workers=count, threads_per_worker=1, processes=True, **settings)
     except (OSError, RuntimeError) as error:
         raise ClusterError(f"the workers did not start ({error}); if this is a script: {GUARD}") from None
