@@ -6,7 +6,6 @@ from jounce import (
     jet as jet,
     rigid as rigid,
     robot as robot,
-    testing as testing,
 )
 from jounce.constraints import (
     AbstractConstraint as AbstractConstraint,

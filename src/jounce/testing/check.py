@@ -47,6 +47,14 @@ class JointReport:
         Names of the contracts that it keeps.
     left_out : mapping of str to str
         Why contracts say nothing of it, or not all that they do, by name.
+
+    Examples
+    --------
+    >>> from jounce import planar
+    >>> from jounce.testing import check_joint
+    >>> report = check_joint(planar.Revolute, contracts=["expressions", "files"])
+    >>> report.held, dict(report.left_out)
+    (('expressions', 'files'), {})
     """
 
     kind: type[Any]
