@@ -41,22 +41,22 @@ def sides_of_designs(
     last: float,
     order: int,
     *,
-    free: bool = False,
+    forces: bool | None = None,
 ) -> tuple[Float[np.ndarray, "design side"], Float[np.ndarray, "design side"]]:
     """Return where the laws of each design jump or bend, and the instants on both sides of it.
 
-    A design with fewer of them than others has the first instant in their place. Laws of forces count where these move
-    the mechanism (`free`).
+    A design with fewer of them than others has the first instant in their place. Laws of forces count as
+    `breaks_of_laws` takes them.
     """
     count = len(next(iter(parameters.values())))
     different = 0
-    if laws_may_break(mechanism, free=free):
+    if laws_may_break(mechanism, forces=forces):
         different = count if breaks_depend_on(mechanism, parameters) else 1
     found = []
     for k in range(different):
         try:
             design = mechanism.with_parameters(**{name: float(values[k]) for name, values in parameters.items()})
-            breaks = breaks_of_laws(design, first, last, order, free=free)
+            breaks = breaks_of_laws(design, first, last, order, forces=forces)
         except JounceError:  # told when the design is solved
             breaks = np.zeros(0)
         sides, which = both_sides(breaks, first, last)

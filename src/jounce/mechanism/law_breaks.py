@@ -57,11 +57,10 @@ def breaks_of_laws(
 
 
 @under_own_settings
-def laws_may_break(mechanism: Mechanism, *, free: bool = False) -> bool:
+def laws_may_break(mechanism: Mechanism, *, forces: bool | None = None) -> bool:
     """Tell whether a law that `breaks_of_laws` looks at may jump or bend anywhere, whatever its parameters are."""
-    return any(map(may_break, laws_of(mechanism))) or (
-        (free or _shows_forces(mechanism)) and any(map(may_break, laws_of_forces(mechanism)))
-    )
+    counted = _shows_forces(mechanism) if forces is None else forces
+    return any(map(may_break, laws_of(mechanism))) or (counted and any(map(may_break, laws_of_forces(mechanism))))
 
 
 @under_own_settings

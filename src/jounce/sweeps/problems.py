@@ -211,7 +211,7 @@ class Simulations(_OfMechanism):
         """Simulate some designs side by side; their threads are as many as the machine has cores."""
         del threads
         first, last = sorted((float(self.instants[0]), float(self.instants[-1])))
-        breaks, beside = sides_of_designs(self.mechanism, designs, first, last, self.order, free=True)
+        breaks, beside = sides_of_designs(self.mechanism, designs, first, last, self.order, forces=True)
         parts = [
             self._simulated({name: values[lot] for name, values in designs.items()}, beside[lot])
             for lot in _lots(beside, MORE_INSTANTS * len(self.instants))
