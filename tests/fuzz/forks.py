@@ -13,6 +13,8 @@ from jounce.io import hdf5_check
 _SERVER = """
 import io, os, select, signal, struct, sys
 import h5netcdf, h5py, xarray
+good = xarray.Dataset({"a": ("time", [1.0])}, {"time": [0.0]}).to_netcdf(engine="h5netcdf")
+xarray.load_dataset(io.BytesIO(bytes(good)), engine="h5netcdf")  # what this imports, no fork does again
 program, answers, questions = compile(sys.argv[1], "program", "exec"), os.dup(1), sys.stdin.buffer
 while head := questions.read(16):
     size, seconds = struct.unpack("<qd", head)

@@ -79,6 +79,12 @@ def test_a_table_that_a_spreadsheet_saved(tmp_path):
     assert read(table(tmp_path, "\ufefftime,psi\r\n0,1\r\n"))["psi"].values.tolist() == [[1.0]]
 
 
+def test_a_unit_that_is_none_of_mechanics_is_kept(tmp_path):
+    found = read(table(tmp_path, "time [s],T [degC]\n0,20\n"))
+    write(found, tmp_path / "again.csv")
+    assert (tmp_path / "again.csv").read_text() == "time [s],T [degC]\n0,20\n"
+
+
 def external_array(file):
     del file["psi"]
     file.create_dataset("psi", (5, 2), "f8", external=[("/dev/zero", 0, 80)])

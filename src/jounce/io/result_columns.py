@@ -17,6 +17,7 @@ from jounce.units.shown_units import derivative_unit, time_axes
 if TYPE_CHECKING:
     import xarray
 
+SUFFIXES = (".csv", ".nc")  # of files of results
 ALONG = ("time", "angle", "point")  # what the rows of a table follow: of a motion, of a cam, of a curve
 CURVE_AXES = ("arc_length", "driver_value")  # first columns of a curve of configurations
 AXES = {  # of outputs that are more than one number, and the labels along them

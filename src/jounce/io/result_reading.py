@@ -16,8 +16,7 @@ from jounce.errors import OutputError
 from jounce.io.files.column_units import name_and_unit
 from jounce.io.files.reading import bad_line, is_result, known_name, read_file
 from jounce.io.hdf5_check import LONGEST, check_readable
-from jounce.io.result_columns import dataset_of
-from jounce.io.results import SUFFIXES
+from jounce.io.result_columns import SUFFIXES, dataset_of
 from jounce.settings import under_own_settings
 
 if TYPE_CHECKING:

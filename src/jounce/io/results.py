@@ -15,13 +15,11 @@ from jounce.io.files.column_units import heading, is_si, name_and_unit
 from jounce.io.files.netcdf_parts import NetcdfParts
 from jounce.io.files.reading import written_name
 from jounce.io.files.writing import check_target, replacing
-from jounce.io.result_columns import column_units, columns
+from jounce.io.result_columns import SUFFIXES, column_units, columns
 from jounce.settings import under_own_settings
 
 if TYPE_CHECKING:
     import xarray
-
-SUFFIXES = (".csv", ".nc")
 
 
 class _SourceError(Exception):

@@ -196,6 +196,8 @@ def test_included_files_and_meshes_of_mjcf(tmp_path):
         error = fails_soon(lambda text=text: load(text), RobotFileError)
         assert "MuJoCo" not in str(error)
     assert load(refused[4], allow=[tmp_path / "there"]).mass > 0
+    with pytest.raises(RobotFileError, match=r"robot\.xml, line 2, include: is a directory.*, got '\.'"):
+        load("<mujoco>\n<include file='.'/></mujoco>")
 
 
 def test_numbers_of_included_files_are_checked_and_no_log_is_left():

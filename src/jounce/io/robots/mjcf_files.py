@@ -56,10 +56,20 @@ def included(root: Element, allow: Iterable[str | PathLike[str]] = ()) -> list[E
                 path = _named(element, name, root, allow, folder)
                 if os.path.lexists(path):
                     if path not in found:
-                        found[path] = read_markup(path)
+                        found[path] = _included(element, name, path)
                         waiting.append(found[path])
                     break
     return list(found.values())
+
+
+def _included(element: Element, name: str, path: str) -> Element:
+    """Read a file that an element names; one of which nothing can be read is an error of that element."""
+    try:
+        return read_markup(path)
+    except RobotFileError as error:
+        if error.line is not None:
+            raise
+        raise element.error(error.message, element.tag, value=name) from None
 
 
 def check_copies(parts: Iterable[Element]) -> None:
