@@ -6,6 +6,7 @@ Instants may start from the results of others: they are solved in rounds, each o
 """
 
 import dataclasses
+import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
@@ -27,7 +28,7 @@ from jounce.shapes import is_traced
 
 WIDTHS = (8, 256)  # instants that XLA's programs are for: each compiles once
 GPU_WIDTH = 2**15  # the same on a GPU, which they have to fill
-STARTS = 64  # instants from which others start, in the arrays of rounds of XLA
+STARTS = 64  # instants from which those of rounds of XLA start
 SIDE_BY_SIDE = 128  # samples along the first axis that XLA computes side by side, so that the cache holds them
 Rounds = Callable[[Int[np.ndarray, "round lane"]], None]
 _published: dict[str, Program] = {}  # by the names under which other machine code calls them
@@ -75,10 +76,6 @@ class OnLlvm:
     def width(self) -> int:
         """How many instants a round has: as many as a vector holds."""
         return self.machine_code.width
-
-    def room(self, count: int) -> int:
-        """Return of how many instants the arrays of rounds are to be, where so many are solved."""
-        return count
 
     @cached_property
     def name(self) -> str:
@@ -146,16 +143,6 @@ class OnXla:
 
         return jax.tree.map(whole, *parts)
 
-    def room(self, count: int) -> int:
-        """Return of how many instants the arrays of rounds are to be, where so many are solved: one of few numbers.
-
-        Each of them compiles once. Beside full rounds there are some that others start from.
-        """
-        rounds = self.width
-        while rounds + STARTS < count:
-            rounds *= 4
-        return rounds + STARTS
-
     def rounds(self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"]) -> Rounds:
         """Return what solves instants in rounds, as that of `OnLlvm`; the arrays are written when all are solved."""
         linked, own, held = map(jax.tree.leaves, lanes)
@@ -165,14 +152,33 @@ class OnXla:
         links = tuple(next(k for k, whole in enumerate(wholes) if whole is part) for part in linked)
 
         def run(targets: Int[np.ndarray, "round lane"]) -> None:
-            end, turns, room = targets.max(initial=-1) + 1, np.asarray(len(targets)), -(-len(sources) // self.width)
-            targets = np.concatenate([targets, np.zeros((max(0, room - len(targets)), self.width), np.int64)])
-            how = (links, wanted, self.form, self.how)
-            found = self.mapped.in_rounds(self.shared, wholes, (own, held), (sources, targets, turns), how)
+            order, total = targets.ravel(), self.width * _power(len(targets))
+            place = np.full(wholes[0].shape[-1], -1)
+            place[order[::-1]] = np.arange(len(order))[::-1]
+            source = sources[order]
+            before = np.unique(source[place[source] < 0])  # those that are not solved here
+            source = np.where(place[source] < 0, total + np.searchsorted(before, source), place[source])
+            starts = [_filled(wholes[k][..., before], STARTS * _power(-(-len(before) // STARTS))) for k in links]
+            given = [_filled(x[..., order], total) for x in own]
+            order_of_rounds = _filled(source, total), np.asarray(len(targets))
+            how = links, wanted, self.width, self.form, self.how
+            found = self.mapped.in_rounds(self.shared, starts, (given, held), order_of_rounds, how)
             for whole, part in zip(wholes, found, strict=True):
-                whole[..., :end] = np.asarray(part)[..., :end]
+                whole[..., order] = np.asarray(part)[..., : len(order)]
 
         return run
+
+
+def _power(count: int) -> int:
+    """Return the first power of four that is no less: sizes for which programs are compiled are few."""
+    return 4 ** math.ceil(math.log(max(1, count), 4))
+
+
+def _filled(array: np.ndarray, total: int) -> np.ndarray:
+    """Return an array with zeros behind its instants, up to so many."""
+    found = np.zeros((*array.shape[:-1], total), array.dtype)
+    found[..., : array.shape[-1]] = array
+    return found
 
 
 def _taken(array: np.ndarray, places: Int[np.ndarray, " lane"], axis: int) -> np.ndarray:
@@ -267,21 +273,37 @@ class Mapped:
         return jax.tree.map(lambda x: jnp.reshape(x, (count, *x.shape[2:])), jax.lax.map(block, parts))
 
     def _in_rounds(
-        self, shared: Any, wholes: Sequence[Any], others: tuple[Any, Any], order: tuple[Any, Any, Any], how: Any
+        self, shared: Any, starts: Sequence[Any], others: tuple[Any, Any], order: tuple[Any, Any], how: Any
     ) -> Any:
-        """Return the arrays of all instants after rounds of some of them; see `OnXla.rounds`."""
-        (own, held), (sources, targets, turns), (links, wanted, form, static) = others, order, how
+        """Return the results of instants in the order of rounds, as `OnXla.rounds` puts them.
 
-        def go_on(turn: Any, wholes: list[Any]) -> list[Any]:
-            here = targets[turn]
-            source = sources[here]
-            given = [jnp.take(wholes[k], source, axis=-1) for k in links] + [jnp.take(x, here, axis=-1) for x in own]
-            given += [jnp.broadcast_to(jnp.asarray(x), (*x.shape[:-1], len(here))) for x in held]
-            found = jax.tree.leaves(self._many(shared, jax.tree.unflatten(form, given), **dict(static)))
-            parts = zip(wholes, (found[k] for k in wanted), strict=True)
-            return [whole.at[..., here].set(part) for whole, part in parts]
+        Each round is written in one piece, for which XLA has fast code: it has none for numbers put here and there.
+        """
+        (own, held), (sources, turns), (links, wanted, width, form, static) = others, order, how
+        total = len(sources)
 
-        return jax.lax.fori_loop(0, turns, go_on, [jnp.asarray(x) for x in wholes])
+        def solved(linked: Sequence[Any], own: Sequence[Any]) -> list[Any]:
+            same = [jnp.broadcast_to(jnp.asarray(x), (*x.shape[:-1], width)) for x in held]
+            given = jax.tree.unflatten(form, [*linked, *own, *same])
+            found = jax.tree.leaves(self._many(shared, given, **dict(static)))
+            return [found[k] for k in wanted]
+
+        def some(x: Any, turn: Any) -> Any:
+            return jax.lax.dynamic_slice_in_dim(x, turn * width, width, axis=-1)
+
+        def go_on(turn: Any, kept: list[Any]) -> list[Any]:
+            source = some(sources, turn)
+            parts = solved([jnp.take(kept[k], source, axis=-1) for k in links], [some(x, turn) for x in own])
+            put = jax.lax.dynamic_update_slice_in_dim
+            return [put(whole, part, turn * width, -1) for whole, part in zip(kept, parts, strict=True)]
+
+        one = [[jax.ShapeDtypeStruct((*x.shape[:-1], width), x.dtype) for x in group] for group in (starts, own)]
+        shapes = jax.eval_shape(solved, *one)
+        kept = [jnp.zeros((*x.shape[:-1], total), x.dtype) for x in shapes]
+        for k, start in zip(links, starts, strict=True):
+            kept[k] = jnp.concatenate([kept[k], start], axis=-1)
+        found = jax.lax.fori_loop(0, turns, go_on, kept)
+        return [x[..., :total] for x in found]
 
 
 def mapped(**how: Any) -> Callable[[Callable[..., Any]], Mapped]:

@@ -132,14 +132,12 @@ class _Room:
 
     def __init__(self, solver: Solver, like: Any, size: int, anchors: int):
         leaves, form = jax.tree.flatten(like)
-        room = solver.program.room(size + anchors)
-        shapes = [*((*leaf.shape[:-1], room) for leaf in leaves), *[(room,)] * 4]
+        shapes = [*((*leaf.shape[:-1], size + anchors) for leaf in leaves), *[(size,)] * 4]
         self.block, self._size = borrow(room_of(shapes)), size
         kinds = [*[float] * (len(leaves) + 2), *[int] * 2]
         *state, self._time, self._step, self.status, self._source = arrays_in(self.block, shapes, kinds)
         self.state = jax.tree.unflatten(form, state)
-        for part in (self._time, self._step, self.status, self._source):
-            part[:] = 0
+        self._source[:] = 0
         self._width = solver.program.width
         self._run = solver.rounds(self.state, self._step, self._time, self.status, self._source)
         self._rounds = rounds(0, 1, self._width)
@@ -160,6 +158,13 @@ class _Room:
         self._step[:count] = np.where(near, to_neighbour, to_anchor)
         self._rounds = rounds(count, stride, self._width)
 
+    def rest(self, like: Any, count: int, stride: int) -> None:
+        """Take up so many instants, all at the same time, s, as that of a state."""
+        for whole, part in zip(jax.tree.leaves(self.state), jax.tree.leaves(like), strict=True):
+            whole[..., self._size :] = part
+        self._time[:], self._step[:], self._source[:] = 0.0, 0.0, self._size
+        self._rounds = rounds(count, stride, self._width)
+
     def solve(self) -> None:
         """Solve the instants that were taken up last."""
         self._run(self._rounds)
@@ -170,12 +175,13 @@ class _Room:
 
 
 def prepare_spans(solver: Solver, like: SolvedState, count: int) -> None:
-    """Compile what solves a grid of so many instants, unless it is there already; nothing is solved."""
+    """Compile what solves a grid of so many instants, unless it is there already, and solve one again and again."""
     if solver.is_compiled:
         return
-    anchors = SMALL_BATCH  # as many as there are likely to be
-    size = min(count, stride_of(solver, count, count, anchors) * solver.program.width)
-    room = _Room(solver, like, size, anchors)
+    stride = stride_of(solver, count, count, SMALL_BATCH)  # anchors, which are not known yet
+    size = min(count, stride * solver.program.width)
+    room = _Room(solver, like, size, 1)
+    room.rest(like, size, stride)
     room.solve()
     give_back(room.block)
 
