@@ -40,5 +40,5 @@ def test_laws_of_forces_count_where_they_move_the_mechanism():
     )
     values = {"begin": np.array([0.3, 0.4])}
     assert design_sides.sides_of_designs(pushed, values, 0.0, 1.0, 3)[0].shape == (2, 0)
-    breaks, _ = design_sides.sides_of_designs(pushed, values, 0.0, 1.0, 3, free=True)
+    breaks, _ = design_sides.sides_of_designs(pushed, values, 0.0, 1.0, 3, forces=True)
     assert breaks == pytest.approx(np.array([[0.3, 0.3], [0.4, 0.4]]), abs=1e-9)
