@@ -92,6 +92,24 @@ def test_what_is_no_message_of_the_page_prints_nothing(page, bare, message, capf
     assert caplog.records == []  # the root logger would print them
 
 
+def test_values_that_no_control_can_have_print_nothing(page, bare, capfd, caplog):
+    given = {"origin": bare, "subprotocols": [f"viser-v{viser.__version__}"], "max_size": None}
+    controls = list(page.page.server.gui._gui_input_handle_from_uuid)
+    with connect(page.url.replace("http", "ws", 1), **given) as stream:
+        stream.recv(timeout=20)
+        for update in ({"nothing": 1}, {"value": []}, {"value": {}}):
+            for name in controls:
+                message = {"type": "GuiUpdateMessage", "uuid": name, "updates": update}
+                stream.send(msgspec.msgpack.encode(message))
+        with contextlib.suppress(ConnectionClosed, TimeoutError):
+            while stream.recv(timeout=1.0):
+                pass
+    gc.collect()
+    assert fetched(page.url)[0] == 200
+    assert capfd.readouterr() == ("", "")
+    assert caplog.records == []
+
+
 @pytest.mark.parametrize("length", [2000, 7000])
 def test_a_long_path_is_refused_in_words(page, bare, length):
     token = page.url.removeprefix(bare)[1:]

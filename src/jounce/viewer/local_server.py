@@ -16,7 +16,7 @@ import secrets
 import socket
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -126,6 +126,23 @@ def _refuse_uploads(server: Any) -> None:
         server.gui._websock_interface.unregister_handler(kind)
 
 
+def _ignore_what_does_not_fit(server: Any) -> None:
+    """Say nothing of messages that no page sends, such as letters for the number of a slider.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+    """
+    interface = server.gui._websock_interface
+    handle = interface._handle_incoming_message
+
+    async def handled(client: int, message: Any) -> None:
+        with suppress(Exception):  # viser would print it; errors of callbacks come another way
+            await handle(client, message)
+
+    interface._handle_incoming_message = handled
+
+
 def _this_machine(host: str) -> bool:
     return re.sub(r":[0-9]+$", "", host).lower() in HOSTS
 
@@ -165,6 +182,7 @@ def quiet_server(port: int = 0, label: str | None = None, access: AccessControl 
         with redirect_stdout(io.StringIO()), (access or AccessControl()).starting():
             server = viser.ViserServer(host="127.0.0.1", port=port or _free_port(), label=label, verbose=False)
         _refuse_uploads(server)
+        _ignore_what_does_not_fit(server)
     except BaseException:
         if server is not None:
             quiet_stop(server)
