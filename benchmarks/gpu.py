@@ -18,7 +18,7 @@ from benchmarks.arm import REFERENCE, arm, motion
 from benchmarks.cases import EXAMPLES, CannotRunError, Case, Cases, Contestant
 from benchmarks.processes import Worker
 from benchmarks.references import KINEMATIC, error_of, largest_error
-from jounce.kinematics.instant_program import advance_instant
+from jounce.kinematics.continuation.instant_program import advance_instant
 
 os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")  # several processes share the device
 ON_CPU, ON_GPU = {"JAX_PLATFORMS": "cpu"}, {"JAX_PLATFORMS": "cuda,cpu"}

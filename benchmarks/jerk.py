@@ -17,9 +17,9 @@ import numpy as np
 import jounce as jn
 from benchmarks.cases import Case, Cases, Contestant, ready
 from jounce import drivers, planar
-from jounce.dynamics.forward import State
+from jounce.dynamics.forward.accelerations import State
 from jounce.integrate import AbstractMethod
-from jounce.integrate.diffrax_term import state_rates
+from jounce.integrate.mechanisms.diffrax_term import state_rates
 
 GRID = np.linspace(0.0, 1.0, 17)  # s
 STEPS = tuple(1 / 16 / n for n in (1, 2, 4, 8, 16, 32))  # s; all end on the grid

@@ -14,9 +14,9 @@ FILES = ("four_bar", "slider_crank", "six_bar_watt", "press", "rssr", "rsur")
 
 def moved(file: str) -> Callable[[], Any]:
     """Return the function that moves the first slider of a page and waits for its motion."""
-    from jounce.viewer.local_server import quiet_server
-    from jounce.viewer.mechanisms import MechanismSubject
-    from jounce.viewer.page import Page
+    from jounce.viewer.page.local_server import quiet_server
+    from jounce.viewer.page.page import Page
+    from jounce.viewer.subjects.mechanisms import MechanismSubject
 
     subject = MechanismSubject(jn.load(EXAMPLES / f"{file}.yaml"))
     page, turn = Page(quiet_server(), subject, order=4), count()

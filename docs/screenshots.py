@@ -10,7 +10,7 @@ from playwright.sync_api import sync_playwright
 
 import jounce as jn
 from jounce.viewer import view
-from jounce.viewer.appearance import BodyPoint
+from jounce.viewer.shapes.appearance import BodyPoint
 
 IMAGES = Path(__file__).parent / "images"
 FLAGS = ["--headless=new", "--no-sandbox", "--enable-unsafe-swiftshader"]

@@ -17,24 +17,24 @@ SLOW_EXAMPLES = frozenset(
     """
     jounce.design.optimise.optimise
     jounce.design.tolerance.tolerance
-    jounce.dynamics.reactions.applied_force
-    jounce.integrate.batch.simulate_batch
-    jounce.integrate.diffrax_term.ode_term
-    jounce.integrate.simulate.simulate
+    jounce.dynamics.inverse.reactions.applied_force
+    jounce.integrate.mechanisms.batch.simulate_batch
+    jounce.integrate.mechanisms.diffrax_term.ode_term
+    jounce.integrate.mechanisms.simulate.simulate
     jounce.io.results.write_parts
     jounce.kinematics.cams.plate_cam.plate_cam
     jounce.kinematics.curves.assemblies.assemblies
     jounce.kinematics.curves.limits.LimitPosition
-    jounce.kinematics.families.solve_batch
-    jounce.kinematics.solve.solve_in_stretches
+    jounce.kinematics.families.solve_batch.solve_batch
+    jounce.kinematics.position_analysis.solve.solve_in_stretches
     jounce.planning.tool_paths.follow_tool_path.follow_tool_path
     jounce.plot.bands.draw_bands
     jounce.plot.forces.draw_power
-    jounce.robot.closed_loop.mechanism
+    jounce.robot.closed_loops.closed_loop.mechanism
     jounce.sweeps.sweep.sweep
     jounce.trajectory.composed.OutputMotion
-    jounce.viewer.cams.cam_mechanism
-    jounce.viewer.slopes.peak_slopes
+    jounce.viewer.subjects.cams.cam_mechanism
+    jounce.viewer.subjects.slopes.peak_slopes
     """.split()
 )
 """Docstrings whose examples take more than a second and a half, most of them to compile."""

@@ -81,7 +81,7 @@ try:
         pass
 except jn.MechanismError as error:
     print(error.message)"""
-    assert "that of jounce.robot.coupling.CoupledJoints already" in printed(code)
+    assert "that of jounce.robot.closed_loops.coupling.CoupledJoints already" in printed(code)
 
 
 def test_everything_can_be_imported_by_a_star():

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from jounce.dynamics.limits import check_limits
+from jounce.dynamics.limits.check_limits import check_limits
 from jounce.io.robots.limits import load_limits
 from jounce.io.robots.loader import load_robot
 from jounce.io.robots.trajectories import load_trajectory

@@ -8,7 +8,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from jounce import io
-from jounce.reporting.json_result_schema import result_schema
+from jounce.reporting.json.result_schema import result_schema
 from tests.cli.test_check import PENDULUM
 from tests.cli.test_torques import LAW, closed_form
 

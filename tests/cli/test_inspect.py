@@ -9,7 +9,7 @@ import pytest
 
 import jounce as jn
 from jounce.papers.sommer_2024 import VALIDATION_CASES
-from jounce.reporting.json_result_schema import result_schema
+from jounce.reporting.json.result_schema import result_schema
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"

@@ -7,7 +7,7 @@ import pathlib
 import numpy as np
 import pytest
 
-from jounce.reporting.json_result_schema import result_schema
+from jounce.reporting.json.result_schema import result_schema
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "examples"
 PENDULUM = EXAMPLES / "double_pendulum.yaml"

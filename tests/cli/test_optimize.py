@@ -9,7 +9,7 @@ from jsonschema import Draft202012Validator
 
 import jounce as jn
 from jounce.cli import main
-from jounce.reporting.json_result_schema import result_schema
+from jounce.reporting.json.result_schema import result_schema
 
 TEXT = """\
 # A crank whose law is a cubic.

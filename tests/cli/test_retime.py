@@ -7,7 +7,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from jounce import io
-from jounce.reporting.json_result_schema import result_schema
+from jounce.reporting.json.result_schema import result_schema
 
 PANDA = "examples/robots/panda.urdf"
 TOO_FAST = "examples/trajectories/panda_too_fast.csv"

@@ -8,7 +8,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from jounce import io
-from jounce.reporting.json_result_schema import result_schema
+from jounce.reporting.json.result_schema import result_schema
 from tests.cli.test_check import PENDULUM
 
 LAW = "joints: {pin: 0.5*sin(2*t)}\ntime: {start: 0, stop: 1, step: 0.1}\n"

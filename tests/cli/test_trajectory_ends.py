@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
-from jounce.reporting.json_result_schema import result_schema
+from jounce.reporting.json.result_schema import result_schema
 from tests.cli.test_check import PENDULUM
 
 POINTS = """joint_names: [pin]

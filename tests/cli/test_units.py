@@ -45,7 +45,7 @@ def test_inside_is_si_and_what_is_shown_says_its_units(four_bar, tmp_path):
 def test_figures_peaks_and_the_view_are_in_the_units_of_the_file(four_bar):
     from jounce.plot import draw, hodograph, phase_portrait
     from jounce.reporting.peaks import peaks, shown_peaks
-    from jounce.viewer.mechanisms import recorded
+    from jounce.viewer.subjects.mechanisms import recorded
 
     mechanism, motion = four_bar
     labels = [axes.get_ylabel() for axes in draw(motion).axes]

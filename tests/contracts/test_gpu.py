@@ -15,7 +15,7 @@ import pytest
 import jounce as jn
 from jounce.execution import mapped
 from jounce.execution.device import on_processor
-from jounce.kinematics import instant_program
+from jounce.kinematics.continuation import instant_program
 from tests.problems.mechanisms import example, reference
 
 ROBOTS = Path(__file__).parents[2] / "examples" / "robots"

@@ -115,7 +115,7 @@ def test_the_command_tells_what_matters_and_draws_it(crank, tmp_path, capsys, sp
     result = json.loads(capsys.readouterr().out)
     from jsonschema import Draft202012Validator
 
-    from jounce.reporting.json_result_schema import result_schema
+    from jounce.reporting.json.result_schema import result_schema
 
     Draft202012Validator(result_schema()).validate(result)
     columns = [(x["output"], x["derivative"]) for x in result["spread"]]

@@ -13,7 +13,7 @@ import jounce as jn
 from jounce.cli.file_kinds import kind_of
 from jounce.constraints import catalogue
 from jounce.mechanism.resolve import resolve_motion
-from jounce.robot.closures import Loops
+from jounce.robot.closed_loops.closures import Loops
 from tests.problems.closed_robots import FIVE_BAR, in_contact, in_pinocchio
 
 ROOT = pathlib.Path(__file__).parents[2]

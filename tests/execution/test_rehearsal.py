@@ -41,7 +41,7 @@ def compiled_later(monkeypatch):
     monkeypatch.setattr(solving, "rehearsed", first)
     monkeypatch.setattr(solving, "_rehearse", known)
     monkeypatch.setattr(sys.modules["jounce.execution.rehearsal"], "_had", set())
-    monkeypatch.setattr(sys.modules["jounce.integrate.programs_ahead"], "rehearsed", first)
+    monkeypatch.setattr(sys.modules["jounce.integrate.mechanisms.programs_ahead"], "rehearsed", first)
     return lambda: {name for name, count in counts().items() if count > before[name]}
 
 

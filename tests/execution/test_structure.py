@@ -12,7 +12,7 @@ import pytest
 import jounce as jn
 from jounce.execution.structure import UndescribedError, description, program_key, tree_description
 from jounce.kinematics import Status
-from jounce.kinematics.advance import advance
+from jounce.kinematics.continuation.correct_and_differentiate import advance
 from jounce.mechanism import build
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.trajectory import Expression

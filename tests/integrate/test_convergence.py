@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.dynamics.start import consistent_start
+from jounce.dynamics.forward.initial_state import consistent_start
 from tests.problems import dynamics
 from tests.problems.marches import LENIENT, ends, marched, onwards, orders
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.dynamics.forward import State
+from jounce.dynamics.forward.accelerations import State
 from jounce.errors import MechanismError
 from tests.problems import dynamics
 

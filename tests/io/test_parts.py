@@ -25,7 +25,7 @@ SUFFIXES = ["nc", "csv"]
 
 @pytest.fixture(autouse=True)
 def _three_stretches(monkeypatch):
-    monkeypatch.setattr("jounce.kinematics.long_grids.STRETCH", 1100)
+    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.STRETCH", 1100)
 
 
 def turning():

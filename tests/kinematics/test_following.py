@@ -10,9 +10,9 @@ import jounce as jn
 from jounce import drivers, planar
 from jounce.jet import Jet
 from jounce.kinematics import Status
-from jounce.kinematics.advance import _status
-from jounce.kinematics.assembly import assemble
-from jounce.kinematics.solver import Solver
+from jounce.kinematics.assembly.assemble import assemble
+from jounce.kinematics.continuation.correct_and_differentiate import _status
+from jounce.kinematics.continuation.solver import Solver
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism import build
 from tests.problems.small import crank, distance_slider, four_bar, slider_crank
@@ -98,7 +98,7 @@ def test_where_both_sides_disagree_only_what_rounding_spoils_is_refused(monkeypa
     """No motion is known on which they disagree, so they are made to."""
     away = np.geomspace(1e-6, 0.5, 40)
     time = np.r_[0.5, np.pi - away[::-1], np.pi + away]
-    monkeypatch.setattr("jounce.kinematics.grid.LARGEST_DISAGREEMENT", -1.0)
+    monkeypatch.setattr("jounce.kinematics.position_analysis.grid.LARGEST_DISAGREEMENT", -1.0)
     motion = jn.solve(PARALLELOGRAM, time, order=4, strict=False)
     refused = motion.status == Status.SINGULAR
     width = np.max(np.abs(time - np.pi)[refused])

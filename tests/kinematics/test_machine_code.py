@@ -7,8 +7,9 @@ import jounce as jn
 from jounce.execution.llvm import self_test
 from jounce.execution.llvm.programs import Program
 from jounce.execution.mapped import Mapped, OnLlvm
-from jounce.kinematics import Status, legs
-from jounce.kinematics.instant_program import advance_instant
+from jounce.kinematics import Status
+from jounce.kinematics.continuation import continuation_steps as legs
+from jounce.kinematics.continuation.instant_program import advance_instant
 from jounce.mechanism.builder import build
 from tests.linear_algebra.test_frontal import chain
 from tests.problems.small import four_bar, slider_crank

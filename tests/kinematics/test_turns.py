@@ -8,7 +8,7 @@ import pytest
 import jounce as jn
 from jounce import drivers, forces, planar, spatial
 from jounce.dynamics import AppliedTorqueOutput, DriverTorqueOutput
-from jounce.kinematics.assembly import assemble
+from jounce.kinematics.assembly.assemble import assemble
 from jounce.mechanism import build
 from tests.problems.small import four_bar, law, spindle
 

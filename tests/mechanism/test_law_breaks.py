@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.kinematics.design_sides import sides_of_designs
+from jounce.kinematics.families.design_sides import sides_of_designs
 from jounce.mechanism.law_breaks import breaks_of_laws, laws_may_break
 
 PAIR = ("ground", "rod")

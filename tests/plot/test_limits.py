@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.dynamics.limits import check_limits
+from jounce.dynamics.limits.check_limits import check_limits
 from jounce.plot import draw_limits, save
 from jounce.trajectory import JointTrajectory
 

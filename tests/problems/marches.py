@@ -4,8 +4,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.dynamics.forward import State
-from jounce.integrate.marching import Outcome, begin_march, march
+from jounce.dynamics.forward.accelerations import State
+from jounce.integrate.marching.marching import Outcome, begin_march, march
 
 COUNT = 4096  # steps tried at most
 LENIENT = 1e-6  # tolerance where the steps are given

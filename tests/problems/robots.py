@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from jounce.io.robots.loader import load_robot
 from jounce.rigid.inertia import Inertia
-from jounce.robot.model import Joint, Limits, Link, Mimic
+from jounce.robot.model.links_and_joints import Joint, Limits, Link, Mimic
 from jounce.robot.robot import Robot
 
 FILES = pathlib.Path(__file__).parents[2] / "examples" / "robots"

@@ -5,7 +5,7 @@ import pytest
 
 import jounce as jn
 from jounce.dynamics import DriverTorqueOutput, JointForceOutput
-from jounce.reporting.motion_facts import motion_facts
+from jounce.reporting.facts.motion_facts import motion_facts
 
 
 def parallelogram(law):

@@ -6,9 +6,9 @@ import pytest
 import jounce as jn
 from jounce.execution.backends import VARIABLE
 from jounce.execution.llvm.self_test import is_usable
-from jounce.robot.batches import LEAST_THREADED
-from jounce.robot.forward_dynamics import _moved
-from jounce.robot.inverse_dynamics import _generalised_forces
+from jounce.robot.algorithms.forward_dynamics import _moved
+from jounce.robot.algorithms.inverse_dynamics import _generalised_forces
+from jounce.robot.recursions.batches import LEAST_THREADED
 from tests.problems.robots import random_robot, robot_named
 
 pytestmark = pytest.mark.skipif(not is_usable(), reason="there is no compiler, or a system where it was not tried")

@@ -337,7 +337,7 @@ def test_the_command_prints_peaks_and_a_checksum(tmp_path, capsys):
     result = json.loads(capsys.readouterr().out)
     from jsonschema import Draft202012Validator
 
-    from jounce.reporting.json_result_schema import result_schema
+    from jounce.reporting.json.result_schema import result_schema
 
     Draft202012Validator(result_schema()).validate(result)
     peak = next(x for x in result["peaks"] if x["output"] == "C_y" and x["derivative"] == 2)

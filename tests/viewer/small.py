@@ -6,9 +6,9 @@ import threading
 import numpy as np
 
 import jounce as jn
-from jounce.viewer.appearance import Appearance, BodyPoint, ColouredMesh
-from jounce.viewer.meshes import box
-from jounce.viewer.recording import Parameter, Recording
+from jounce.viewer.shapes.appearance import Appearance, BodyPoint, ColouredMesh
+from jounce.viewer.shapes.meshes import box
+from jounce.viewer.shapes.recording import Parameter, Recording
 
 INERTIA, MASS, RADIUS = 0.5, 2.0, 0.3
 

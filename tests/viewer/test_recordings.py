@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.viewer.arrows import TracedPoint, load_scale
-from jounce.viewer.mechanisms import MechanismSubject, instants_shown
-from jounce.viewer.overlay import DisplayOptions, Overlay
-from jounce.viewer.plots import cursor_data, default_charts
-from jounce.viewer.recording import rotated
+from jounce.viewer.page.overlay import DisplayOptions, Overlay
+from jounce.viewer.page.plots import cursor_data, default_charts
+from jounce.viewer.shapes.arrows import TracedPoint, load_scale
+from jounce.viewer.shapes.recording import rotated
+from jounce.viewer.subjects.mechanisms import MechanismSubject, instants_shown
 from tests.viewer.small import INERTIA, MASS, RADIUS, derivatives_of_the_rim, wheel
 
 

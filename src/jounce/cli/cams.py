@@ -61,7 +61,7 @@ def cam(
         --set "lift=12 mm" --units length=mm,angle=deg
     """
     from jounce.io import in_units, load_cam
-    from jounce.reporting.cam_facts import cam_facts, cam_words
+    from jounce.reporting.facts.cam_facts import cam_facts, cam_words
 
     output.check()
     told = heading.units

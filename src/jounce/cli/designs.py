@@ -101,7 +101,7 @@ def optimize(
     curves = {name: _points(name, path) for name, path in assignments(curve or (), "--curve", "as NAME=FILE").items()}
     spare_inputs(out, overwrite=overwrite)
     from jounce.design import optimise
-    from jounce.reporting.design_facts import design_facts, design_table, design_words
+    from jounce.reporting.facts.design_facts import design_facts, design_table, design_words
 
     with _errors_about(file), Bar("optimising") as bar:
         design = optimise(

@@ -60,10 +60,10 @@ def export(
         examples/trajectories/ur5_stack.yaml --format ros --rate 50Hz \
         --torques --out stack.yaml
     """
-    from jounce.dynamics.motion_ends import trajectory_ends
+    from jounce.dynamics.limits.motion_ends import trajectory_ends
     from jounce.io import export_trajectory
     from jounce.reporting.motion_ends import between_words, ends_words
-    from jounce.reporting.summaries import wrapped
+    from jounce.reporting.text.summaries import wrapped
 
     frequency = None if rate is None else frequency_of(rate)
     names = None if joints is None else [name.strip() for name in joints.split(",")]

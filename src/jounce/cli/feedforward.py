@@ -75,7 +75,7 @@ def feedforward(
     from jounce.io import load_drives
     from jounce.planning import feedforward as computed
     from jounce.planning.elastic.link_errors import link_errors
-    from jounce.reporting import feedforward_facts as facts
+    from jounce.reporting.facts import feedforward_facts as facts
 
     if not 0 <= rates <= MOST_RATES:
         raise JounceError(f"must be a whole number from 0 to {MOST_RATES}", name="--rates", value=rates)

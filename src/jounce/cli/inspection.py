@@ -53,8 +53,8 @@ def inspect(
       jounce inspect examples/four_bar.yaml --range
       jounce inspect examples/robots/panda.urdf --json
     """
-    from jounce.reporting.summaries import start_heading, start_summary
-    from jounce.reporting.tables import bodies_table, mechanism_tables, robot_tables
+    from jounce.reporting.text.summaries import start_heading, start_summary
+    from jounce.reporting.text.tables import bodies_table, mechanism_tables, robot_tables
 
     suffix = file.suffix.lower()
     with expecting(file, "mechanism", "robot"):
@@ -64,19 +64,19 @@ def inspect(
             raise JounceError("is for mechanism files; a robot file has no parameters", name="--set", path=file)
         if reading.units:
             raise JounceError("is for mechanism files; results for robots are in SI units", name="--units", path=file)
-        from jounce.reporting.robot_facts import inspected_robot
+        from jounce.reporting.facts.robot_facts import inspected_robot
 
         facts = inspected_robot(RobotReading(strict=strict, allow=reading.allow).robot(file), file)
     else:
         if strict:
             raise JounceError("is for robot files; mechanism files are always read so", name="--strict", path=file)
-        from jounce.reporting.mechanism_facts import inspected
+        from jounce.reporting.facts.mechanism_facts import inspected
 
         mechanism = reading.mechanism(file)
         with errors_about(file):
             facts = inspected(mechanism, file)
             if range_ and facts["ok"]:
-                from jounce.reporting.range_facts import range_facts
+                from jounce.reporting.facts.range_facts import range_facts
 
                 with options_named():
                     facts["range"] = range_facts(mechanism, driver)
@@ -89,7 +89,7 @@ def inspect(
             show_table(table)
         say(f"\n{start_summary(facts)}")
         if found := facts.get("range"):
-            from jounce.reporting.range_facts import range_words
+            from jounce.reporting.facts.range_facts import range_words
 
             say(f"\n{range_words(dict(found))}")
     return 0 if facts["ok"] else 1

@@ -177,10 +177,10 @@ def _told(
     write: Callable[[], None] = lambda: None,
 ) -> int:
     """Print what there is to tell of a motion, write it, and return the exit status."""
-    from jounce.reporting.json_results import motion_result
-    from jounce.reporting.motion_facts import motion_facts
+    from jounce.reporting.facts.motion_facts import motion_facts
+    from jounce.reporting.json.results import motion_result
     from jounce.reporting.peaks import peaks, shown_peaks
-    from jounce.reporting.summaries import motion_summary
+    from jounce.reporting.text.summaries import motion_summary
 
     if not output.json:
         say(motion_summary(motion_facts(motion), file.name))
@@ -221,7 +221,7 @@ def schema(of: Literal["mechanism", "results"] = "mechanism", /) -> int:
     import json
 
     if of == "results":
-        from jounce.reporting.json_result_schema import result_schema as wanted
+        from jounce.reporting.json.result_schema import result_schema as wanted
     else:
         from jounce.io import json_schema as wanted
 

@@ -31,7 +31,7 @@ def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: 
       jounce reproduce negrean-2025 --out out
       jounce reproduce negrean-2025 --out out --samples a.csv --masses link.yaml
     """
-    from jounce.reporting.summaries import count
+    from jounce.reporting.text.summaries import count
 
     check_name("paper", paper, PAPERS, JounceError)
     given = {name: path for name, path in (("samples", samples), ("masses", masses)) if path is not None}

@@ -69,9 +69,9 @@ def check(
     from jounce.io import load_motion_limits
     from jounce.planning.retiming.limits import limits_of
     from jounce.planning.retiming.motion_limits_check import check_motion
-    from jounce.reporting.json_results import limits_result
-    from jounce.reporting.summaries import limits_summary, verdict
-    from jounce.reporting.tables import limits_table
+    from jounce.reporting.json.results import limits_result
+    from jounce.reporting.text.summaries import limits_summary, verdict
+    from jounce.reporting.text.tables import limits_table
 
     if out is not None:
         from jounce.plot import check_figure
@@ -136,11 +136,11 @@ def torques(
       jounce torques examples/robots/panda.urdf \
         examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg"
     """
-    from jounce.dynamics.motion_ends import trajectory_ends
-    from jounce.dynamics.trajectories import trajectory_torques
-    from jounce.reporting.json_results import torques_result
+    from jounce.dynamics.limits.motion_ends import trajectory_ends
+    from jounce.dynamics.limits.trajectories import trajectory_torques
+    from jounce.reporting.json.results import torques_result
     from jounce.reporting.peaks import table_peaks
-    from jounce.reporting.summaries import torques_summary
+    from jounce.reporting.text.summaries import torques_summary
 
     if not 0 <= rates <= MOST_RATES:
         raise JounceError(f"must be a whole number from 0 to {MOST_RATES}", name="--rates", value=rates)
@@ -162,7 +162,7 @@ def torques(
 
 def _beside_breaks(robot: Any, motion: Any, rates: int, *, drives: bool) -> Any:
     """Return the torques on both sides of where laws jump or bend, at the instants of these; None without any."""
-    from jounce.dynamics.trajectories import trajectory_torques
+    from jounce.dynamics.limits.trajectories import trajectory_torques
     from jounce.trajectory.breaks import both_sides, law_breaks
 
     first, last = float(motion.times[0]), float(motion.times[-1])

@@ -64,8 +64,8 @@ def servo(
     """
     from jounce.io import in_units
     from jounce.mechanism.time import last_step_words
-    from jounce.reporting.law_facts import law_facts, law_words
     from jounce.reporting.peaks import shown_peaks, table_peaks
+    from jounce.reporting.text.law_facts import law_facts, law_words
 
     output.check()
     frequency, told = frequency_of(rate), heading.units
@@ -148,7 +148,7 @@ def _units_of(mechanism: Mechanism, names: list[str]) -> ShownUnits:
 
 
 def _result(file: Path, frequency: float, names: list[str], laws: Any, found: Any, out: Path | None) -> dict[str, Any]:
-    from jounce.reporting.json_results import told_peak
+    from jounce.reporting.json.results import told_peak
 
     peaks = [told_peak(peak) for peak in found]
     return {"file": file, "rate": frequency, "drivers": names, "laws": laws, "peaks": peaks, "written": out}

@@ -86,7 +86,7 @@ def modes(
         --mode 2
     """
     from jounce.io.files.writing import check_target
-    from jounce.reporting.modes_facts import equilibrium_tables, equilibrium_words, modes_facts, modes_table
+    from jounce.reporting.facts.modes_facts import equilibrium_tables, equilibrium_words, modes_facts, modes_table
 
     if out is not None:
         check_target(out, (".csv",), "a table of modes", overwrite=overwrite)
@@ -110,7 +110,7 @@ def modes(
         for table in (*equilibrium_tables(rest), modes_table(found)):
             show_table(table)
     if out is not None:
-        from jounce.reporting.modes_facts import write_modes
+        from jounce.reporting.facts.modes_facts import write_modes
 
         written(lambda: write_modes(found, rest.mechanism.space, out, overwrite=overwrite))
     if moved is not None and animation is not None:

@@ -65,7 +65,7 @@ def tolerance(
     """
     from jounce.design.tolerance import column_of, tolerance as spread_of
     from jounce.design.variations import named_forms
-    from jounce.reporting.spread_facts import columns_of, index_table, spread_facts, spread_summary, spread_table
+    from jounce.reporting.facts.spread_facts import columns_of, index_table, spread_facts, spread_summary, spread_table
 
     output.check()
     forms = named_forms(vary)

@@ -59,9 +59,9 @@ def view(
       jounce view examples/robots/panda.urdf \
         examples/trajectories/panda_wave.yaml --port 8080 --no-open
     """
-    from jounce.kinematics.solve import checked_order
+    from jounce.kinematics.position_analysis.solve import checked_order
     from jounce.viewer import view as show
-    from jounce.viewer.local_server import check_installed
+    from jounce.viewer.page.local_server import check_installed
 
     check_installed()
     subject: object = file

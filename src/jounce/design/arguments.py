@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from jounce.design.language import EXERTED, MEASURES, Node, operated
 from jounce.errors import ExpressionError
-from jounce.kinematics.solve import HIGHEST_ORDER
+from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
 
 HIGHEST_DERIVATIVE = HIGHEST_ORDER - 2  # that goals may ask for: its rate and how that bends are needed, too
 

@@ -37,7 +37,7 @@ from jounce.design.measures import (
 from jounce.design.quantities import Quantities, Quantity, told_about
 from jounce.errors import ExpressionError, did_you_mean
 from jounce.jet.derivatives import taylor_coefficients
-from jounce.kinematics.solve import HIGHEST_ORDER
+from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
 from jounce.mechanism import Mechanism
 from jounce.mechanism.held_outputs import with_outputs
 

@@ -14,8 +14,8 @@ from jounce.design.variations import Variation, read_variations, reader_of, spre
 from jounce.errors import MechanismError, UnsupportedError, check_name, no_such, whole_number
 from jounce.jet.turns import whole_periods
 from jounce.kinematics import Motion, Status, solve
-from jounce.kinematics.design_sides import Sides
-from jounce.kinematics.families import solve_with_sides
+from jounce.kinematics.families.design_sides import Sides
+from jounce.kinematics.families.solve_batch import solve_with_sides
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
 from jounce.mechanism.held_outputs import with_outputs
 from jounce.mechanism.law_breaks import laws_may_break

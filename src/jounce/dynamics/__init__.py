@@ -1,12 +1,11 @@
 """Energies, equations of motion, and forces with rates: of drivers, joints and everything that is applied."""
 
-from jounce.dynamics.balances import (
+from jounce.dynamics.energy.balances import (
     gravity_forces as gravity_forces,
     newton_euler as newton_euler,
     virtual_work as virtual_work,
 )
-from jounce.dynamics.constraint_equations import constraint_equations as constraint_equations
-from jounce.dynamics.energies import (
+from jounce.dynamics.energy.energies import (
     Energy as Energy,
     acceleration_energy as acceleration_energy,
     body_energy as body_energy,
@@ -14,7 +13,7 @@ from jounce.dynamics.energies import (
     potential_energy as potential_energy,
     stored_energy as stored_energy,
 )
-from jounce.dynamics.energy_outputs import (
+from jounce.dynamics.energy.energy_outputs import (
     AccelerationEnergyOutput as AccelerationEnergyOutput,
     BodyAccelerationEnergyOutput as BodyAccelerationEnergyOutput,
     BodyKineticEnergyOutput as BodyKineticEnergyOutput,
@@ -22,8 +21,8 @@ from jounce.dynamics.energy_outputs import (
     KineticEnergyOutput as KineticEnergyOutput,
     PotentialEnergyOutput as PotentialEnergyOutput,
 )
-from jounce.dynamics.energy_terms import EnergyTerms as EnergyTerms, energy_terms as energy_terms
-from jounce.dynamics.equations import (
+from jounce.dynamics.energy.energy_terms import EnergyTerms as EnergyTerms, energy_terms as energy_terms
+from jounce.dynamics.energy.equations import (
     catalan as catalan,
     energy_slope as energy_slope,
     gibbs_appell as gibbs_appell,
@@ -32,13 +31,9 @@ from jounce.dynamics.equations import (
     mangeron_nielsen as mangeron_nielsen,
     printed_coefficient as printed_coefficient,
 )
-from jounce.dynamics.limit_report import LimitReport as LimitReport, LimitRow as LimitRow
-from jounce.dynamics.limits import check_limits as check_limits
-from jounce.dynamics.linearisation import Linearisation as Linearisation, StateSpace as StateSpace
-from jounce.dynamics.many_equilibria import equilibria as equilibria
-from jounce.dynamics.modes import Modes as Modes
-from jounce.dynamics.motion_ends import TrajectoryEnd as TrajectoryEnd, trajectory_ends as trajectory_ends
-from jounce.dynamics.outputs import (
+from jounce.dynamics.energy.power import power_balance as power_balance
+from jounce.dynamics.inverse.constraint_equations import constraint_equations as constraint_equations
+from jounce.dynamics.inverse.outputs import (
     AppliedForceOutput as AppliedForceOutput,
     AppliedTorqueOutput as AppliedTorqueOutput,
     DriverForceOutput as DriverForceOutput,
@@ -48,17 +43,22 @@ from jounce.dynamics.outputs import (
     JointForceOutput as JointForceOutput,
     JointTorqueOutput as JointTorqueOutput,
 )
-from jounce.dynamics.power import power_balance as power_balance
-from jounce.dynamics.reactions import (
+from jounce.dynamics.inverse.reactions import (
     Reaction as Reaction,
     applied_force as applied_force,
     driver_force as driver_force,
     ground_reaction as ground_reaction,
     joint_reaction as joint_reaction,
 )
-from jounce.dynamics.small_motions import linearise as linearise
-from jounce.dynamics.static_equilibrium import Equilibrium as Equilibrium, equilibrium as equilibrium
-from jounce.dynamics.trajectories import trajectory_torques as trajectory_torques
+from jounce.dynamics.limits.check_limits import check_limits as check_limits
+from jounce.dynamics.limits.limit_report import LimitReport as LimitReport, LimitRow as LimitRow
+from jounce.dynamics.limits.motion_ends import TrajectoryEnd as TrajectoryEnd, trajectory_ends as trajectory_ends
+from jounce.dynamics.limits.trajectories import trajectory_torques as trajectory_torques
+from jounce.dynamics.statics.many_equilibria import equilibria as equilibria
+from jounce.dynamics.statics.static_equilibrium import Equilibrium as Equilibrium, equilibrium as equilibrium
+from jounce.dynamics.vibration.linearization import Linearisation as Linearisation, StateSpace as StateSpace
+from jounce.dynamics.vibration.modes import Modes as Modes
+from jounce.dynamics.vibration.small_motions import linearise as linearise
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
 _compute_under_own_settings(__name__)

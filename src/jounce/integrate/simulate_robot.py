@@ -7,22 +7,22 @@ import jax
 import numpy as np
 
 from jounce.errors import RobotError, UnsupportedError, check_name, flag
-from jounce.integrate.events import EventLog
-from jounce.integrate.joint_events import JointEvent, JointEventDetector
-from jounce.integrate.marching import Outcome
-from jounce.integrate.methods import AbstractMethod, Taylor
-from jounce.integrate.robot_marching import Progress, RobotProblem, RobotState, RobotSteps, march_robot
-from jounce.integrate.robot_simulation import RobotSimulation
+from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
+from jounce.integrate.marching.marching import Outcome
+from jounce.integrate.marching.robot_marching import Progress, RobotProblem, RobotState, RobotSteps, march_robot
+from jounce.integrate.results.robot_simulation import RobotSimulation
+from jounce.integrate.steps.events import EventLog
+from jounce.integrate.steps.methods import AbstractMethod, Taylor
 from jounce.kinematics import Status
-from jounce.kinematics.solve import raise_for_status
-from jounce.robot.arguments import checked_state, floats
-from jounce.robot.base_motion import BaseMotion, base_arrays, base_body
-from jounce.robot.joint_laws import GivenLaws, joint_laws
+from jounce.kinematics.position_analysis.solve import raise_for_status
+from jounce.robot.algorithms.base_motion import BaseMotion, base_arrays, base_body
+from jounce.robot.algorithms.wrench_laws import wrench_laws
+from jounce.robot.algorithms.wrenches import Wrench
+from jounce.robot.model.arguments import checked_state, floats
+from jounce.robot.model.joint_laws import GivenLaws, joint_laws
+from jounce.robot.model.robot_size import robot_size
+from jounce.robot.recursions.tree_equations import TreeEquations
 from jounce.robot.robot import Robot
-from jounce.robot.robot_size import robot_size
-from jounce.robot.tree_equations import TreeEquations
-from jounce.robot.wrench_laws import wrench_laws
-from jounce.robot.wrenches import Wrench
 from jounce.shapes import ArrayLike, is_traced
 from jounce.trajectory.motion import AbstractMotion
 

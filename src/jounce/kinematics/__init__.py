@@ -1,5 +1,6 @@
 """Kinematics: assembly, positions, all derivatives from one factorisation, diagnosis, and the result."""
 
+from jounce.kinematics.assembly.mobility import Branch as Branch, Mobility as Mobility, mobility as mobility
 from jounce.kinematics.cams import (
     Extreme as Extreme,
     OscillatingFollower as OscillatingFollower,
@@ -18,16 +19,18 @@ from jounce.kinematics.curves import (
     assemblies as assemblies,
     trace as trace,
 )
-from jounce.kinematics.families import solve_batch as solve_batch
-from jounce.kinematics.mobility import Branch as Branch, Mobility as Mobility, mobility as mobility
-from jounce.kinematics.motion import Motion as Motion
-from jounce.kinematics.solve import (
+from jounce.kinematics.families.solve_batch import solve_batch as solve_batch
+from jounce.kinematics.position_analysis.chunked_motion import (
+    Stretches as Stretches,
+    takes_stretches as takes_stretches,
+)
+from jounce.kinematics.position_analysis.solve import (
     raise_for_status as raise_for_status,
     solve as solve,
     solve_in_stretches as solve_in_stretches,
 )
+from jounce.kinematics.results.motion import Motion as Motion
 from jounce.kinematics.status import Status as Status
-from jounce.kinematics.stretches import Stretches as Stretches, takes_stretches as takes_stretches
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
 _compute_under_own_settings(__name__)

@@ -10,7 +10,7 @@ import numpy as np
 from jounce.errors import MechanismError
 from jounce.plot.labels import scale_of, symbol, unit_label
 from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, shown_name, style
-from jounce.reporting.spread_facts import Column, chosen
+from jounce.reporting.facts.spread_facts import Column, chosen
 
 if TYPE_CHECKING:
     import xarray

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics import kinetic_energy, outputs as loads, potential_energy, power_balance, stored_energy
+from jounce.dynamics import kinetic_energy, potential_energy, power_balance, stored_energy
+from jounce.dynamics.inverse import outputs as loads
 from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_name
 from jounce.kinematics import Motion

@@ -17,7 +17,7 @@ from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion
-from jounce.kinematics.assembly import assemble
+from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.curves.choice import chosen
 from jounce.mechanism import Mechanism, build, time_grid, with_outputs_held
 from jounce.mechanism.builder import starting_guess

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jounce.dynamics.limit_report import LimitReport, LimitRow
-from jounce.dynamics.limits import FIELDS
+from jounce.dynamics.limits.check_limits import FIELDS
+from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
 from jounce.errors import RobotError
 from jounce.plot.instants import evenly_chosen
 from jounce.plot.labels import unit_label
@@ -48,7 +48,7 @@ def draw_limits(report: LimitReport, title: str = "") -> Figure:
     Examples
     --------
     >>> import jounce as jn
-    >>> from jounce.dynamics.limits import check_limits
+    >>> from jounce.dynamics.limits.check_limits import check_limits
     >>> from jounce.plot.limits import draw_limits
     >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
     >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0], limits=jn.Limits(velocity=2.0, effort=8.0))

@@ -26,9 +26,9 @@ from jounce.plot.labels import quantity_word, rounded_down
 from jounce.plot.scene import scene_of
 from jounce.plot.sketch import length_text, limits_with, paths_of
 from jounce.plot.style import BODY_COLOURS
-from jounce.reporting.motion_facts import motion_facts
+from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.peaks import Peak, derivative_name, peaks, shown_peaks
-from jounce.reporting.summaries import motion_summary
+from jounce.reporting.text.summaries import motion_summary
 from jounce.units.shown_units import ShownUnits, derivative_unit
 
 __all__ = ["check_report", "report"]

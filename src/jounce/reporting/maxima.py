@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.highest import highest_of, local_heights
+from jounce.dynamics.limits.local_maxima import highest_of, local_heights
 
 Times = Float[np.ndarray, " time"]
 Curves = Float[np.ndarray, "time curves"]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.dynamics.motion_ends import TrajectoryEnd
+from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.planning.retiming.sampled_paths import lines_of, samples_of
 from jounce.planning.retiming.straight_lines import polynomials_at
 from jounce.trajectory import HermiteMotion, JointTrajectory, SplineMotion

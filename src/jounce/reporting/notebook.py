@@ -17,15 +17,15 @@ from jounce.errors import JounceError, SampleWarning
 from jounce.integrate import Batch
 from jounce.kinematics import Curve, Motion, Status
 from jounce.mechanism import Mechanism
-from jounce.reporting.curve_facts import curve_facts, curve_summary, curve_tables
-from jounce.reporting.design_facts import design_facts, design_table, design_words
-from jounce.reporting.mechanism_facts import mechanism_facts
-from jounce.reporting.modes_facts import equilibrium_facts, equilibrium_tables, equilibrium_words, modes_table
-from jounce.reporting.motion_facts import motion_facts
+from jounce.reporting.facts.curve_facts import curve_facts, curve_summary, curve_tables
+from jounce.reporting.facts.design_facts import design_facts, design_table, design_words
+from jounce.reporting.facts.mechanism_facts import mechanism_facts
+from jounce.reporting.facts.modes_facts import equilibrium_facts, equilibrium_tables, equilibrium_words, modes_table
+from jounce.reporting.facts.motion_facts import motion_facts
+from jounce.reporting.facts.robot_facts import robot_facts
 from jounce.reporting.peaks import peaks, shown_peaks
-from jounce.reporting.robot_facts import robot_facts
-from jounce.reporting.summaries import count, verdict
-from jounce.reporting.tables import Table, limits_table, mechanism_tables, number, peaks_table, robot_tables, table
+from jounce.reporting.text.summaries import count, verdict
+from jounce.reporting.text.tables import Table, limits_table, mechanism_tables, number, peaks_table, robot_tables, table
 from jounce.robot import Robot
 from jounce.trajectory import JointTrajectory
 

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from jounce.dynamics.limit_report import LimitReport
-from jounce.dynamics.trajectories import told_drives
+from jounce.dynamics.limits.limit_report import LimitReport
+from jounce.dynamics.limits.trajectories import told_drives
 from jounce.planning import RetimedTrajectory
 from jounce.planning.retiming.path import Path as JointPath
-from jounce.reporting.json_results import limits_result
+from jounce.reporting.json.results import limits_result
 from jounce.reporting.motion_ends import ends_words
-from jounce.reporting.summaries import count
-from jounce.reporting.tables import Table, number
+from jounce.reporting.text.summaries import count
+from jounce.reporting.text.tables import Table, number
 
 TOLD = 1e-9  # rad or m: how far from a trajectory its path is told to pass; less comes of rounding
 

@@ -16,7 +16,7 @@ from jounce.interrupts import undoing
 
 if TYPE_CHECKING:
     from jounce.reporting.peaks import Peak
-    from jounce.reporting.tables import Table
+    from jounce.reporting.text.tables import Table
 
 OURS = (
     AssemblyWarning,
@@ -35,7 +35,7 @@ PATIENCE = 1.0  # s, before a progress bar is shown
 def show_peaks(found: Sequence[Peak]) -> None:
     """Print a table of peaks."""
     if found:
-        from jounce.reporting.tables import peaks_table
+        from jounce.reporting.text.tables import peaks_table
 
         show_table(peaks_table(found))
     else:
@@ -191,7 +191,7 @@ def say(text: str) -> None:
 
 def say_json(command: str, data: Mapping[str, Any]) -> None:
     """Print the result of a command as JSON on standard output."""
-    from jounce.reporting.json_results import result_json
+    from jounce.reporting.json.results import result_json
 
     sys.stdout.write(result_json(command, data) + "\n")
     sys.stdout.flush()
@@ -232,7 +232,7 @@ def cautions(*, json: bool = False) -> Iterator[None]:
 
 def _tell(kind: str, style: str, message: object, json: bool) -> None:
     if json:
-        from jounce.reporting.json_results import complaint
+        from jounce.reporting.json.results import complaint
 
         sys.stderr.write(complaint(kind, message) + "\n")
         return

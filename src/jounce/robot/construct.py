@@ -8,9 +8,9 @@ import numpy as np
 
 from jounce.errors import RobotError, check_choice
 from jounce.rigid.inertia import Inertia, finite_numbers
-from jounce.robot.model import UNLIMITED, Joint, Limits, Link
+from jounce.robot.model.links_and_joints import UNLIMITED, Joint, Limits, Link
+from jounce.robot.model.tree import turn_about
 from jounce.robot.robot import Robot
-from jounce.robot.tree import turn_about
 from jounce.shapes import ArrayLike
 
 CONVENTIONS = ("standard", "modified")

@@ -3,9 +3,9 @@
 from typing import Any
 
 from jounce.mechanism import Mechanism
-from jounce.robot.abstract_robot import AbstractRobot
-from jounce.robot.closed_loop import mechanism
-from jounce.robot.closures import GivenCoordinates
+from jounce.robot.closed_loops.closed_loop import mechanism
+from jounce.robot.closed_loops.closures import GivenCoordinates
+from jounce.robot.model.abstract_robot import AbstractRobot
 
 
 class Robot(AbstractRobot):
@@ -59,6 +59,6 @@ class Robot(AbstractRobot):
 
         See Also
         --------
-        jounce.robot.closed_loop.mechanism : What there is to set: drivers, outputs, time, and so on.
+        jounce.robot.closed_loops.closed_loop.mechanism : What there is to set: drivers, outputs, time, and so on.
         """
         return mechanism(self, q, **settings)

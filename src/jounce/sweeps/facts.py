@@ -9,7 +9,7 @@ import numpy as np
 from jounce.kinematics import Status
 from jounce.mechanism.time import last_step_words
 from jounce.reporting.peaks import derivative_unit
-from jounce.reporting.tables import Table, number
+from jounce.reporting.text.tables import Table, number
 from jounce.sweeps.chunks import Plan
 
 

@@ -12,16 +12,16 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.design.variations import Reader, reader_of
-from jounce.dynamics.trajectories import FollowedTrajectory
+from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.errors import MechanismError, RobotError, check_name
 from jounce.integrate import simulate_batch
-from jounce.integrate.methods import AbstractMethod
-from jounce.integrate.options import checked_options, instants_of
+from jounce.integrate.steps.methods import AbstractMethod
+from jounce.integrate.steps.options import checked_options, instants_of
 from jounce.kinematics import Motion, Status, solve
-from jounce.kinematics.design_sides import Sides, sides_of_designs
-from jounce.kinematics.families import solve_with_sides
-from jounce.kinematics.motion import output_group
-from jounce.kinematics.solve import checked_settings
+from jounce.kinematics.families.design_sides import Sides, sides_of_designs
+from jounce.kinematics.families.solve_batch import solve_with_sides
+from jounce.kinematics.position_analysis.solve import checked_settings
+from jounce.kinematics.results.motion import output_group
 from jounce.mechanism import (
     AbstractMotionOutput,
     AbstractOutput,

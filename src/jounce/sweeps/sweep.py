@@ -14,7 +14,7 @@ from jaxtyping import Bool
 from jounce.design.design_space import sample_space
 from jounce.design.variations import read_variations
 from jounce.errors import DamageWarning, JounceError, MechanismError, OutputError, TrajectoryError, whole_number
-from jounce.integrate.methods import AbstractMethod
+from jounce.integrate.steps.methods import AbstractMethod
 from jounce.io.files.reading import recording
 from jounce.mechanism import Mechanism
 from jounce.mechanism.time import TimeLike

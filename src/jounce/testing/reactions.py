@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jounce.constraints.base import ROLES
-from jounce.dynamics.inverse import MotionForces
+from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.jet import Jet
 from jounce.kinematics import Motion
 from jounce.mechanism import Body, Mechanism, build

@@ -12,7 +12,7 @@ from jounce.errors import JounceError
 from jounce.kinematics import PlateCam
 from jounce.mechanism import Mechanism
 from jounce.robot import Robot
-from jounce.viewer.local_server import AccessControl, check_installed, check_port, quiet_server, quiet_stop
+from jounce.viewer.page.local_server import AccessControl, check_installed, check_port, quiet_server, quiet_stop
 
 __all__ = ["View", "view"]
 
@@ -48,7 +48,7 @@ class View:
         access = AccessControl()
         server = quiet_server(port, label=subject.name, access=access)
         try:
-            from jounce.viewer.page import Page  # which needs the extra
+            from jounce.viewer.page.page import Page  # which needs the extra
 
             self.page = Page(server, subject, order)
             self._lay_out(subject, playing)
@@ -58,10 +58,10 @@ class View:
         self.url = f"http://127.0.0.1:{server.get_port()}/?token={access.token}"
 
     def _lay_out(self, subject: Any, playing: bool) -> None:
-        from jounce.viewer.panel import Panel
-        from jounce.viewer.plots import Plots
-        from jounce.viewer.slopes import SlopesFolder, can_be_differentiated
-        from jounce.viewer.tabs import ArrowsTab, ForcesTab
+        from jounce.viewer.page.panel import Panel
+        from jounce.viewer.page.plots import Plots
+        from jounce.viewer.page.tabs import ArrowsTab, ForcesTab
+        from jounce.viewer.subjects.slopes import SlopesFolder, can_be_differentiated
 
         gui = self.page.server.gui
         gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False, brand_color=(0, 90, 140))
@@ -197,14 +197,14 @@ def subject_of(
         If it is none of them, or a trajectory is given with a mechanism.
     """
     from jounce.io import load, load_robot
-    from jounce.viewer.mechanisms import MechanismSubject
+    from jounce.viewer.subjects.mechanisms import MechanismSubject
 
     path = None
     if isinstance(given, str | PathLike):
         path = Path(fspath(given))
         given = (load if path.suffix.lower() in MECHANISM_FILES else load_robot)(path, allow=allow)
     if isinstance(given, PlateCam):
-        from jounce.viewer.cams import CamSubject
+        from jounce.viewer.subjects.cams import CamSubject
 
         if trajectory is not None or modes.wanted:
             raise JounceError("a cam turns, and has neither modes nor a trajectory", path=path, name="cam")
@@ -240,8 +240,8 @@ def modes_subject(
     JounceError
         If there is no equilibrium, nothing moves about it, or an option is for the other kind.
     """
-    from jounce.viewer.modes import ModesSubject
-    from jounce.viewer.robot_appearance import robot_appearance
+    from jounce.viewer.shapes.robot_appearance import robot_appearance
+    from jounce.viewer.subjects.modes import ModesSubject
 
     try:
         if isinstance(given, Mechanism):
@@ -275,9 +275,9 @@ def robot_subject(
         If the trajectory cannot be read or does not fit the robot.
     """
     from jounce.io import load_trajectory
-    from jounce.viewer.closed_loops import ClosedRobotSubject
-    from jounce.viewer.robot_appearance import robot_appearance
-    from jounce.viewer.robots import RobotSubject
+    from jounce.viewer.shapes.robot_appearance import robot_appearance
+    from jounce.viewer.subjects.closed_loops import ClosedRobotSubject
+    from jounce.viewer.subjects.robots import RobotSubject
 
     if isinstance(trajectory, str | PathLike):
         trajectory = load_trajectory(trajectory)

@@ -230,7 +230,7 @@ def test_what_mujoco_warns_of_leaves_no_log():
 
 def test_meshes_that_are_shown(tmp_path):
     pytest.importorskip("trimesh")
-    from jounce.viewer.robot_shapes import file_shapes
+    from jounce.viewer.shapes.robot_shapes import file_shapes
 
     path = pathlib.Path("robot.urdf").resolve()
 

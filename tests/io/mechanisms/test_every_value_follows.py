@@ -9,7 +9,7 @@ import pytest
 
 import jounce as jn
 from jounce.constraints import catalogue
-from jounce.integrate.batch_equations import ParametricMechanism
+from jounce.integrate.mechanisms.batch_equations import ParametricMechanism
 from jounce.io import json_schema
 from jounce.io.mechanisms.inertia_forms import _solid_keys
 from jounce.io.mechanisms.keys import file_keys

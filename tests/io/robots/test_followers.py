@@ -7,7 +7,7 @@ from jounce.errors import RobotFileError
 from jounce.io.robots import followers
 from jounce.io.robots.faults import Faults
 from jounce.io.robots.loader import load_robot
-from jounce.robot.model import has_room
+from jounce.robot.model.links_and_joints import has_room
 
 FULL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 KEPT = {  # range of the leader; of each follower: range, multiplier, offset; what the leader keeps

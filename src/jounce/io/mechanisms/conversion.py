@@ -19,7 +19,7 @@ from jounce.io.files.source import read_source
 from jounce.mechanism import Mechanism, TimeGrid
 from jounce.mechanism.mechanism import GROUND, names_column
 from jounce.robot import Robot
-from jounce.robot.closed_loop import DRIVE
+from jounce.robot.closed_loops.closed_loop import DRIVE
 from jounce.units.values import parse_value
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import jounce.dynamics as dynamics
 import jounce.mechanism as mechanism
-from jounce.dynamics.energy_outputs import ENERGY_OUTPUTS
+from jounce.dynamics.energy.energy_outputs import ENERGY_OUTPUTS
 from jounce.mechanism import AbstractQuantity
-from jounce.robot.coupling import SlideOutput
+from jounce.robot.closed_loops.coupling import SlideOutput
 
 OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
     (None, mechanism.PointOutput),

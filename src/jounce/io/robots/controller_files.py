@@ -130,7 +130,9 @@ def _values(
     robot: Robot, trajectory: JointTrajectory, names: tuple[str, ...], times: Any, efforts: int, known: Any
 ) -> list[np.ndarray]:
     """Return positions, velocities and accelerations at instants, then torques and their rates; (time, joints) each."""
-    from jounce.dynamics.trajectories import FollowedTrajectory  # a sixth of a second, which reading does not need
+    from jounce.dynamics.limits.trajectories import (
+        FollowedTrajectory,  # a sixth of a second, which reading does not need
+    )
 
     order = max(2, efforts + 1)
     followed = FollowedTrajectory(robot, trajectory)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 
 from jounce.errors import RobotError, RobotFileError
 from jounce.io.robots.faults import Faults
-from jounce.robot.model import Joint, has_room, ranges_at_leader
+from jounce.robot.model.links_and_joints import Joint, has_room, ranges_at_leader
 
 NO_ROOM = "ranges of joints that leave the joint that they follow no room to move"
 

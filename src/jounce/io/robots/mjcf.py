@@ -20,10 +20,10 @@ from jounce.io.robots.mjcf_left_out import LeftOut, left_out_of_model, left_out_
 from jounce.io.robots.mjcf_ties import NO_CLOSURE, Ties, tied_tendons
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
-from jounce.robot.floating_base import floating_joints
-from jounce.robot.model import Closure, Joint, Limits, Link, Mimic, leaders
+from jounce.robot.model.floating_base import floating_joints
+from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link, Mimic, leaders
+from jounce.robot.model.tree import quaternion_matrix, turn_about
 from jounce.robot.robot import Robot
-from jounce.robot.tree import quaternion_matrix, turn_about
 
 _Vector = Float[np.ndarray, "3"]
 _Matrix = Float[np.ndarray, "3 3"]

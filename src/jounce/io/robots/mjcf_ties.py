@@ -7,7 +7,7 @@ from typing import Any
 
 from jounce.errors import RobotFileError
 from jounce.io.robots.mjcf_files import line_of
-from jounce.robot.model import Mimic
+from jounce.robot.model.links_and_joints import Mimic
 
 NO_CLOSURE = "has no equivalent joint or closure; remove it, or set active='false'"
 

@@ -31,8 +31,8 @@ from jounce.io.robots.sdf_poses import (
     text_of,
 )
 from jounce.io.robots.xml_elements import Element
-from jounce.robot.floating_base import floating_joints
-from jounce.robot.model import Closure, Joint, Link, Mimic, leaders
+from jounce.robot.model.floating_base import floating_joints
+from jounce.robot.model.links_and_joints import Closure, Joint, Link, Mimic, leaders
 from jounce.robot.robot import Robot
 
 CLOSED_BY = {"fixed": "weld", "revolute": "pin", "continuous": "pin", "prismatic": "slider", "ball": "connect"}

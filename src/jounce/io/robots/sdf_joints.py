@@ -22,7 +22,7 @@ from jounce.io.robots.sdf_poses import (
     vector_of,
 )
 from jounce.io.robots.xml_elements import Element
-from jounce.robot.model import Limits
+from jounce.robot.model.links_and_joints import Limits
 
 AXIS_TAGS = ("axis", "axis2")
 AXES = {"revolute": 1, "continuous": 1, "prismatic": 1, "fixed": 0, "universal": 2, "revolute2": 2, "ball": 0}

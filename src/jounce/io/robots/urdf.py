@@ -16,10 +16,10 @@ from jounce.io.robots.named_elements import NamedElements
 from jounce.io.robots.urdf_left_out import check_version, note_left_out, rotors
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
-from jounce.robot.floating_base import floating_joints
-from jounce.robot.model import Joint, Limits, Link, Mimic, leaders
+from jounce.robot.model.floating_base import floating_joints
+from jounce.robot.model.links_and_joints import Joint, Limits, Link, Mimic, leaders
+from jounce.robot.model.tree import axes_with_z_along, ordered
 from jounce.robot.robot import Robot
-from jounce.robot.tree import axes_with_z_along, ordered
 
 EXPANDED = ("floating", "planar")
 TYPES = ("continuous", "fixed", "prismatic", "revolute", *EXPANDED)

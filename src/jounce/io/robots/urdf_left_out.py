@@ -25,7 +25,7 @@ from jounce.io.robots.faults import (
 from jounce.io.robots.sdf_joints import RATIO, ROTOR
 from jounce.io.robots.sdf_left_out import DECAY, KINEMATIC, STATIC, follower
 from jounce.io.robots.xml_elements import Element
-from jounce.robot.model import Joint
+from jounce.robot.model.links_and_joints import Joint
 from jounce.robot.robot import Robot
 
 LOOPS = "<loop_joint>, which closes a loop"

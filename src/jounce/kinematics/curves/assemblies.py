@@ -9,20 +9,20 @@ import numpy as np
 from jounce.display import Displayed
 from jounce.errors import AssemblyError, MobilityError
 from jounce.execution.device import resident
-from jounce.kinematics.assembly import (
+from jounce.kinematics.assembly.assemble import (
     check_assembled,
     check_mobility,
     nearest_to_guess,
     redundancy_of,
     settled,
 )
+from jounce.kinematics.assembly.axis_directions import drawn_senses, senses
+from jounce.kinematics.assembly.gauss_newton import put_together
 from jounce.kinematics.curves.curve import Curve, posed
 from jounce.kinematics.curves.start import first_instant
 from jounce.kinematics.curves.starts import put_together_side_by_side
 from jounce.kinematics.curves.tracing import check_number, traced
 from jounce.kinematics.curves.walker import Walker
-from jounce.kinematics.gauss_newton import put_together
-from jounce.kinematics.senses import drawn_senses, senses
 from jounce.mechanism import Mechanism, build, check_mechanism
 from jounce.mechanism.preconditions import concrete
 from jounce.modules import with_fields

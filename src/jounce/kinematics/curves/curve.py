@@ -18,8 +18,8 @@ from jounce.kinematics.curves.limits import LimitPosition, limits_between, value
 from jounce.kinematics.curves.path import End, Path, meets, walk_both_ways
 from jounce.kinematics.curves.start import Freed
 from jounce.kinematics.curves.walker import LANES, Place, Walker, spin
-from jounce.kinematics.motion import Motion
-from jounce.kinematics.pose_outputs import output_values
+from jounce.kinematics.results.motion import Motion
+from jounce.kinematics.results.pose_outputs import output_values
 from jounce.kinematics.status import Status
 from jounce.mechanism import AbstractOutput, Mechanism
 from jounce.mechanism.axis_angles import AttitudeHistory

@@ -10,7 +10,7 @@ from jounce.constraints.facts import dimension_of_field, field_kinds
 from jounce.errors import MechanismError, MobilityError, SingularityError, check_name
 from jounce.execution.device import resident
 from jounce.jet import Jet
-from jounce.kinematics.assembly import check_assembled, freely_moving, settled
+from jounce.kinematics.assembly.assemble import check_assembled, freely_moving, settled
 from jounce.kinematics.curves.walker import Place, Walker
 from jounce.mechanism import Mechanism, build, time_grid
 from jounce.modules import with_fields

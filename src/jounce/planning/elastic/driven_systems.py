@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.reactions import driver_force
-from jounce.dynamics.trajectories import FollowedTrajectory
+from jounce.dynamics.inverse.reactions import driver_force
+from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.errors import MechanismError, RobotError, SampleWarning
 from jounce.execution.chunks import in_chunks
-from jounce.kinematics.solve import solve
+from jounce.kinematics.position_analysis.solve import solve
 from jounce.mechanism import Mechanism, time_grid
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.planning.elastic.drives import Drive, DriveArrays
-from jounce.robot.inverse_dynamics import inverse_dynamics
+from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
 from jounce.robot.robot import Robot
 from jounce.shapes import Numbers
 from jounce.trajectory.joint_trajectory import JointTrajectory

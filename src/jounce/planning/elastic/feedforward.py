@@ -11,7 +11,7 @@ from jounce.planning.elastic.driven_systems import DrivenMechanism, DrivenRobot,
 from jounce.planning.elastic.drives import Drive
 from jounce.planning.elastic.motor_motion import Feedforward, MotorMotion, motor_motion
 from jounce.planning.elastic.spring_deflection import SpringDeflection
-from jounce.robot.arguments import checked_coordinates, whole_number
+from jounce.robot.model.arguments import checked_coordinates, whole_number
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory.joint_trajectory import JointTrajectory

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.kinematics.solve import solve
+from jounce.kinematics.position_analysis.solve import solve
 from jounce.planning.elastic.driven_systems import DrivenMechanism, DrivenRobot
 from jounce.planning.elastic.motor_motion import Feedforward
 from jounce.planning.elastic.simulation import simulate_elastic

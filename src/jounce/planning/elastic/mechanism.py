@@ -17,8 +17,8 @@ from jounce.forces import AbstractForce
 from jounce.forces.actuators import SlideForce
 from jounce.forces.laws import ExpressionLaw, TimeLaw
 from jounce.integrate import Simulation, simulate
-from jounce.integrate.options import SimulationOptions
-from jounce.kinematics.solve import solve
+from jounce.integrate.steps.options import SimulationOptions
+from jounce.kinematics.position_analysis.solve import solve
 from jounce.mechanism import Body, Mechanism, time_grid
 from jounce.mechanism.resolve import resolve
 from jounce.mechanism.time import TimeLike

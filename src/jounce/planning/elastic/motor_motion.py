@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.limit_report import LimitRow, LimitRows
-from jounce.dynamics.limits import worst_instants
+from jounce.dynamics.limits.check_limits import worst_instants
+from jounce.dynamics.limits.limit_report import LimitRow, LimitRows
 from jounce.errors import TrajectoryError
 from jounce.planning.elastic.driven_systems import DrivenSystem
 from jounce.planning.elastic.drives import DriveArrays

@@ -15,14 +15,14 @@ import numpy as np
 
 from jounce.errors import RobotError
 from jounce.integrate import RobotSimulation, simulate
-from jounce.integrate.options import SimulationOptions
+from jounce.integrate.steps.options import SimulationOptions
 from jounce.jet import Jet
 from jounce.jet.compose import OfSample
 from jounce.planning.elastic.driven_systems import robot_drives
 from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.planning.elastic.motor_torques import MOTOR, torques_of
 from jounce.robot import Joint, Link, Robot
-from jounce.robot.joint_laws import AbstractJointLaws
+from jounce.robot.model.joint_laws import AbstractJointLaws
 from jounce.shapes import real_numbers
 from jounce.trajectory import AbstractMotion
 

@@ -5,7 +5,7 @@ from typing import Unpack, overload
 
 from jounce.errors import JounceError
 from jounce.integrate import RobotSimulation, Simulation
-from jounce.integrate.options import SimulationOptions
+from jounce.integrate.steps.options import SimulationOptions
 from jounce.mechanism import Mechanism
 from jounce.mechanism.time import TimeLike
 from jounce.planning.elastic.drives import Drive

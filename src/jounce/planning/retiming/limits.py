@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import finite_numbers
-from jounce.robot.model import Limits
+from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
 
 VARYING = ("velocity", "acceleration", "deceleration", "jerk", "jounce", "effort", "effort_rate")

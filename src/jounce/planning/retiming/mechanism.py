@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.dynamics.limit_report import LimitReport, LimitRow
+from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
 from jounce.errors import MechanismError, SolveError
 from jounce.mechanism import Mechanism
 from jounce.planning.retiming.fastest import fastest
@@ -14,7 +14,7 @@ from jounce.planning.retiming.mechanism_quantities import MechanismQuantities, r
 from jounce.planning.retiming.paths import checked
 from jounce.planning.retiming.rate_law import Conditions, RateLaw
 from jounce.planning.retiming.retimed import RetimedTrajectory, active_limits
-from jounce.robot.model import Limits
+from jounce.robot.model.links_and_joints import Limits
 from jounce.trajectory import FollowingMotion
 
 EXPANSIONS = 4  # of forces about the last law

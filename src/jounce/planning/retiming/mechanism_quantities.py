@@ -25,7 +25,7 @@ from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.quantities import Labels, PathQuantities, Quantity
 from jounce.planning.retiming.rate_law import RateLaw
 from jounce.planning.retiming.rate_motion import RateMotion
-from jounce.robot.model import Limits
+from jounce.robot.model.links_and_joints import Limits
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FollowingMotion
 
 SAMPLES = 2001

@@ -7,18 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from jounce.dynamics.highest import local_maxima
-from jounce.dynamics.limit_jumps import infinite_quantities, jumps_of
-from jounce.dynamics.limit_report import LimitReport, LimitRow
-from jounce.dynamics.limits import FIELDS, check_limits, word_of
-from jounce.dynamics.motion_ends import TrajectoryEnd, end_jumps
-from jounce.dynamics.trajectories import FollowedTrajectory
+from jounce.dynamics.limits.check_limits import FIELDS, check_limits, word_of
+from jounce.dynamics.limits.limit_jumps import infinite_quantities, jumps_of
+from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
+from jounce.dynamics.limits.local_maxima import local_maxima
+from jounce.dynamics.limits.motion_ends import TrajectoryEnd, end_jumps
+from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.errors import SampleWarning
 from jounce.planning.retiming.limits import MotionLimits, limits_of
 from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.quantities import Curves
 from jounce.planning.retiming.robot_quantities import RobotQuantities
-from jounce.robot.model import Limits
+from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
 from jounce.trajectory.breaks import at_breaks, law_breaks, with_sides

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.dynamics.trajectories import FollowedTrajectory, warn_of_degrees
+from jounce.dynamics.limits.trajectories import FollowedTrajectory, warn_of_degrees
 from jounce.errors import SolveError, TrajectoryError, flag, whole_number
 from jounce.mechanism import Mechanism
 from jounce.planning.retiming.fastest import Search, fastest, slowed_only
@@ -22,7 +22,7 @@ from jounce.planning.retiming.rate_motion import RateMotion
 from jounce.planning.retiming.retimed import RetimedTrajectory, active_limits
 from jounce.planning.retiming.robot_quantities import RobotQuantities
 from jounce.planning.retiming.sampled_paths import path_of_samples
-from jounce.robot.model import Limits
+from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike
 from jounce.trajectory import FollowingMotion, JointTrajectory

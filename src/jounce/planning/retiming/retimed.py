@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.dynamics.limit_report import LimitReport
+from jounce.dynamics.limits.limit_report import LimitReport
 from jounce.planning.retiming.fastest import Search
 from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.rate_law import RateLaw

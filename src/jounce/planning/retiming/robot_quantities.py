@@ -5,15 +5,15 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.limits import REST, SLIDING, TURNING
-from jounce.dynamics.trajectories import FollowedTrajectory
+from jounce.dynamics.limits.check_limits import REST, SLIDING, TURNING
+from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.errors import RobotError, TrajectoryError
 from jounce.planning.retiming.limits import MotionLimits, limits_of
 from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.quantities import Labels, PathQuantities, Quantity
-from jounce.robot.inverse_dynamics import inverse_dynamics
-from jounce.robot.kinematics import forward_kinematics
-from jounce.robot.model import Limits
+from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
+from jounce.robot.model.links_and_joints import Limits
+from jounce.robot.recursions.kinematics import forward_kinematics
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
 

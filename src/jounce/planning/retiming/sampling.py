@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 
-from jounce.dynamics.limit_report import LimitReport
+from jounce.dynamics.limits.limit_report import LimitReport
 from jounce.errors import SampleWarning, TrajectoryError
 from jounce.planning.retiming.limits import MotionLimits
 from jounce.planning.retiming.motion_limits_check import check_motion

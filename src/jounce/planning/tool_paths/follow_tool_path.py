@@ -15,7 +15,7 @@ from jounce.planning.tool_paths.task_rank import CONFIGURATIONS, random_coordina
 from jounce.planning.tool_paths.tool_path import ToolPath
 from jounce.planning.tool_paths.tool_path_motion import ToolPathMotion
 from jounce.planning.tool_paths.tool_tasks import tool_of
-from jounce.robot.arguments import floats
+from jounce.robot.model.arguments import floats
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike
 from jounce.trajectory.joint_trajectory import JointTrajectory

@@ -17,9 +17,9 @@ from jounce.planning.tool_paths.task_rank import (
     task_columns,
 )
 from jounce.planning.tool_paths.tool_tasks import Tool, rotation_matrices, tool_of, unit_vectors
-from jounce.robot.abstract_robot import AbstractRobot
-from jounce.robot.arguments import checked_position, floats, whole_number
-from jounce.robot.kinematics import forward_kinematics
+from jounce.robot.model.abstract_robot import AbstractRobot
+from jounce.robot.model.arguments import checked_position, floats, whole_number
+from jounce.robot.recursions.kinematics import forward_kinematics
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike
 

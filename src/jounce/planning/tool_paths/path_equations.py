@@ -10,7 +10,7 @@ from jaxtyping import Float
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.modules import Module
 from jounce.planning.tool_paths.tool_tasks import Tool, columns_of, task_rows
-from jounce.robot.tree import Tree
+from jounce.robot.model.tree import Tree
 from jounce.shapes import Numbers
 
 MOST = 12  # corrections

@@ -8,8 +8,8 @@ import numpy as np
 
 from jounce.linear_algebra.linear import DenseFactor, singular_values
 from jounce.planning.tool_paths.tool_tasks import Goal, columns_of, misses
-from jounce.robot.batches import Batched
-from jounce.robot.tree import Tree
+from jounce.robot.model.tree import Tree
+from jounce.robot.recursions.batches import Batched
 
 FIRST = 1e-3  # damping, as part of the squares of what is missed: Fan and Yuan 2005, which keeps quadratic convergence
 LEAST = 1e-15  # damping, as part of the squares of the Jacobian: where joints are redundant nothing else holds them

@@ -7,10 +7,10 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.planning.tool_paths.tool_tasks import Goal, Tool, columns_of, task_rows
-from jounce.robot.abstract_robot import AbstractRobot
-from jounce.robot.batches import Batched
-from jounce.robot.kinematics import link_frame
-from jounce.robot.tree import Tree
+from jounce.robot.model.abstract_robot import AbstractRobot
+from jounce.robot.model.tree import Tree
+from jounce.robot.recursions.batches import Batched
+from jounce.robot.recursions.kinematics import link_frame
 
 CONFIGURATIONS = 16  # configurations at random that tell what joints can do in general
 RANK = 1e-9  # of the largest singular value: less is none

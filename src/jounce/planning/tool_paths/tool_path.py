@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.display import Displayed
-from jounce.dynamics.highest import local_maxima
+from jounce.dynamics.limits.local_maxima import local_maxima
 from jounce.errors import JounceError, TrajectoryError
 from jounce.jet import Jet, dot, sqrt
 from jounce.jet.algebra import stacked

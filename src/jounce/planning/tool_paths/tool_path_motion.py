@@ -19,10 +19,10 @@ from jounce.planning.tool_paths.path_marching import Nodes, predicted
 from jounce.planning.tool_paths.task_rank import SINGULAR, losing_joints, task_columns
 from jounce.planning.tool_paths.tool_path import ToolPath
 from jounce.planning.tool_paths.tool_tasks import task_rows
-from jounce.robot.arguments import whole_number
-from jounce.robot.batches import Batched
+from jounce.robot.model.arguments import whole_number
+from jounce.robot.model.tree import Tree
+from jounce.robot.recursions.batches import Batched
 from jounce.robot.robot import Robot
-from jounce.robot.tree import Tree
 from jounce.shapes import ArrayLike, seconds
 from jounce.trajectory import HermiteMotion
 from jounce.trajectory.joint_trajectory import MAX_ORDER, JointTrajectory

@@ -12,11 +12,11 @@ from jounce.jet import Jet, concatenate, cross, dot
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.inertia import finite_numbers
 from jounce.rigid.orientation import check_rotation
-from jounce.robot.abstract_robot import AbstractRobot
-from jounce.robot.arguments import floats, joints_of
-from jounce.robot.kinematics import link_frame, place_of
-from jounce.robot.robot_size import robot_size
-from jounce.robot.tree import Frame, Tree, axes_with_z_along
+from jounce.robot.model.abstract_robot import AbstractRobot
+from jounce.robot.model.arguments import floats, joints_of
+from jounce.robot.model.robot_size import robot_size
+from jounce.robot.model.tree import Frame, Tree, axes_with_z_along
+from jounce.robot.recursions.kinematics import link_frame, place_of
 from jounce.shapes import ArrayLike, Numbers
 
 if TYPE_CHECKING:

@@ -1,0 +1,139 @@
+"""Generalised forces from balances of momentum: virtual work, Newton-Euler. Negrean 2025, equations 79-81, 121-125."""
+
+from typing import Any
+
+import jax.numpy as jnp
+
+from jounce.dynamics.energy.driver_coordinates import balanced
+from jounce.dynamics.energy.energies import error_for
+from jounce.errors import whole_number
+from jounce.kinematics import Motion
+from jounce.robot.algorithms.equations_of_motion import (
+    centers_of,
+    partial_velocities,
+    times_inertia,
+    work,
+    work_of_weight,
+)
+from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
+from jounce.robot.model.arguments import checked_coordinates
+from jounce.robot.model.tree import Tree
+from jounce.robot.recursions.batches import Batched
+from jounce.robot.recursions.kinematics import body_frames
+from jounce.robot.recursions.tree_scan import Series, to_coordinates
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike
+
+
+@Batched
+def _virtual_work(tree: Tree, arrays: tuple[Series], _: Any, inertial: bool) -> Any:
+    """Return the work of inertia, or of weight, along each coordinate."""
+    frames = body_frames(tree, arrays[0]).without_base()
+    if not inertial:
+        return to_coordinates(tree, work_of_weight(tree, frames))
+    force = centers_of(tree, frames).differentiate().differentiate() * jnp.asarray(tree.mass)[:, None]
+    spin = frames.angular_velocity
+    assert spin is not None  # there are accelerations
+    moment = times_inertia(tree, frames, spin).differentiate()
+    return to_coordinates(tree, work(partial_velocities(tree, frames), force, moment))
+
+
+def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
+    """Return the generalised inertia forces by recursive Newton-Euler on jets: `inverse_dynamics` without gravity.
+
+    For the motion of a mechanism the balances of momentum are those of all bodies together, by multipliers.
+
+    Parameters
+    ----------
+    system, q, rates
+        As for `lagrange`.
+
+    Returns
+    -------
+    array of shape (..., rates + 1, n)
+        Forces and their rates, N m or N by s; for a motion as of `lagrange`.
+
+    Raises
+    ------
+    RobotError, MechanismError
+        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> newton_euler(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
+    [[10.0], [14.0]]
+    """
+    rates = whole_number("rates", rates, error=error_for(system))
+    if isinstance(system, Motion):
+        return balanced(system, rates, gravity=False)
+    falling, q = system.with_gravity((0.0, 0.0, 0.0)), checked_coordinates(system, q, rates + 2, rates + 2)
+    return inverse_dynamics(falling, q, drives=False)
+
+
+def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
+    """Return the generalised inertia forces by the principle of d'Alembert-Lagrange: Negrean 2025, equations 121-124.
+
+    The work that inertia forces and moments of all bodies do along each coordinate, ``sum J^T F``. For the motion of
+    a mechanism, J is how the bodies move with the laws of the drivers: the transposed Jacobian of the constraints.
+
+    Parameters
+    ----------
+    system, q, rates
+        As for `lagrange`.
+
+    Returns
+    -------
+    array of shape (..., rates + 1, n)
+        Forces and their rates, N m or N by s; for a motion as of `lagrange`.
+
+    Raises
+    ------
+    RobotError, MechanismError
+        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> virtual_work(jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]], rates=1).round(12).tolist()
+    [[10.0], [14.0]]
+    """
+    rates = whole_number("rates", rates, error=error_for(system))
+    if isinstance(system, Motion):
+        return balanced(system, rates, gravity=False)
+    return _virtual_work(system, (checked_coordinates(system, q, rates + 2, rates + 2),), (), (True,))
+
+
+def gravity_forces(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
+    """Return the generalised forces that hold the robot against gravity, and their rates: Q_g of Negrean 2025, 125.
+
+    With the inertia forces they make the driving forces, ``Q_m = Q_i + Q_g``.
+
+    Parameters
+    ----------
+    system, q, rates
+        As for `lagrange`, with K at least `rates`.
+
+    Returns
+    -------
+    array of shape (..., rates + 1, n)
+        Forces and their rates, N m or N by s; for a motion as of `lagrange`.
+
+    Raises
+    ------
+    RobotError, MechanismError
+        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> lift = jn.robot.JointAxis([0, 0, 1], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> gravity_forces(jn.robot.from_screws([lift]), [[0.0]]).tolist()
+    [[19.62]]
+    """
+    rates = whole_number("rates", rates, error=error_for(system))
+    if isinstance(system, Motion):
+        return balanced(system, rates, gravity=True) - balanced(system, rates, gravity=False)
+    return _virtual_work(system, (checked_coordinates(system, q, rates, rates),), (), (False,))

@@ -1,0 +1,218 @@
+"""A driven mechanism in the coordinates of its drivers: how its energies follow from changes of their laws.
+
+The laws of the drivers are generalised coordinates: with them, joints and loops determine all bodies. A law is changed
+by a jet, and all poses follow from it to first order by the factored Jacobian, order after order, as in a solve.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.energy.energies import body_energy
+from jounce.dynamics.forward.accelerations import Lanes
+from jounce.dynamics.inverse.motion_forces import MotionForces
+from jounce.dynamics.masses import Masses, required_masses
+from jounce.dynamics.motion_values import Coordinates, cut, labelled, pose_of
+from jounce.errors import MechanismError
+from jounce.execution.chunks import in_chunks
+from jounce.execution.compilation import compiled
+from jounce.jet import Jet
+from jounce.jet.algebra import total
+from jounce.kinematics import Motion
+from jounce.kinematics.continuation.change_points import spoiled
+from jounce.kinematics.continuation.jacobian_factors import Factor, factored
+from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.element_indices import element_indices
+from jounce.mechanism.system import System
+from jounce.modules import Module
+from jounce.rigid.pose import Pose
+from jounce.shapes import ArrayLike, Numbers
+from jounce.units.shown_units import derivative_unit
+
+if TYPE_CHECKING:
+    import xarray
+
+
+class ChangedLaw(Module):
+    """The laws of a group of drivers, changed by jets."""
+
+    law: Any
+    change: Float[Numbers, "levels instance batch"]  # Taylor coefficients
+
+    def __call__(self, time: Jet) -> Jet:
+        """Return the law at the instants of a jet."""
+        return self.law(time) + Jet(tuple(self.change[: time.order + 1]))
+
+
+def in_driver_coordinates(
+    motion: Motion,
+    q: ArrayLike | None,
+    least: int,
+    form: Callable[..., Any],
+    static: tuple[Any, ...],
+    *,
+    power: int = 0,
+) -> "xarray.DataArray":
+    """Return what a form of the equations of motion gives in the coordinates of the drivers.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism whose bodies have masses.
+    q : None
+        The motion has its own coordinates.
+    least : int
+        Highest derivative of the laws that counts.
+    form : callable
+        Maps energies, as a function of coefficients of the coordinates and of an order, those coefficients, and
+        `static` to coefficients of shape (levels, coordinates, batch).
+    static : tuple
+        What else the form takes.
+    power : int, default 0
+        By which power of s what the form gives is divided, in units of forces.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimensions time, derivative and driver, with the unit of each driver; NaN at instants that were not solved, and
+        at change points.
+
+    Raises
+    ------
+    MechanismError
+        If coordinates are given, no body has a mass, or something moves that no driver prescribes.
+    """
+    if q is not None:
+        raise MechanismError("a motion has its coordinates already, the laws of its drivers", name="q", value=q)
+    model, names = motion.model, drivers_of(motion)
+    found = element_indices(model)
+    order = tuple((found[name].group, found[name].instance) for name in names)
+    pose_type, coordinates = motion.poses
+    masses = required_masses(motion.mechanism)
+    start = cut(coordinates, 0)
+
+    def chunk(lanes: np.ndarray) -> Any:
+        still = {name: values[..., lanes] for name, values in start.items()}
+        return _evaluated(model.system, still, motion.time[lanes], masses, pose_type, order, least, form, static)
+
+    values = in_chunks(chunk, len(motion.time))
+    values = np.where(spoiled(motion.passages, motion.time, least), np.nan, values)
+    return _of_drivers(motion, values, power)
+
+
+def _of_drivers(motion: Motion, values: Float[np.ndarray, "order driver time"], power: int = 0) -> Any:
+    """Return what acts along the coordinates of drivers, labelled, with the unit of each, N or N*m over s^power."""
+    drivers = motion.mechanism.drivers
+    efforts = ["N*m" if is_turning(driver) else "N" for driver in drivers.values()]
+    units = [derivative_unit(unit, power) if power >= 0 else f"{unit}*s^{-power}" for unit in efforts]
+    return labelled(motion, values, driver=tuple(drivers)).assign_coords(unit=("driver", units))
+
+
+def drivers_of(motion: Motion) -> tuple[str, ...]:
+    """Return the names of the drivers of a motion.
+
+    Raises
+    ------
+    MechanismError
+        If something moves that no driver prescribes.
+    """
+    system, names = motion.model.system, tuple(motion.mechanism.drivers)
+    rows, columns = system.shape if system.groups else (0, 1)
+    if (rows if system.rank is None else system.rank) != columns or not names:
+        message = "the coordinates here are the laws of the drivers, and they do not prescribe all that can move"
+        raise MechanismError(message, name="drivers", value=list(names))
+    return names
+
+
+def balanced(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray":
+    """Return what inertia asks of the drivers, and on request weight too, by multipliers: nothing applied acts.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism whose bodies have masses.
+    rates : int
+        How many rates are wanted.
+    gravity : bool
+        Whether the bodies have weight.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimensions time, derivative and driver, with the unit of each driver; NaN at instants that were not solved.
+
+    Raises
+    ------
+    MechanismError
+        If no body has a mass, the motion has too few derivatives, or something moves that no driver prescribes.
+    """
+    names = drivers_of(motion)
+    required_masses(motion.mechanism)
+    if motion.order < rates + 2:
+        raise MechanismError(f"this needs a motion solved to order {rates + 2}", name="order", value=motion.order)
+    forces = MotionForces(motion, gravity=gravity, applied=False)
+    values = np.stack([forces.driver_force(name)[: rates + 1, 0] for name in names], axis=1)
+    return _of_drivers(motion, values)
+
+
+@compiled("pose_type", "order", "least", "form", "static")
+def _evaluated(
+    system: System,
+    still: Coordinates,
+    instants: Lanes,
+    masses: Masses,
+    pose_type: type[Pose],
+    order: tuple[tuple[int, int], ...],
+    least: int,
+    form: Callable[..., Any],
+    static: tuple[Any, ...],
+) -> Any:
+    place = pose_of(still, pose_type)
+    factor = factored(dataclasses.replace(system, fronts=None), place, Jet([instants[None]]))
+
+    def energies(changes: Any, p: int) -> Jet:
+        time = Jet.variable(instants[None], changes.shape[0] - 1)
+        pose = followed(with_changes(system, order, changes), place, factor, time)
+        parts = body_energy(pose, *masses, p)
+        return total(part.map(lambda c: jnp.sum(c, axis=0)) for part in parts)
+
+    return form(energies, jnp.zeros((least + 1, len(order), len(instants))), *static)
+
+
+def with_changes(
+    system: System, order: tuple[tuple[int, int], ...], changes: Float[Numbers, "levels driver batch"]
+) -> System:
+    """Return a system whose drivers, by group and instance, have laws that are changed."""
+    groups = list(system.groups)
+    for index in {group for group, _ in order}:
+        members = [order.index((index, instance)) for instance in range(groups[index].instances)]
+        law = ChangedLaw(groups[index].element.motion, changes[:, np.array(members)])
+        groups[index] = eqx.tree_at(lambda g: g.element.motion, groups[index], law)
+    return eqx.tree_at(lambda s: s.groups, system, tuple(groups))
+
+
+def followed(system: System, place: Pose, factor: Factor, time: Jet) -> Pose:
+    """Return the pose with all derivatives that the time jet has, right to first order in changes of the system.
+
+    The factors are those of the system without changes. What they leave of the residual is corrected by them once more,
+    which is all of it to first order: no derivative is taken of a factorisation.
+    """
+
+    def solved(pose: Any, solution: Any) -> Any:
+        return pose.extended(*system.coordinates(solution, pose.shifts))
+
+    def left(pose: Any) -> Any:
+        return system.residual(pose, time.truncate(pose.order)).dense().coefficients[pose.order]
+
+    pose = place.displaced(*system.coordinates(factor.solve(-left(place)), place.shifts))
+    for _ in range(time.order):
+        solution = factor.solve(-left(pose.extended(None, None)))
+        solution = solution - factor.solve(left(solved(pose, solution)))
+        pose = jax.lax.optimization_barrier(solved(pose, solution))  # or XLA computes it again in all that uses it
+    return pose

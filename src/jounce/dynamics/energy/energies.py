@@ -1,0 +1,388 @@
+"""Kinetic energy and acceleration energies of any order, with their rates. Negrean 2025, equations 65-120.
+
+The acceleration energy of order p is the kinetic energy with derivatives of order p + 1 in the place of velocities,
+``E_p = 1/2 integral |r^(p+1)|^2 dm``; order 0 is the kinetic energy. With the second moments S of a body about its
+centre of mass C and its axes a this is ``m/2 |r_C^(p+1)|^2 + 1/2 sum S_jk a_j^(p+1) . a_k^(p+1)`` (equation 107), exact
+for any motion. On jets the same two products give the rates.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses, second_moments
+from jounce.dynamics.motion_values import Coordinates, check_motion, cut, held, labelled, pose_of
+from jounce.errors import JounceError, MechanismError, RobotError, flag, whole_number
+from jounce.execution.compilation import compiled
+from jounce.jet import Jet, dot
+from jounce.jet.algebra import stacked, total
+from jounce.kinematics import Motion
+from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
+from jounce.mechanism.system import Group
+from jounce.rigid import PlanarPose
+from jounce.rigid.frames import Frames
+from jounce.rigid.pose import Pose
+from jounce.robot.model.arguments import checked_coordinates
+from jounce.robot.model.tree import Tree
+from jounce.robot.recursions.batches import Batched
+from jounce.robot.recursions.kinematics import body_frames
+from jounce.robot.recursions.tree_scan import Series
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike, Numbers
+from jounce.units.shown_units import derivative_unit
+
+if TYPE_CHECKING:
+    import xarray
+
+Energies = Float[Numbers, "order body time"]
+"""Taylor coefficients of energies of bodies along a motion."""
+
+EnergyFunction = Callable[..., tuple[Jet, ...]]
+"""What maps a pose, masses, centres, second moments and an order to energies, as `body_energy` does."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Energy:
+    """An energy of several bodies, translation and rotation apart, with its rates.
+
+    Of a robot it holds plain arrays, of a motion `xarray.DataArray` of dimensions time, derivative and body.
+
+    Parameters
+    ----------
+    translation, rotation : array of shape (..., rates + 1, bodies)
+        The parts of each body, kg m^2 / s^(2 p + 2) for order p, and their derivatives.
+    bodies : tuple of str
+        Names along the last axis.
+    order : int
+        The order p of the energy; 0 is the kinetic energy.
+    """
+
+    translation: Any
+    rotation: Any
+    bodies: tuple[str, ...]
+    order: int
+
+    @property
+    def total(self) -> Any:
+        """Energy of all bodies and its rates, shape (..., rates + 1)."""
+        return summed(self.translation + self.rotation)
+
+
+def summed(energies: Any) -> Any:
+    """Return energies of bodies added up; NaN where one of them is."""
+    return energies.sum("body", skipna=False) if hasattr(energies, "dims") else energies.sum(axis=-1)
+
+
+def body_energy(
+    pose: Pose | Frames, mass: Any, center_of_mass: Any, second_moments: Any, order: int = 1
+) -> tuple[Jet, Jet]:
+    """Return the acceleration energy of rigid bodies as jets: Negrean 2025, equations 82-113.
+
+    Parameters
+    ----------
+    pose : SpatialPose, PlanarPose or Frames
+        Where the bodies are, as jets of order `order` + 1 or more.
+    mass : array_like
+        kg; its shape is that of the batch axes of the pose.
+    center_of_mass : array of shape (3, ...) or (2, ...)
+        In the frames of the bodies, m.
+    second_moments : array of shape (3, 3, ...) or (2, 2, ...)
+        Integral of rho rho^T dm about the centre of mass, in the frames of the bodies, kg m^2.
+    order : int, default 1
+        Order p of the energy; 0 is the kinetic energy.
+
+    Returns
+    -------
+    translation, rotation : Jet
+        Shorter than the pose by `order` + 1.
+
+    Raises
+    ------
+    ValueError
+        If the pose has too few derivatives.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> import numpy as np
+    >>> angle = jn.Jet([0.0, 2.0, 1.5])  # a disc of 1 kg m^2 that turns in the plane, at 2 rad/s and 3 rad/s^2
+    >>> pose = jn.rigid.PlanarPose.from_jets(jn.Jet.constant(np.zeros(2), 2), angle)
+    >>> _, rotation = jn.dynamics.body_energy(pose, 1.0, np.zeros(2), 0.5 * np.eye(2))
+    >>> float(rotation.coefficients[0])  # (3^2 + 2^4) / 2
+    12.5
+    """
+    velocity = differentiated(pose.point(center_of_mass), order + 1)
+    rates = [differentiated(axis, order + 1) for axis in axes_of(pose)]
+    translation = dot(velocity, velocity) * (0.5 * mass)
+    size = range(len(rates))
+    rotation = total(
+        dot(rates[i], rates[k]) * ((0.5 if i == k else 1.0) * second_moments[i][k])
+        for i in size
+        for k in size
+        if i <= k
+    )
+    return translation, rotation
+
+
+def axes_of(pose: Pose | Frames) -> tuple[Jet, ...]:
+    """Return the axes of bodies, two in the plane, in components of the base."""
+    return tuple(pose.direction(unit) for unit in np.eye(2)) if isinstance(pose, PlanarPose) else pose.axes
+
+
+def differentiated(jet: Jet, times: int) -> Jet:
+    """Return a derivative of a jet.
+
+    Raises
+    ------
+    ValueError
+        If the jet is too short.
+    """
+    if jet.order < times:
+        raise ValueError(f"the pose has derivatives to order {jet.order}, this energy needs order {times}")
+    for _ in range(times):
+        jet = jet.differentiate()
+    return jet
+
+
+def acceleration_energy(
+    system: Robot | Motion, q: ArrayLike | None = None, *, order: int = 1, drives: bool = True
+) -> Energy:
+    """Return the acceleration energy of order p of a robot or of a moving mechanism, and its rates.
+
+    Negrean 2025, equations 73-78 for order 0, 82-113 for order 1, 107 for any order.
+
+    Parameters
+    ----------
+    system : Robot or Motion
+        A robot, or the motion of a mechanism whose bodies have masses.
+    q : array_like of shape (..., K + 1, n), optional
+        Coordinates of a robot and their derivatives, K at least p + 1.
+    order : int, default 1
+        The order p; 0 is the kinetic energy.
+    drives : bool, default True
+        Of a robot: count the rotors of the drives, ``1/2 I (q^(p+1))^2`` for the armature I of a joint, with the
+        rotation of the link that it moves; those of followers with that of their leader's.
+
+    Returns
+    -------
+    Energy
+        With K - p - 1 rates; for a motion of derivatives to order K, one for each instant.
+
+    Raises
+    ------
+    RobotError, MechanismError
+        If derivatives are missing, q does not fit the robot, or no body of the mechanism has a mass.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
+    >>> robot = jn.Robot("one", links, [pin])
+    >>> float(jn.acceleration_energy(robot, [[0.0], [2.0], [3.0]]).total[0].round(12))  # (3^2 + 2^4) / 3 / 2
+    4.166666666667
+    """
+    drives = flag("drives", drives, error=error_for(system))
+    return Energy(*energies_of(system, q, order, body_energy, drives))
+
+
+def energy_unit(order: int) -> str:
+    """Return the unit of the acceleration energy of an order.
+
+    Examples
+    --------
+    >>> from jounce.dynamics.energy.energies import energy_unit
+    >>> energy_unit(0), energy_unit(1)
+    ('J', 'J/s^2')
+    """
+    return derivative_unit("J", 2 * order)
+
+
+def error_for(system: Any) -> type[JounceError]:
+    """Return the class of errors about a robot, or about the motion of a mechanism."""
+    return MechanismError if isinstance(system, Motion) else RobotError
+
+
+def energies_of(
+    system: Robot | Motion, q: ArrayLike | None, order: int, function: EnergyFunction, drives: bool = False
+) -> tuple[Any, ...]:
+    """Return what `body_energy`, or a function like it, gives for the bodies of a system, their names, and the order.
+
+    The energies of rotors, on request, are added to the last of what the function gives.
+
+    Raises
+    ------
+    RobotError, MechanismError
+        As for `acceleration_energy`.
+    """
+    order = whole_number("order", order, 0, HIGHEST_ORDER, error=error_for(system))
+    if isinstance(system, Motion):
+        if q is not None:
+            raise MechanismError("a motion has its coordinates already", name="q", value=q)
+        _check_known(system, order, system.order)
+        bodies = tuple(system.mechanism.bodies)
+        found = energy_coefficients(system, order, function)
+        parts = tuple(labelled(system, x[: system.order - order, 1:], energy_unit(order), body=bodies) for x in found)
+        return *parts, bodies, order
+    leading = tuple(k for k, joint in enumerate(system.moving_joints) if joint.mimic is None) if drives else ()
+    parts = _of_robot(system, (checked_coordinates(system, q, order + 1),), (), (order, function, leading))
+    return *parts, system.moving_links, order
+
+
+def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None, *, drives: bool = True) -> Energy:
+    """Return the kinetic energy of a robot or of a moving mechanism, and its rates: `acceleration_energy` of order 0.
+
+    Negrean 2025, equations 65-78 (Koenig's theorem). Of a robot the armature inertia of its joints counts, unless
+    `drives` is False.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
+    >>> jn.kinetic_energy(jn.robot.from_screws([slide]), [[0.0], [3.0], [1.0]]).total.tolist()  # energy and power
+    [9.0, 6.0]
+    """
+    return acceleration_energy(system, q, order=0, drives=drives)
+
+
+def robot_energy(tree: Tree, frames: Frames, order: int, function: EnergyFunction = body_energy) -> tuple[Jet, ...]:
+    """Return the energy of the bodies of a robot as jets of shape (bodies, batch), from the frames of the bodies."""
+    tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)[..., None]
+    center = jnp.swapaxes(jnp.asarray(tree.center), 0, 1)[:, :, None]
+    return function(frames, jnp.asarray(tree.mass)[:, None], center, second_moments(tensor), order)
+
+
+@Batched
+def _of_robot(
+    tree: Tree, arrays: tuple[Series], _: Any, order: int, function: EnergyFunction, leading: tuple[int, ...]
+) -> tuple[Float[Numbers, "levels body batch"], ...]:
+    frames = body_frames(tree, arrays[0]).without_base()
+    *parts, last = (stacked(part) for part in robot_energy(tree, frames, order, function))
+    if leading:  # the bodies that coordinates move, in their order
+        rate = differentiated(Jet(tuple(arrays[0])), order + 1)
+        last = last.at[:, np.array(leading)].add(stacked(rate * rate * (0.5 * jnp.asarray(tree.armature)[:, None])))
+    return *parts, last
+
+
+def energy_coefficients(motion: Motion, order: int, function: EnergyFunction = body_energy) -> tuple[Energies, ...]:
+    """Return what `body_energy`, or a function like it, gives for bodies as Taylor coefficients, the ground first.
+
+    Raises
+    ------
+    MechanismError
+        If no body has a mass, or the motion has too few derivatives.
+    """
+    pose_type, coordinates = motion.poses
+    _check_known(motion, order, len(coordinates["position"]) - 1)
+    return _of_bodies(coordinates, required_masses(motion.mechanism), pose_type, order, function)
+
+
+def _check_known(motion: Motion, order: int, known: int) -> None:
+    if known < order + 1:
+        message = f"an energy of order {order} needs a motion solved to order {order + 1}"
+        raise MechanismError(message, name="order", value=motion.order)
+
+
+@compiled("pose_type", "order", "function", brief=True)
+def _of_bodies(
+    coordinates: Coordinates, masses: Masses, pose_type: type[Pose], order: int, function: EnergyFunction
+) -> tuple[Energies, ...]:
+    return tuple(stacked(part) for part in function(pose_of(coordinates, pose_type), *masses, order))
+
+
+def potential_energy(motion: Motion) -> "xarray.DataArray":
+    """Return the potential energy of all bodies of a mechanism in its gravity, and its rates; zero at the origin.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism whose bodies have masses.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimensions time and derivative, J by s; NaN at instants that were not solved.
+
+    Raises
+    ------
+    MechanismError
+        If no body has a mass.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> lift = jn.Mechanism(
+    ...     space="planar",
+    ...     gravity=[0, -10.0],
+    ...     bodies={"cage": jn.Body([0, 0], mass=3.0)},
+    ...     joints={"rail": jn.planar.Prismatic(("ground", "cage"), [0, 0], [0, 0], [0, 1], [0, 1])},
+    ...     drivers={"height": jn.drivers.SlideDriver(("ground", "cage"), [0, 0], [0, 0], [0, 1], "2*t")},
+    ... )
+    >>> energy = jn.dynamics.potential_energy(jn.solve(lift, [0.0, 1.0], order=1))
+    >>> energy.values[1].round(9).tolist()  # energy and power
+    [60.0, 60.0]
+    """
+    check_motion(motion)
+    return labelled(motion, potential_coefficients(motion)[: motion.order + 1].sum(axis=1), "J")
+
+
+def potential_coefficients(motion: Motion) -> Energies:
+    """Return the potential energies of bodies as Taylor coefficients, the ground first."""
+    masses, (pose_type, coordinates) = required_masses(motion.mechanism), motion.poses
+    heights = held(motion, _heights(coordinates, masses.center, gravity_of(motion.mechanism), pose_type))
+    return 0.0 - heights * masses.mass[None]  # no -0
+
+
+@compiled("pose_type", brief=True)
+def _heights(
+    coordinates: Coordinates, center: Float[Numbers, "component body 1"], gravity: Gravity, pose_type: type[Pose]
+) -> Energies:
+    return stacked(dot(pose_of(coordinates, pose_type).point(center), gravity))
+
+
+def stored_energy(motion: Motion) -> Any:
+    """Return the energy that springs, and other forces that give back what they take, have stored.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of any mechanism; without such forces it is zero.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimension time, J; NaN at instants that were not solved.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> sled = jn.Mechanism(
+    ...     space="planar",
+    ...     bodies={"sled": jn.Body([1, 0])},
+    ...     joints={"rail": jn.planar.Prismatic(("ground", "sled"), [0, 0], [0, 0], [1, 0], [1, 0])},
+    ...     drivers={"push": jn.drivers.SlideDriver(("ground", "sled"), [0, 0], [0, 0], [1, 0], "1 + t**2")},
+    ...     forces={"spring": jn.forces.Spring(("ground", "sled"), [0, 0], [0, 0], stiffness=5.0, length=1.0)},
+    ... )
+    >>> jn.dynamics.stored_energy(jn.solve(sled, [0.0, 2.0], order=1)).values.round(12).tolist()  # 5/2 t^4
+    [0.0, 40.0]
+    """
+    check_motion(motion)
+    pose_type, coordinates = motion.poses
+    stored = _stored(motion.forces, cut(coordinates, 1), motion.time[None], pose_type)
+    return labelled(motion, held(motion, stored)[None], "J")[:, 0].drop_vars("derivative")
+
+
+@compiled("pose_type", brief=True)
+def _stored(groups: tuple[Group, ...], coordinates: Coordinates, time: Any, pose_type: type[Pose]) -> Any:
+    return energy_of_forces(groups, pose_of(coordinates, pose_type), Jet.variable(time, 1))
+
+
+def energy_of_forces(groups: Sequence[Group], pose: Pose, time: Jet) -> Float[Numbers, " batch"]:
+    """Return the energy that forces have stored, J, in a pose with velocities."""
+    lanes = time.shape[-1]
+    parts = [jnp.broadcast_to(g.energy(pose, time).coefficients[0], (g.instances, lanes)) for g in groups]
+    return jnp.sum(jnp.concatenate([*parts, jnp.zeros((1, lanes))]), axis=0)

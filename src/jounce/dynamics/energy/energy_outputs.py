@@ -1,0 +1,122 @@
+"""Energies as outputs: kinetic, of accelerations of any order, and potential, of a body or of the whole mechanism."""
+
+import abc
+from typing import ClassVar
+
+import equinox as eqx
+
+from jounce.constraints.base import Whole
+from jounce.dynamics.energy.energies import energy_coefficients, energy_unit, potential_coefficients
+from jounce.dynamics.motion_values import held
+from jounce.errors import MechanismError, check_name, whole_number
+from jounce.kinematics import Motion
+from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
+from jounce.mechanism import AbstractMotionOutput, Mechanism
+from jounce.shapes import Numbers
+
+
+class AbstractEnergyOutput(AbstractMotionOutput):
+    """An energy of all bodies of a mechanism, J; of accelerations of order p, J/s^(2 p)."""
+
+    unit = "J"
+    rate_names = ("energy", "first rate", "second rate", "third rate", "fourth rate")
+    source: ClassVar[str] = "mechanism"  # the key of a file that says what it is of
+
+    @property
+    def alone(self) -> str | None:
+        """The body alone whose energy it is; None for all of them."""
+        return getattr(self, "body", None)
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless the body exists and there are masses."""
+        bodies, alone = mechanism.bodies, self.alone
+        if alone is not None:
+            check_name("moving body", alone, bodies, MechanismError, name="body")
+        if all(body.mass is None for name, body in bodies.items() if alone in (None, name)):
+            which = "no body has a mass" if alone is None else "this body has no mass"
+            raise MechanismError(f"{which}, and an energy needs one", name=self.source, value=alone)
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the energy, (levels, 1, time)."""
+        parts = held(motion, self._of_bodies(motion))
+        if self.alone is None:
+            return parts.sum(axis=1, keepdims=True)
+        index = 1 + list(motion.mechanism.bodies).index(self.alone)  # the ground first
+        return parts[:, index : index + 1]
+
+    @abc.abstractmethod
+    def _of_bodies(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of all bodies, (levels, bodies, time)."""
+
+
+class KineticEnergyOutput(AbstractEnergyOutput):
+    """Kinetic energy of all bodies, J. Negrean 2025, equations 65-78."""
+
+    lost_orders = 1
+
+    def _of_bodies(self, motion):
+        return sum(energy_coefficients(motion, 0))
+
+
+class AccelerationEnergyOutput(AbstractEnergyOutput):
+    """Acceleration energy of order p of all bodies, J/s^(2 p). Negrean 2025, equations 82-122."""
+
+    order: Whole = eqx.field(static=True, default=1)
+
+    def __check_init__(self):
+        whole_number("order", self.order, 0, HIGHEST_ORDER, error=MechanismError)
+
+    @property
+    def lost_orders(self) -> int:  # type: ignore[override] - of an instance, as it depends on the order
+        """Derivatives by which it is shorter than the motion."""
+        return int(self.order) + 1
+
+    @property
+    def unit(self) -> str:
+        """Unit of the energy."""
+        return energy_unit(int(self.order))
+
+    def _of_bodies(self, motion):
+        return sum(energy_coefficients(motion, int(self.order)))
+
+
+class PotentialEnergyOutput(AbstractEnergyOutput):
+    """Potential energy of all bodies in gravity, J; zero at the origin."""
+
+    def _of_bodies(self, motion):
+        return potential_coefficients(motion)
+
+
+class BodyKineticEnergyOutput(KineticEnergyOutput):
+    """Kinetic energy of a body, J. Negrean 2025, equations 65-72."""
+
+    body: str = eqx.field(static=True, kw_only=True)
+
+    source = "body"
+
+
+class BodyAccelerationEnergyOutput(AccelerationEnergyOutput):
+    """Acceleration energy of order p of a body, J/s^(2 p). Negrean 2025, equations 82-106."""
+
+    body: str = eqx.field(static=True, kw_only=True)
+
+    source = "body"
+
+
+class BodyPotentialEnergyOutput(PotentialEnergyOutput):
+    """Potential energy of a body in gravity, J; zero at the origin."""
+
+    body: str = eqx.field(static=True, kw_only=True)
+
+    source = "body"
+
+
+ENERGY_OUTPUTS: tuple[tuple[str, type[AbstractEnergyOutput]], ...] = (
+    ("kinetic_energy", KineticEnergyOutput),
+    ("kinetic_energy", BodyKineticEnergyOutput),
+    ("acceleration_energy", AccelerationEnergyOutput),
+    ("acceleration_energy", BodyAccelerationEnergyOutput),
+    ("potential_energy", PotentialEnergyOutput),
+    ("potential_energy", BodyPotentialEnergyOutput),
+)
+"""The word for ``quantity`` in a file and the class of each energy as an output."""

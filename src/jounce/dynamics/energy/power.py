@@ -1,0 +1,172 @@
+"""The power balance of a mechanism in motion: a check of all forces that needs no second solver."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.forward.accelerations import Lanes
+from jounce.dynamics.inverse.motion_forces import MotionForces
+from jounce.dynamics.masses import Gravity, Masses
+from jounce.dynamics.motion_values import Coordinates, check_motion, labelled, pose_of
+from jounce.execution.compilation import compiled
+from jounce.jet import Jet, dot
+from jounce.jet.algebra import stacked, total
+from jounce.kinematics import Motion
+from jounce.mechanism.axis_angles import at_lanes
+from jounce.mechanism.system import Group
+from jounce.rigid import PlanarPose
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+if TYPE_CHECKING:
+    import xarray
+
+FAINT = 1e-3  # of what turning bodies would move: coefficients that vanish have its rounding, 1e-12 of this or less
+
+
+def power_balance(motion: Motion) -> "xarray.Dataset":
+    """Return where the power in a moving mechanism comes from and goes to, with rates: a check of all its forces.
+
+    What drivers and applied forces put in is what the kinetic energy of the bodies, and their potential energy in
+    gravity, gain; the joints do no work. Both sides are computed apart: one from multipliers, one from energies.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism with masses or applied forces.
+
+    Returns
+    -------
+    xarray.Dataset
+        With dimensions time and derivative, in W, W/s, ...: ``drivers`` and ``forces``, the power that they put in;
+        ``kinetic`` and ``potential``, the rates of the energies; ``residual``, the first two less the others, which is
+        rounding; and ``scale``, the sum of the sizes of all products that enter, by which to judge it at each instant
+        and order: where these cancel, as where the power grows evenly, its rates are rounding and this is not.
+
+    Raises
+    ------
+    MechanismError
+        If nothing has a mass and no force is applied, the motion has no accelerations, or the masses are not valid.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> wheel = jn.Mechanism(
+    ...     space="planar",
+    ...     bodies={"wheel": jn.Body([0, 0], mass=2.0, inertia=0.5)},
+    ...     joints={"O": jn.planar.Revolute(("ground", "wheel"), [0, 0], [0, 0])},
+    ...     drivers={"turn": jn.drivers.CoordinateDriver(("ground", "wheel"), "angle", motion="t**2")},
+    ... )
+    >>> balance = jn.power_balance(jn.solve(wheel, [0.0, 3.0], order=4))
+    >>> balance["drivers"].sel(derivative=0).values.tolist()  # 1 N m at 0 and 6 rad/s
+    [0.0, 6.0]
+    >>> bool((abs(balance["residual"]) <= 1e-12 * balance["scale"]).all())
+    True
+    """
+    check_motion(motion)
+    import xarray
+
+    forces = MotionForces.of(motion)
+    nothing = np.zeros((forces.levels, len(motion.time)))
+    driven = [(nothing, nothing), *(_driver_power(forces, name) for name in motion.mechanism.drivers)]
+    rest = forces.in_chunks(lambda lanes: _powers(*_of_chunk(forces, lanes), forces.pose_type, forces.levels))
+    applied, kinetic, potential, sizes = (np.asarray(part) for part in rest)
+    forces.check_finite(applied)
+    power, size = np.sum(driven, axis=0)
+    terms = {"drivers": power, "forces": applied.sum(axis=1)}
+    terms |= {"kinetic": kinetic.sum(axis=1), "potential": potential.sum(axis=1)}
+    found = {name: labelled(motion, part[: motion.order + 1], "W") for name, part in terms.items()}
+    residual = found["drivers"] + found["forces"] - found["kinetic"] - found["potential"]
+    found["residual"] = residual.assign_attrs(units="W")
+    found["scale"] = labelled(motion, (size + sizes.sum(axis=1))[: motion.order + 1], "W")
+    return xarray.Dataset(found)
+
+
+def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the power of a driver and the size of its products, as Taylor coefficients, (levels, time)."""
+    place = forces.indices[name]
+    element = forces.model.system.groups[place.group].element
+    law = forces.in_chunks(lambda lanes: _law(element, forces.motion.time[lanes], forces.levels))[:, place.instance]
+    rate, force = Jet(tuple(law)).differentiate(), Jet(tuple(forces.driver_force(name)[:, 0]))
+    power, size = force * rate, force.map(np.abs) * rate.map(np.abs)
+    return np.stack(power.dense().coefficients), np.stack(size.dense().coefficients)
+
+
+@compiled("levels", brief=True)
+def _law(driver: Any, instants: Lanes, levels: int) -> Float[Numbers, "_ instance batch"]:
+    law = stacked(driver.motion(Jet.variable(instants[None], levels)))
+    return law.reshape(levels + 1, -1, len(instants))
+
+
+def _of_chunk(forces: MotionForces, lanes: np.ndarray) -> tuple[Any, ...]:
+    bodies = forces.coordinates_at(None, lanes, forces.levels + 2)
+    applied, instants = at_lanes(forces.motion.forces, lanes), forces.motion.time[lanes]
+    return applied, bodies, instants, forces.masses, forces.gravity, forces.model.length
+
+
+@compiled("pose_type", "levels", brief=True)
+def _powers(
+    groups: tuple[Group, ...],
+    bodies: Coordinates,
+    instants: Lanes,
+    masses: Masses,
+    gravity: Gravity,
+    length: float | Float[Numbers, ""],
+    pose_type: type[Pose],
+    levels: int,
+) -> tuple[Float[Numbers, "{levels} _ batch"], ...]:
+    """Return the power of each force, the rates of both energies of each body, and the sizes of all their products."""
+    order = levels + 1  # energies have one less, and their rates one less again
+    pose, time = pose_of(bodies, pose_type, order), Jet.variable(instants[None], order)
+    mass, center, moments = masses
+    velocity, spin, tensor = pose.point(center).differentiate(), _spin(pose), _inertia(moments, pose.turns)
+    axes = [axis.dense() for axis in (pose.axes if pose.turns == 3 else (pose.sine[None], pose.cosine[None]))]
+    turning = _largest(axes).differentiate()
+    speed = _largest([pose.position.differentiate()]) + turning * (jnp.max(jnp.abs(center), axis=0) + FAINT * length)
+    momentum = [total(tensor[i][k] * spin[k] for k in range(pose.turns)) for i in range(pose.turns)]
+    kinetic = dot(velocity, velocity) * (0.5 * mass) + total(a * b for a, b in zip(spin, momentum, strict=True)) * 0.5
+    turns = _largest([w[None] for w in spin]) + turning * FAINT
+    sizes = speed * speed * mass + turns * turns * jnp.max(jnp.sum(jnp.abs(tensor), axis=1), axis=0)
+    sizes = sizes.differentiate() + (speed * mass * jnp.sum(jnp.abs(gravity))).truncate(levels - 1)
+    potential = (dot(velocity, gravity) * -mass).truncate(levels - 1)
+    applied = [_applied(group, pose, time, turning.map(lambda c: jnp.max(c, axis=0)), length) for group in groups]
+    nothing = jnp.zeros((levels, 0, len(instants)))
+    powers, products = (
+        jnp.concatenate([*(stacked(pair[k].truncate(levels - 1)) for pair in applied), nothing], axis=1) for k in (0, 1)
+    )
+    products = jnp.concatenate([products, stacked(sizes)], axis=1)
+    return powers, stacked(kinetic.differentiate()), stacked(potential), products
+
+
+def _spin(pose: Pose) -> tuple[Jet, ...]:
+    """Return the components of the angular velocities of bodies, in their axes."""
+    if isinstance(pose, PlanarPose):
+        return (pose.angle.differentiate(),)
+    assert pose.angular_velocity is not None  # there are accelerations
+    return tuple(pose.angular_velocity)
+
+
+def _inertia(
+    moments: Float[Numbers, "component component body 1"], turns: int
+) -> Float[Numbers, "{turns} {turns} body 1"]:
+    """Return the tensors of inertia about the centres of mass from the second moments."""
+    spread = total(moments[k][k] for k in range(len(moments)))
+    if turns == 1:
+        return spread[None, None]
+    return spread[None, None] * jnp.eye(3)[:, :, None, None] - moments
+
+
+def _applied(group: Group, pose: Pose, time: Jet, turning: Jet, length: float | Float[Numbers, ""]) -> tuple[Jet, Jet]:
+    """Return the power of forces, (instances, batch), and the size of its products."""
+    lever = length if group.element.unit == "N" else 1.0
+    rates = group.velocity(pose, time).map(jnp.abs) + turning * (FAINT * lever)
+    return group.power(pose, time), group.force(pose, time).map(jnp.abs).dot(rates)
+
+
+def _largest(jets: Sequence[Jet]) -> Jet:
+    """Return the largest component of vectors, coefficient by coefficient, (bodies, batch)."""
+    levels = zip(*(jet.dense().coefficients for jet in jets), strict=True)
+    return Jet(tuple(jnp.max(jnp.abs(jnp.concatenate(level)), axis=0) for level in levels))

@@ -1,0 +1,374 @@
+"""Forward dynamics of constrained mechanisms: accelerations and multipliers with all their rates, from one matrix.
+
+The equations of motion ``M q'' + Phi_q^T lambda = Q`` and ``Phi'' = 0`` are written once, on plain values. On series
+their coefficient k is affine in the unknowns ``(q''[k], lambda[k])``, with the same matrix
+``[[M, Phi_q^T], [Phi_q, 0]]`` at every order: the "hyper-dynamic" equations that Sommer 2024, section 7, announces.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.dynamics.forward.loads import inertia_forces, mass_matrices
+from jounce.dynamics.forward.saddle_fronts import SaddleFactor, SaddleFronts, SaddleInverse
+from jounce.dynamics.forward.saddle_point import (
+    BodyMatrices,
+    ByBody,
+    Column,
+    DenseInverse,
+    Jacobian,
+    MassMatrix,
+    ReducedFactor,
+    as_column,
+    block_diagonal,
+    by_body,
+    in_basis,
+    saddle_point,
+)
+from jounce.dynamics.masses import Gravity, Masses
+from jounce.jet import Jet
+from jounce.jet.algebra import total
+from jounce.jet.series import Recursion
+from jounce.linear_algebra.least_squares import range_basis
+from jounce.linear_algebra.linear import DenseFactor
+from jounce.mechanism.axis_angles import with_turns
+from jounce.mechanism.system import System
+from jounce.modules import Module
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.pose import Pose
+from jounce.rigid.spatial import body_axes, quaternion_spins
+from jounce.shapes import Numbers
+
+Instants = Float[Numbers, "1 batch"]
+Lanes = Float[Numbers, " batch"]
+"""One number for each run of a batch; of `Flags` and `Indices` alike."""
+Flags = Bool[Numbers, " batch"]
+Indices = Int[Numbers, " batch"]
+Factor = DenseFactor | SaddleFactor | ReducedFactor
+Inverse = DenseInverse | SaddleInverse
+"""Of the equations' matrix, for many right sides that come one by one."""
+Matrices = Float[Numbers, "size size batch"]
+"""Of the equations of motion."""
+Rows = Float[Numbers, "row batch"]
+Shifts = Float[Numbers, "shift body batch"]
+"""One vector for each body, such as a position or a velocity."""
+Turns = Float[Numbers, "turn body batch"]
+"""One turn, or rate of it, for each body: of one component in the plane, three in space."""
+Attitudes = Float[Numbers, "attitude body batch"]
+"""Angles, of one component, or Euler parameters, of four."""
+
+
+class State(NamedTuple):
+    """Where the moving bodies are and how they move; shapes (components, bodies, batch).
+
+    Attributes
+    ----------
+    position, velocity : array
+        Of the origins of the body frames, in the global frame, m and m/s.
+    attitude : array
+        Angles, (1, bodies, batch) in rad, or Euler parameters, (4, bodies, batch).
+    spin : array
+        Rate of the angle, or angular velocity in the axes of the body, rad/s.
+    """
+
+    position: Numbers
+    attitude: Numbers
+    velocity: Numbers
+    spin: Numbers
+
+    def map(self, function: Callable[[Any], Any]) -> "State":
+        """Apply a function to each array."""
+        return State(*map(function, self))
+
+
+class Expansion(NamedTuple):
+    """Taylor coefficients of a motion about an instant: what a step of an integrator needs, and leaves behind."""
+
+    state: State  # arrays of shape (order + 1, components, bodies, batch)
+    acceleration: Float[Numbers, "order coordinate body batch"]
+    multipliers: Float[Numbers, "order row batch"]  # of the scaled rows, over the scale of the masses
+
+
+class Equations(Module):
+    """The equations of motion of a mechanism.
+
+    Parameters
+    ----------
+    system : System
+        Its joints, drivers and forces.
+    masses : Masses
+        Of all bodies, the ground first.
+    gravity : array of shape (components, 1, 1)
+        m/s^2.
+    scale : float
+        Of the masses, by which the equations are divided, kg.
+    pose_type : type
+        PlanarPose or SpatialPose.
+    saddle : SaddleFronts, optional
+        How the matrix of a large mechanism is eliminated.
+    """
+
+    system: System
+    masses: Masses
+    gravity: Gravity
+    scale: float | Float[Numbers, ""]
+    pose_type: type = eqx.field(static=True)
+    saddle: SaddleFronts | None = None
+
+    @property
+    def coordinates(self) -> int:
+        """Number of coordinates of a body."""
+        return self.pose_type.shifts + self.pose_type.turns
+
+    def near(self, angles: tuple[Float[Numbers, "_ batch"], ...]) -> "Equations":
+        """Return the equations where the angles about axes that forces measure have the turns of these.
+
+        There is one array of shape (instances, batch) for each group of such forces, rad.
+        """
+        if not angles:
+            return self
+        system = dataclasses.replace(self.system, forces=with_turns(self.system.forces, angles))
+        return dataclasses.replace(self, system=system)
+
+    def pose(self, state: State) -> Pose:
+        """Return the pose of all bodies, the ground first, with velocities."""
+        return self.extended(self.still(state.position, state.attitude), state.velocity, state.spin)
+
+    def extended(self, pose: Pose, shift: Shifts, turn: Turns) -> Pose:
+        """Return a pose with one more Taylor coefficient of the moving bodies."""
+        return pose.extended(with_ground(shift), with_ground(turn))
+
+    def still(self, position: Shifts, attitude: Attitudes) -> Pose:
+        """Return the pose of order zero of all bodies, the ground first."""
+        origins = Jet([with_ground(position)])
+        if self.pose_type is PlanarPose:
+            return PlanarPose.from_jets(origins, Jet([with_ground(attitude)[0]]))
+        quaternion = turns_with_ground(attitude)  # of unit length already: it is kept so
+        spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
+        return SpatialPose(origins, Jet([quaternion]), spins, axes, None)
+
+    def attitude_of(self, pose: Pose) -> Attitudes:
+        """Return the attitude of the moving bodies, as a state has it, from a pose of order zero."""
+        if isinstance(pose, PlanarPose):
+            return pose.angle.coefficients[0][None, 1:]
+        return pose.quaternion.coefficients[0][:, 1:]
+
+    def balance(
+        self, state: State, acceleration: ByBody, multipliers: Rows, time: Instants
+    ) -> tuple[ByBody, Rows, Attitudes]:
+        """Return what must vanish, and how the attitude moves.
+
+        Returns
+        -------
+        forces : array of shape (coordinates, bodies, batch)
+            ``M q'' - Q + Phi_q^T lambda``, over the scale of the masses.
+        second : array of shape (rows, batch)
+            ``Phi''``, of the scaled rows.
+        attitude_rate : array
+            Of the shape of the attitude.
+        """
+        shifts = self.pose_type.shifts
+        still = self.still(state.position, state.attitude)  # made once: what repeats is summed once, if it is the same
+        moving = self.extended(still, state.velocity, state.spin)
+        pose = self.extended(moving, acceleration[:shifts] / 2.0, acceleration[shifts:] / 2.0)
+        clock = Jet.variable(time, 2)
+        second = 2.0 * self.system.residual(pose, clock).dense().coefficients[2]
+        force, moment = inertia_forces(pose, self.masses, self.gravity)
+        inertia = jnp.concatenate([force.coefficients[0], moment.coefficients[0]])[:, 1:]
+        now = clock.truncate(0)
+
+        def loosened(change: Any) -> Any:
+            return jax.jvp(lambda p: self.system.residual(p, now).coefficients[0], (still,), (change,))[1]
+
+        forces = inertia / self.scale + conjugate(loosened, still, multipliers)[:, 1:]
+        applied = self.system.applied_forces(moving, clock.truncate(1)).coefficients[0]
+        forces = forces - applied[:, 1:] / self.scale
+        return forces, second, self.attitude_rate(state)
+
+    def attitude_rate(self, state: State) -> Attitudes:
+        """Return how the attitude of a state moves."""
+        if self.pose_type is PlanarPose:
+            return state.spin
+        spins = quaternion_spins(state.attitude)
+        return 0.5 * total(spin * part for spin, part in zip(spins, jnp.split(state.spin, 3), strict=True))
+
+    def matrix(self, state: State, time: Instants) -> Matrices:
+        """Return the matrix of the unknown accelerations and multipliers, scaled; of redundant rows, combinations."""
+        jacobian, rank = self._jacobian(state, time), self.system.rank
+        jacobian = jacobian if rank is None else in_basis(range_basis(jacobian, rank), jacobian)
+        return saddle_point(self.mass_matrix(state), jacobian)
+
+    def factored(self, state: State, time: Instants) -> Factor:
+        """Return the factors of that matrix, which solve for all rows."""
+        if self.system.rank is not None:
+            jacobian = self._jacobian(state, time)
+            return ReducedFactor.of(self.mass_matrix(state), jacobian, range_basis(jacobian, self.system.rank))
+        if self.saddle is None:
+            return DenseFactor.of(self.matrix(state, time))
+        entries = self.system.entries(self.still(state.position, state.attitude), Jet([time]))
+        return self.saddle.factored(self._masses(state), entries, self.system.column_scale, self.system.row_scale)
+
+    def blank_factor(self, lanes: int) -> Factor:
+        """Return a placeholder for the factors of a batch, to start a loop with."""
+        if self.system.rank is not None:
+            return ReducedFactor.blank(self.system.shape, self.system.rank, lanes)
+        if self.saddle is None:
+            size = sum(self.system.shape)
+            return DenseFactor.blank((size, size), lanes)
+        return self.saddle.blank(lanes)
+
+    def _jacobian(self, state: State, time: Instants) -> Jacobian:
+        return self.system.jacobian(self.still(state.position, state.attitude), Jet([time]))
+
+    def mass_matrix(self, state: State) -> MassMatrix:
+        """Return the mass matrix over the scale of the masses, scaled."""
+        return block_diagonal(self._masses(state), self.system.column_scale)
+
+    def _masses(self, state: State) -> BodyMatrices:
+        """Return the mass matrices of the moving bodies over the scale of the masses."""
+        return mass_matrices(self.still(state.position, state.attitude), self.masses)[:, :, 1:] / self.scale
+
+    def unknowns(self, solve: Callable[[Rows], Rows], forces: ByBody, second: Rows) -> tuple[ByBody, Rows]:
+        """Return the changes of accelerations and multipliers that make what `balance` returns vanish.
+
+        Parameters
+        ----------
+        solve : callable
+            Solves for right sides with the matrix of the equations, scaled.
+        forces, second : array
+            As `balance` returns them.
+        """
+        scale = self.system.column_scale
+        columns = self.system.shape[1]
+        solution = -solve(jnp.concatenate([as_column(forces, scale), second]))
+        return by_body(solution[:columns], scale), solution[columns:]
+
+    def least_change(self, factor: Factor, gap: Rows) -> Column:
+        """Return the change of coordinates of least kinetic energy that closes a gap of the scaled rows, scaled."""
+        columns = self.system.shape[1]
+        return factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns]
+
+    def with_rates(self, factor: Factor, state: State, time: Instants) -> State:
+        """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
+        rate = self.system.residual(self.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
+        change = by_body(self.least_change(factor, rate), self.system.column_scale)
+        shifts = self.pose_type.shifts
+        return state._replace(velocity=state.velocity + change[:shifts], spin=state.spin + change[shifts:])
+
+
+def with_ground(
+    moving: Float[Numbers, "*components body batch"], of_ground: float | np.ndarray = 0.0
+) -> Float[Numbers, "*components body+1 batch"]:
+    """Put the ground, which has none of most quantities, before the moving bodies; in NumPy what is there."""
+    array: Any = np if isinstance(moving, np.ndarray) else jnp
+    ground = array.broadcast_to(of_ground, (*moving.shape[:-2], 1, moving.shape[-1]))
+    return array.concatenate([ground, moving], axis=-2)
+
+
+def turns_with_ground(moving: Float[Numbers, "*orders 4 body batch"]) -> Float[Numbers, "*orders 4 body+1 batch"]:
+    """Put the ground, which does not turn, before the moving bodies: Euler parameters, or their series."""
+    components = moving.shape[:-2]
+    return with_ground(moving, np.eye(1, math.prod(components)).reshape(*components, 1, 1))
+
+
+def conjugate(variation: Callable[[Pose], Any], pose: Pose, weights: Float[Numbers, "*rows batch"]) -> ByBody:
+    """Return the forces by which weights act on the bodies.
+
+    Parameters
+    ----------
+    variation : callable
+        How what the weights are conjugate to varies with a change of the pose; linear.
+    pose : SpatialPose or PlanarPose
+        Of order zero.
+    weights : array
+        Of the shape of the variation.
+    """
+    shifts = pose.shifts
+    example = jax.ShapeDtypeStruct((shifts + pose.turns, *pose.position.shape[1:]), jnp.float64)
+    transposed = jax.linear_transpose(lambda v: variation(pose.varied(Jet([v[:shifts]]), Jet([v[shifts:]]))), example)
+    return transposed(weights)[0]
+
+
+def inverted(factor: Factor) -> Inverse:
+    """Return what solves with factors for many right sides that come one by one."""
+    return factor.inverted() if isinstance(factor, SaddleFactor) else DenseInverse(factor.inverse())
+
+
+def begun_series(coefficients: list[Any], levels: int) -> Any:
+    """Return the first coefficients of a series with room for the others."""
+    first = jnp.stack(coefficients)
+    return jnp.pad(first, ((0, levels - len(first)), *((0, 0),) * (first.ndim - 1)))
+
+
+def expand(
+    equations: Equations,
+    state: State,
+    time: Instants,
+    order: int,
+    inverse: Inverse | None = None,
+    *,
+    reversible: bool = False,
+) -> Expansion:
+    """Return the Taylor coefficients of the motion through a state, to an order.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the mechanism.
+    state : State
+        That fulfils the constraints and their rates.
+    time : array of shape (1, batch)
+        The instant, s.
+    order : int
+        Highest coefficient of positions and velocities, at least 1.
+    inverse : DenseInverse or SaddleInverse, optional
+        Of the equations' matrix at this state, where it is known.
+    reversible : bool, default False
+        Whether JAX may differentiate it in reverse mode.
+    """
+    count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
+    known = inverted(equations.factored(state, time)) if inverse is None else inverse
+    rows = equations.system.row_scale.shape[0]
+    solved = partial(equations.unknowns, known.solve)
+
+    def program(*leaves: Any) -> Any:
+        position, attitude, velocity, spin, acceleration, multipliers, clock = leaves
+        return equations.balance(State(position, attitude, velocity, spin), acceleration, multipliers, clock)
+
+    trial = jnp.zeros((count, bodies, lanes)), jnp.zeros((rows, lanes))
+    forces, second, _ = program(*state, *trial, time)
+    acceleration, multipliers = solved(forces, second)
+    recursion = Recursion(program, (*state, acceleration, multipliers, time), order - 1, reversible=reversible)
+    shifts = equations.pose_type.shifts
+
+    def raised(before: State, acceleration: Any, attitude_rate: Any, k: Any) -> State:
+        """Return the state of order k from the coefficients of order k - 1 of its rates."""
+        rates = State(before.velocity, attitude_rate, acceleration[:shifts], acceleration[shifts:])
+        return rates.map(lambda c: c / k)
+
+    def level(k: Any, carry: Any) -> Any:
+        history, now, series, rates = carry
+        ticking = jnp.where(k == 1, jnp.ones_like(time), jnp.zeros_like(time))
+        (forces, second, attitude_rate), history = recursion.advanced(history, k, (*now, None, None, ticking))
+        acceleration, multipliers = solved(forces, second)
+        history = recursion.corrected(history, (None,) * 4 + (acceleration, multipliers, None))
+        now = raised(now, acceleration, attitude_rate, k + 1)
+        put = jax.lax.dynamic_update_index_in_dim
+        series = State(*(put(s, c, k + 1, 0) for s, c in zip(series, now, strict=True)))
+        return history, now, series, put(rates, multipliers, k, 0)
+
+    now = raised(state, acceleration, recursion.outputs[2], 1)
+    series = State(*(begun_series([c, d], order + 1) for c, d in zip(state, now, strict=True)))
+    rates = begun_series([multipliers], order)
+    _, _, series, rates = jax.lax.fori_loop(1, order, level, (recursion.history, now, series, rates))
+    numbers = jnp.arange(1.0, order + 1)[:, None, None, None]
+    accelerations = numbers * jnp.concatenate([series.velocity[1:], series.spin[1:]], axis=1)
+    return Expansion(series, accelerations, rates)

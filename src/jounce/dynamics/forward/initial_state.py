@@ -1,0 +1,332 @@
+"""The state a simulation starts from: consistent positions and velocities from partial ones, and what can move."""
+
+import dataclasses
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.dynamics.forward.accelerations import Equations, Instants, State
+from jounce.dynamics.forward.saddle_fronts import SaddleFronts
+from jounce.dynamics.forward.saddle_point import even_scale
+from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses
+from jounce.errors import AssemblyError, MechanismError, MobilityError
+from jounce.execution.compilation import compiled
+from jounce.execution.device import resident
+from jounce.jet import Jet
+from jounce.kinematics.assembly.assemble import SETTLED, assemble, freely_moving
+from jounce.kinematics.continuation.correct_and_differentiate import LARGEST_CONTRADICTION
+from jounce.kinematics.curves.choice import chosen
+from jounce.kinematics.status import Status
+from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE, HostJacobian, is_clearly_regular
+from jounce.mechanism import Mechanism, Model, build
+from jounce.mechanism.builder import released, with_reference
+from jounce.modules import unchecked, with_fields
+from jounce.shapes import Numbers
+
+TOLERANCE = 1e-12  # of the assembled positions, rad or sizes of the mechanism
+ROUNDING = 1e-15  # of residuals, rad or sizes of the mechanism
+LARGEST_CHANGE = 1e-2  # of velocities, as a part of them, by what rounding leaves open of the position
+
+
+@dataclasses.dataclass(frozen=True)
+class ConsistentStart:
+    """A mechanism ready to move.
+
+    Attributes
+    ----------
+    model : Model
+        The numeric model, its rows scaled.
+    equations : Equations
+        Its equations of motion.
+    state : State
+        That fulfils joints, drivers and initial conditions with their rates; a batch of one.
+    jacobian : HostJacobian
+        Of its constraints there.
+    sound : array of bool, shape (forces,)
+        Which applied forces are finite there.
+    """
+
+    model: Model
+    equations: Equations
+    state: State
+    jacobian: HostJacobian
+    sound: Bool[np.ndarray, " force"]
+
+    @cached_property
+    def mobility(self) -> str:
+        """Degrees of freedom and the bodies that have them, in words."""
+        free = self.jacobian.shape[1] - self.jacobian.rank
+        if not free:
+            return "no degree of freedom: all motion is prescribed"
+        noun = "degree of freedom" if free == 1 else "degrees of freedom"
+        return f"{free} {noun}: {freely_moving(self.model, self.jacobian.free_directions)}"
+
+
+def consistent_start(
+    mechanism: Mechanism, instant: float, built: Callable[[Model], None] | None = None
+) -> ConsistentStart:
+    """Return a consistent state at an instant, from the starting guess and the initial conditions.
+
+    Initial conditions are drivers: each fixes one coordinate and its rate, as its law gives them at the instant. What
+    they leave open is chosen: positions nearest to the guess of the bodies, velocities of least kinetic energy.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Its bodies need masses; joints and drivers may leave degrees of freedom.
+    instant : float
+        s.
+    built : callable, optional
+        Called with the model before it is assembled, initial conditions among its drivers.
+
+    Raises
+    ------
+    MechanismError
+        If a value is not valid, no body has a mass, one that can move has none, or a motion that is free would have
+        negative kinetic energy.
+    AssemblyError
+        If joints, drivers and initial conditions cannot all be fulfilled, or redundant ones have other rates.
+    MobilityError
+        If the start is a singular position, or one at which rates would come out as rounding has it.
+    """
+    mechanism = chosen(mechanism, instant)
+    masses = required_masses(mechanism, "the equations of motion")
+    model, gravity, state, together = build(mechanism, initial=True), gravity_of(mechanism), None, None
+    exact = True  # whether the state is known to fulfil the rates of what is left without the initial conditions
+    if built is not None:
+        built(model)
+    if mechanism.initial:
+        whole, coordinates = _assembled(model, instant)
+        model = released(model)
+        driven = equations_of(whole, masses, gravity)
+        state = _set_in_motion(driven, whole, coordinates, instant)
+        if whole.system.rank is not None:  # rows may contradict each other by less than is refused
+            _check_rates(whole, state, _facts(driven, state, instant).rates, instant)
+            exact = False
+        system = with_fields(model.system, forces=whole.system.forces, outputs=whole.system.outputs)
+        model = dataclasses.replace(
+            model, guess=coordinates, system=system, prescribed=whole.prescribed, history=whole.history
+        )
+        together = _let_go(model, whole, instant)
+    model, coordinates = together or assemble(model, instant, TOLERANCE, free=True)
+    equations = resident(equations_of(model, masses, gravity))
+    if state is None:
+        state = _set_in_motion(equations, model, coordinates, instant)
+    elif not exact:
+        state = jax.tree.map(np.asarray, with_rates(equations, state, np.array([[instant]])))
+    facts = _facts(equations, state, instant)
+    jacobian = _checked_jacobian(equations, model, facts, instant)
+    if model.system.rank is not None:
+        _check_rates(model, state, facts.rates, instant)
+    return ConsistentStart(model, equations, state, jacobian, facts.sound[:, 0])
+
+
+def equations_of(model: Model, masses: Masses, gravity: Gravity) -> Equations:
+    """Return the equations of motion of a mechanism."""
+    system = with_fields(model.system, outputs=())
+    values = {
+        "system": system,
+        "masses": masses,
+        "gravity": gravity,
+        "scale": masses.scale(model.length),
+        "pose_type": model.pose_type,
+        "saddle": SaddleFronts.of(system.pattern),
+    }
+    return unchecked(Equations, values)
+
+
+def _assembled(model: Model, instant: float) -> tuple[Model, dict[str, np.ndarray]]:
+    """Return the model with initial conditions, assembled."""
+    try:
+        return assemble(model, instant, TOLERANCE, free=True)
+    except AssemblyError as error:
+        message = f"{error.message}; joints, drivers and initial conditions contradict each other there"
+        raise AssemblyError(message, status=error.status) from None
+    except MobilityError as error:
+        message = f"joints, drivers and initial conditions together: {error.message}"
+        raise MobilityError(message, status=error.status) from None
+
+
+def _let_go(model: Model, whole: Model, instant: float) -> tuple[Model, dict[str, np.ndarray]] | None:
+    """Return the model without initial conditions as `assemble` does, where they were assembled; None if it is unlike.
+
+    The rows that are left are fulfilled there, and independent if all were.
+    """
+    kept = [k for k, name in enumerate(whole.rows) if not name.startswith("initial.")]
+    alike = model.length == whole.length and model.rows == tuple(whole.rows[k] for k in kept)
+    if not kept or not alike or whole.system.rank is not None:
+        return None
+    model, away = with_reference(model, model.guess, instant, model.prescribed)
+    system = resident(with_fields(model.system, row_scale=np.asarray(whole.system.row_scale)[kept]))
+    return (dataclasses.replace(model, system=system), model.guess) if away <= SETTLED else None
+
+
+def initial_as_drivers(mechanism: Mechanism) -> Mechanism:
+    """Return the mechanism with its initial conditions as drivers."""
+    return dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={})
+
+
+def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
+    """Return the state of bodies at rest, from the coordinates of their assembled pose."""
+    position = np.asarray(coordinates["position"])[:, 1:]
+    if model.pose_type.turns == 1:
+        attitude = np.asarray(coordinates["angle"])[None, 1:]
+    else:
+        quaternion = np.asarray(coordinates["quaternion"])[:, 1:]
+        attitude = quaternion / np.sqrt((quaternion**2).sum(axis=0))[None]
+    spin = np.zeros((model.pose_type.turns, *position.shape[1:]))
+    return State(position, attitude, np.zeros_like(position), spin)
+
+
+@compiled(narrow=True, brief=True, alone=True)
+def with_rates(equations: Equations, state: State, time: Instants) -> State:
+    """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
+    return _moving(equations, state, time)
+
+
+@compiled(narrow=True, brief=True, alone=True)
+def _with_rates_told(equations: Equations, state: State, time: Instants) -> tuple[State, Any, Any]:
+    """Return the state of bodies at rest with velocities, what rates they fulfil, and how the attitude moves."""
+    moving = _moving(equations, state, time)
+    return moving, _row_rates(equations, state, time), equations.attitude_rate(moving)
+
+
+class _Facts(NamedTuple):
+    """What decides whether a mechanism can start from a state; arrays of NumPy once it was computed."""
+
+    matrix: Float[Any, "size size"]  # of the equations of motion
+    entries: Float[Any, " entry"]  # of the Jacobian
+    rates: Float[Any, "row 1"]  # of all rows
+    sound: Bool[Any, "force 1"]  # which applied forces are finite
+
+
+@compiled(narrow=True, brief=True, alone=True)
+def _judged(equations: Equations, state: State, time: Instants) -> _Facts:
+    """Return these facts from a program of their own: in that of the velocities they would change its last digits."""
+    still = equations.still(state.position, state.attitude)
+    matrix, entries = equations.matrix(state, time)[..., 0], equations.system.entries(still, Jet([time]))[..., 0]
+    sound = equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
+    return _Facts(matrix, entries, _row_rates(equations, state, time), sound)
+
+
+def _facts(equations: Equations, state: State, instant: float) -> _Facts:
+    return jax.tree.map(np.asarray, _judged(equations, state, np.array([[instant]])))
+
+
+def _moving(equations: Equations, state: State, time: Instants) -> State:
+    """Return a state with velocities, corrected once: masses that gears weight unlike each other cost digits."""
+    factor = equations.factored(state, time)
+    return jax.lax.fori_loop(0, 2, lambda _, moving: equations.with_rates(factor, moving, time), state)
+
+
+def _set_in_motion(equations: Equations, model: Model, coordinates: dict[str, np.ndarray], instant: float) -> State:
+    """Return the assembled bodies with the velocities that laws prescribe, or raise where rounding would decide them.
+
+    At a limit position, such as an arm stretched out, a residual changes with the square of a displacement: what
+    rounding leaves of it hides a place 1e-8 away, at which the velocities are others, and finite.
+    """
+    still, time = at_rest(model, coordinates), np.array([[instant]])
+    state, rates, turning = jax.tree.map(np.asarray, _with_rates_told(equations, still, time))
+    speeds = np.concatenate([state.velocity / model.length, state.spin])[..., 0]
+    size, told = (float(np.max(np.abs(x), initial=0.0)) for x in (speeds, rates))
+    if not (np.isfinite(size) and size > 0 and told > 0):
+        return state
+    away = ROUNDING / told  # s, at those velocities
+    there = still._replace(position=still.position + away * state.velocity, attitude=still.attitude + away * turning)
+    other = jax.tree.map(np.asarray, _with_rates_told(equations, there, time)[0])
+    change = np.concatenate([(other.velocity - state.velocity) / model.length, other.spin - state.spin])[..., 0]
+    if np.max(np.abs(change)) <= LARGEST_CHANGE * size:
+        return state
+    message = (
+        f"the start is a singular position (a dead point) at t = {instant:g} s, where the rates of the laws do not "
+        f"determine the velocities of {freely_moving(model, speeds.T.reshape(1, -1))}: start at another instant, or "
+        "with another position"
+    )
+    raise MobilityError(message)
+
+
+def _row_rates(equations: Equations, state: State, time: Instants) -> Float[Numbers, "row 1"]:
+    return equations.system.residual(equations.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
+
+
+def _check_rates(model: Model, state: State, rates: Float[np.ndarray, "row 1"], instant: float) -> None:
+    """Raise AssemblyError, by name, where redundant rows contradict each other in their rates."""
+    gaps = np.abs(rates)[:, 0]
+    size = max(float(np.max(np.abs(state.velocity))) / model.length, float(np.max(np.abs(state.spin))))
+    if gaps.max() > LARGEST_CONTRADICTION * size:
+        names = dict.fromkeys(row for row, gap in zip(model.rows, gaps, strict=True) if gap > 0.1 * gaps.max())
+        message = f"redundant constraints contradict each other in their rates at t = {instant:g} s: {', '.join(names)}"
+        raise AssemblyError(f"{message}; correct the laws of those named", status=Status.INCONSISTENT)
+
+
+def _checked_jacobian(equations: Equations, model: Model, facts: _Facts, instant: float) -> HostJacobian:
+    """Return the Jacobian, or raise for a body whose acceleration nothing determines, or of negative energy."""
+    whole, system = facts.matrix, model.system
+    jacobian = HostJacobian.of(system.pattern, facts.entries).scaled(np.asarray(system.row_scale)[:, 0])
+    columns = jacobian.shape[1]
+    loose = _loose(whole, columns)
+    if len(loose):
+        mass, _, moments = map(np.asarray, equations.masses)
+        by_body = np.linalg.norm(loose[:, :columns].reshape(len(loose), len(model.bodies), -1), axis=(0, 2))
+        for name, size, m, s in zip(
+            model.bodies, by_body, mass[1:, 0], np.abs(moments[..., 1:, 0]).sum((0, 1)), strict=True
+        ):
+            if size > 0.05 * by_body.max() and (m == 0 or s == 0):
+                lacks = "mass" if m == 0 else "inertia"
+                message = f"the body can move but has no {lacks}, so that nothing determines its acceleration"
+                advice = f"give it one, or join it to a body that has {'mass' if m == 0 else 'inertia'}"
+                raise MechanismError(f"{message}; {advice}", name=f"bodies.{name}.{lacks}")
+        names = freely_moving(model, loose[:, :columns])
+        raise MobilityError(f"the equations of motion are singular at t = {instant:g} s: {names}")
+    if not _is_solid(equations.masses):
+        _check_energy(model, whole[:columns, :columns], jacobian)
+    return jacobian
+
+
+def _loose(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndarray, "direction size"]:
+    """Return the unknowns that the matrix of the equations leaves open, the first of which belong to columns."""
+    scale, tolerance = even_scale(whole, columns), 1e-3 * RANK_TOLERANCE
+    even = whole * scale * scale[:, None]
+    if is_clearly_regular(even, tolerance):
+        return np.zeros((0, len(whole)))
+    small = (sizes := np.linalg.svd(even, compute_uv=False)) <= tolerance * sizes.max()
+    if not small.any():
+        return np.zeros((0, len(whole)))
+    found = np.linalg.svd(even)[2][small] * scale
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+def _is_solid(masses: Masses) -> bool:
+    """Tell whether no body has a negative mass or moment of inertia: then no motion has a negative kinetic energy.
+
+    The least moment about an axis through the centre of mass is the sum of the two lowest second moments.
+    """
+    mass, _, moments = map(np.asarray, masses)
+    planar = len(moments) == 2
+    sums = np.trace(moments) if planar else np.linalg.eigvalsh(moments[..., 0].T)[:, :2].sum(axis=1)
+    return bool(np.all(mass >= 0) and np.all(sums >= 0))
+
+
+def _check_energy(model: Model, mass: Float[np.ndarray, "column column"], jacobian: HostJacobian) -> None:
+    """Refuse masses and moments by which a motion that is free would have negative kinetic energy."""
+    count = len(model.bodies)
+    by_body = np.einsum("bibj->bij", mass.reshape(count, -1, count, mass.shape[0] // count))
+    lowest = np.linalg.eigvalsh(by_body)
+    if lowest.min() >= 0 or jacobian.rank == mass.shape[0]:
+        return
+    free = jacobian.free_directions
+    if len(free) == mass.shape[0] - jacobian.rank:
+        values, motions = np.linalg.eigh(free @ mass @ free.T)
+        if values[0] >= -RANK_TOLERANCE * np.abs(values).max():
+            return
+        motion = (motions[:, 0] @ free).reshape(count, -1)
+        energies = np.einsum("bi,bij,bj->b", motion, by_body, motion)
+    else:  # too many to look at all of them
+        energies = lowest.min(axis=1)
+    name = model.bodies[int(np.argmin(energies))]
+    message = "the body can move so that its kinetic energy is negative; correct its mass and its moments of inertia"
+    raise MechanismError(message, name=f"bodies.{name}.inertia")

@@ -1,0 +1,129 @@
+"""One state of a mechanism as a user gives it, which need not fulfil its joints."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.motion_values import Coordinates, cut
+from jounce.errors import MechanismError, check_choice, check_name
+from jounce.jet.derivatives import taylor_coefficients
+from jounce.kinematics import Motion, Status
+from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
+from jounce.mechanism import Mechanism, Model, build
+from jounce.mechanism.builder import with_reference
+from jounce.mechanism.law_checks import check_laws
+from jounce.rigid import SpatialPose
+from jounce.rigid.euler_parameters import euler_parameters
+from jounce.rigid.pose import Pose
+from jounce.shapes import real_numbers
+
+
+class MotionAtState(Motion):
+    """One state of a mechanism, consistent or not, as a motion of one instant: `at_state` makes it."""
+
+
+def at_state(given: object, state: object, time: object) -> tuple[Motion, int]:
+    """Return a state as a motion of one instant, and how many derivatives are known of it."""
+    if not isinstance(given, Motion | Mechanism):
+        raise MechanismError("must be a jn.Motion or a jn.Mechanism", name="motion", value=given)
+    mechanism = dataclasses.replace(given if isinstance(given, Mechanism) else given.mechanism, outputs={})
+    instant = _array("time", time, ())
+    model = build(mechanism)
+    coordinates = _guessed(model) if state is None else _coordinates(mechanism, model, state)
+    order = len(coordinates["position"]) - 1
+    check_laws(mechanism, instant[None], order + 1, forces=order > 1)
+    if isinstance(given, Motion):  # angles about axes are counted as along it
+        system = dataclasses.replace(given.model.system, outputs=())
+        model = dataclasses.replace(given.model, system=system, outputs=())
+    else:
+        reference = {name: values[0] for name, values in cut(coordinates, 0).items()}
+        model, _ = with_reference(model, reference, float(instant))
+    history = given.history if isinstance(given, Motion) else None
+    status = np.array([int(Status.OK)])
+    return MotionAtState(
+        mechanism, model, instant[None], order, (dict(coordinates), ()), status, {}, history=history
+    ), order
+
+
+def _guessed(model: Model) -> Coordinates:
+    found = {name: np.asarray(value)[None] for name, value in model.guess.items()}
+    return found | ({} if "angle" in found else {"angular_velocity": np.zeros((0, *found["position"].shape[1:]))})
+
+
+def _coordinates(mechanism: Mechanism, model: Model, state: object) -> Coordinates:
+    """Return the Taylor coefficients of the coordinates of all bodies, the ground first, from a state as given."""
+    if not isinstance(state, Mapping):
+        raise MechanismError(
+            "must be a mapping of bodies to where they are and how they move", name="state", value=state
+        )
+    for name in state:
+        check_name("moving body", name, mechanism.bodies, MechanismError, name="state")
+    missing = [name for name in mechanism.bodies if name not in state]
+    if missing:
+        raise MechanismError("is missing: a state must contain every moving body", name=f"state.{missing[0]}")
+    read = [_body_state(f"state.{name}", state[name], model.pose_type) for name in mechanism.bodies]
+    orders = {len(body["position"]) - 1: name for body, name in zip(read, mechanism.bodies, strict=True)}
+    if len(orders) > 1:
+        told = ", ".join(f"'{name}' has {order}" for order, name in sorted(orders.items()))
+        raise MechanismError(f"all bodies need derivatives to the same order; {told}", name="state")
+    (order,) = orders
+    if order >= HIGHEST_ORDER:
+        raise MechanismError(f"derivatives are taken to order {HIGHEST_ORDER - 1}", name="state", value=order)
+    found = {}
+    for name in read[0]:
+        whole = np.stack([np.zeros_like(read[0][name]), *(body[name] for body in read)], axis=-1)[..., None]
+        if name == "quaternion":
+            whole[0, 0, 0] = 1.0
+        found[name] = taylor_coefficients(whole)
+    return found
+
+
+def _body_state(place: str, given: object, pose_type: type[Pose]) -> dict[str, Float[np.ndarray, "_ *component"]]:
+    """Return the plain derivatives of the coordinates of one body."""
+    spatial = pose_type is SpatialPose
+    keys = ("position", "orientation", "angular_velocity") if spatial else ("position", "angle")
+    if not isinstance(given, Mapping):
+        raise MechanismError(f"must be a mapping with {', '.join(keys)}", name=place, value=given)
+    for key in given:
+        check_choice("key", key, keys, MechanismError, name=place)
+    for key in keys[:2]:
+        if key not in given:
+            raise MechanismError("is missing", name=f"{place}.{key}")
+    position = _array(f"{place}.position", given["position"], (pose_type.shifts,))
+    order = len(position) - 1
+    if not spatial:
+        angle = _array(f"{place}.angle", given["angle"], (1,))[:, 0]
+        _check_order(f"{place}.angle", len(angle) - 1, order)
+        return {"position": position, "angle": angle}
+    try:
+        quaternion = np.array([euler_parameters(given["orientation"])])
+    except MechanismError as error:
+        raise error.located(name=f"{place}.orientation") from None
+    spin = _array(f"{place}.angular_velocity", given.get("angular_velocity", np.zeros((0, 3))), (3,))
+    _check_order(f"{place}.angular_velocity", len(spin), order)
+    return {"position": position, "quaternion": quaternion, "angular_velocity": spin}
+
+
+def _check_order(name: str, found: int, order: int) -> None:
+    if found != order:
+        message = f"goes with a position and {order} {'derivative' if order == 1 else 'derivatives'} of it"
+        raise MechanismError(f"{message}; give as many here", name=name, value=found)
+
+
+def _array(name: str, value: Any, shape: tuple[int, ...]) -> Float[np.ndarray, "..."]:
+    """Return finite numbers: of a shape, or where it is not empty, one of them or a list of them."""
+    found = np.array(real_numbers(name, value, MechanismError))
+    if shape:
+        scalar = shape == (1,)
+        if found.ndim == len(shape) - scalar:
+            found = found[None]
+        found = found[:, None] if scalar and found.ndim == 1 else found
+    if found.ndim != len(shape) + bool(shape) or found.shape[1:] != shape:
+        wanted = "one number" if not shape else f"a list of {shape[0]} numbers, or one such list for each derivative"
+        raise MechanismError(f"must be {wanted}", name=name, value=value)
+    if not np.isfinite(found).all():
+        raise MechanismError("must be finite", name=name, value=value)
+    return found

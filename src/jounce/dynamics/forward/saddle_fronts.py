@@ -1,0 +1,236 @@
+"""The matrix of constrained motion, eliminated body by body: the multipliers of a row stand beside one of its bodies.
+
+So the equations of motion of a large mechanism go through the same fronts as its Jacobian: a body has its coordinates
+and the multipliers of a few rows as its columns, and as its rows its balance of forces and those rows. Bodies with
+fewer multipliers than others have some that are zero instead.
+"""
+
+import itertools
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.dynamics.forward.saddle_point import BodyMatrices
+from jounce.linear_algebra.frontal import FrontalFactor
+from jounce.linear_algebra.frontal_inverse import FrontalInverse, InversePlan
+from jounce.linear_algebra.fronts import Fronts
+from jounce.linear_algebra.pattern import Pattern
+from jounce.modules import Module
+from jounce.shapes import Numbers
+
+FRONT_COST = 20.0  # of an operation in fronts, by that of one in dense elimination, as measured for one run
+MOST_NEIGHBOURS = 16  # of a body; with more, its rows would be long
+
+Unknowns = Float[Numbers, "size batch"]
+
+
+class SaddleFronts(Module):
+    """Which entries of masses and Jacobian meet in which front.
+
+    Attributes
+    ----------
+    plan : InversePlan
+        Of a matrix whose entries are those of the mass matrices, of the Jacobian, and one.
+    places : array of int, shape (size,)
+        Where each unknown, the coordinates first, and its equation stand in it.
+    unknowns : array of int, shape (rows of the whole matrix,)
+        Which unknown stands there; one beyond the last where there is none.
+    rows : array of int, shape (entries,)
+        The row of each entry of the Jacobian, any where it is of the ground.
+    """
+
+    plan: InversePlan
+    places: Int[Numbers, " size"]
+    unknowns: Int[Numbers, " row"]
+    rows: Int[Numbers, " entry"]
+
+    @property
+    def fronts(self) -> Fronts:
+        """Those of the whole matrix."""
+        return self.plan.fronts
+
+    @classmethod
+    def of(cls, pattern: Pattern) -> "SaddleFronts | None":
+        """Plan the elimination from the pattern of the Jacobian; None where a dense one is less work."""
+        arrays = (np.asarray(pattern.bodies), np.asarray(pattern.places))
+        told = tuple((x.shape, x.dtype.str, x.tobytes()) for x in arrays)
+        return _planned(told, pattern.body_count, pattern.entry_count, FRONT_COST)
+
+    @classmethod
+    def anew(cls, pattern: Pattern) -> "SaddleFronts | None":
+        """Plan it, as `of` does, which keeps the plans."""
+        size, width, count = sum(pattern.shape), pattern.width, pattern.body_count
+        bodies, places = np.asarray(pattern.bodies), np.asarray(pattern.places)
+        owners = _owners(bodies.tolist(), count)
+        if not owners:
+            return None
+        many = int(np.bincount(owners, minlength=count).max())
+        whole = width + many
+        if FRONT_COST * count * whole * (3 * whole) * (2 * whole) >= size**3:  # no front is smaller in a chain
+            return None
+        where = np.array(owners, int) * whole + width + _ranks(owners)
+        entries = _meeting(pattern, where, whole)
+        if max(len(by_body) for by_body in entries) > MOST_NEIGHBOURS:
+            return None
+        fronts = Fronts.of(_as_pattern(entries, count, whole, width * width * count + pattern.entry_count + 1))
+        number, height, wide = fronts.shape
+        if FRONT_COST * number * whole * height * wide >= size**3:
+            return None
+        row_of = np.zeros(pattern.entry_count + 1, np.int32)
+        row_of[places] = np.arange(len(bodies))[:, None, None]
+        coordinates = (np.arange(count)[:, None] * whole + np.arange(width)).ravel()
+        at = np.concatenate([coordinates, where]).astype(np.int32)
+        unknowns = np.full(count * whole, size, np.int32)
+        unknowns[at] = np.arange(size)
+        return cls(InversePlan.of(fronts), at, unknowns, row_of[:-1])
+
+    def factored(
+        self,
+        masses: BodyMatrices,
+        entries: Float[Numbers, "entry batch"],
+        scale: Float[Numbers, " coordinate"],
+        row_scale: Float[Numbers, "row 1"],
+    ) -> "SaddleFactor":
+        """Factor the matrices with these mass matrices of all bodies, not scaled, and entries of the Jacobian."""
+        masses = masses * (scale[:, None] * scale[None])[:, :, None, None]
+        lanes = entries.shape[-1]
+        flat = jnp.broadcast_to(masses, (*masses.shape[:-1], lanes)).reshape(-1, lanes)
+        whole = jnp.concatenate([flat, entries * row_scale[self.rows], jnp.ones((1, lanes))])
+        return SaddleFactor(FrontalFactor.of(self.fronts, whole, jnp.ones((self.fronts.row_count, 1))), self)
+
+    def blank(self, lanes: int) -> "SaddleFactor":
+        """Return a placeholder for the factors of a batch, to start a loop with."""
+        return SaddleFactor(FrontalFactor.blank(self.fronts, lanes), self)
+
+    def spread(self, right: Unknowns) -> Float[Numbers, "row batch"]:
+        """Return right sides in the order of the coordinates and rows as those of the whole matrix."""
+        right = jnp.concatenate([right, jnp.zeros((1, right.shape[-1]))])
+        return right.at[self.unknowns].get(mode="promise_in_bounds")
+
+
+class SaddleFactor(Module):
+    """The factors of a batch of such matrices."""
+
+    factor: FrontalFactor
+    saddle: SaddleFronts
+
+    def solve(self, right: Unknowns) -> Unknowns:
+        """Return the solutions for right sides in the order of the coordinates and rows."""
+        return self.factor.solve(self.saddle.spread(right))[self.saddle.places]
+
+    def inverse(self) -> Float[Numbers, "size size batch"]:
+        """Return the inverse matrices as dense ones."""
+        size = len(self.saddle.places)
+
+        def one(lane: Any) -> Any:
+            found = jax.tree.map(lambda x: jax.lax.dynamic_slice_in_dim(x, lane, 1, x.ndim - 1), self.factor.arrays)
+            return SaddleFactor(FrontalFactor(self.factor.fronts, *found), self.saddle).solve(jnp.eye(size))
+
+        return jnp.moveaxis(jax.lax.map(one, jnp.arange(self.factor.inverted.shape[-1])), 0, -1)
+
+    def inverted(self) -> "SaddleInverse":
+        """Return what solves for many right sides that come one by one."""
+        return SaddleInverse(FrontalInverse.of(self.saddle.plan, self.factor), self.saddle)
+
+
+class SaddleInverse(Module):
+    """The inverses of a batch of such matrices, whose size grows with the number of bodies, not with its square."""
+
+    inverse: FrontalInverse
+    saddle: SaddleFronts
+
+    def solve(self, right: Unknowns) -> Unknowns:
+        """Return the solutions for right sides in the order of the coordinates and rows."""
+        return self.inverse.solve(self.saddle.spread(right))[self.saddle.places]
+
+    def responses(self, columns: int) -> tuple[Float[Numbers, "column batch"], Float[Numbers, " batch"]]:
+        """Return the largest response to a force on each coordinate, or more, and to a gap of the rows.
+
+        The inverse is not negative on the coordinates, and not positive on the rows: no entry of a column is larger
+        than the root of the product of its diagonal entry and of the largest of those.
+        """
+        diagonal = jnp.abs(self.inverse.diagonal()[self.saddle.places])
+        forces = diagonal[:columns]
+        largest = jnp.max(forces, axis=0, keepdims=True)
+        return jnp.sqrt(forces * largest), jnp.max(diagonal[columns:], axis=0, initial=0.0)
+
+
+@lru_cache(maxsize=100)
+def _planned(
+    told: tuple[tuple[tuple[int, ...], str, bytes], ...], body_count: int, entry_count: int, _: float
+) -> SaddleFronts | None:
+    """Return the plan for a pattern of these arrays: the same for all values, so is kept."""
+    bodies, places = (np.frombuffer(data, kind).reshape(shape) for shape, kind, data in told)
+    found = SaddleFronts.anew(Pattern(bodies, places, body_count, entry_count))
+    for array in jax.tree.leaves(found):
+        array.setflags(write=False)  # many equations share it
+    return found
+
+
+Meeting = list[dict[int, dict[int, int]]]
+"""Of each row, the bodies that it touches, and in which of their columns it has which entry."""
+
+
+def _meeting(pattern: Pattern, where: Int[np.ndarray, " row"], whole: int) -> Meeting:
+    """Return the rows of the whole matrix; entries are those of the masses, of the Jacobian, and one.
+
+    Parameters
+    ----------
+    pattern : Pattern
+        Of the Jacobian.
+    where : array of int, shape (rows,)
+        The place of each multiplier, and of its row.
+    whole : int
+        Columns of a body, its multipliers included.
+    """
+    width, count = pattern.width, pattern.body_count
+    mass = width * width * count
+    entries: Meeting = [{k // whole: {k % whole: mass + pattern.entry_count}} for k in range(count * whole)]
+    for body, i in itertools.product(range(count), range(width)):
+        entries[body * whole + i][body] = {j: (i * width + j) * count + body for j in range(width)}
+    rows = zip(np.asarray(pattern.bodies).tolist(), np.asarray(pattern.places).tolist(), where.tolist(), strict=True)
+    for touched, places, here in rows:
+        entries[here] = {}
+        for body, block in zip(touched, places, strict=True):
+            if body < count:
+                entries[here][body] = {i: mass + place for i, place in enumerate(block)}
+                for i, place in enumerate(block):
+                    entries[body * whole + i].setdefault(here // whole, {})[here % whole] = mass + place
+    return entries
+
+
+def _as_pattern(entries: Meeting, count: int, whole: int, nothing: int) -> Pattern:
+    """Return what meets in rows as a pattern; `nothing` is the number of entries."""
+    slots = max(map(len, entries))
+    bodies = np.full((len(entries), slots), count, np.int32)
+    places = np.full((len(entries), slots, whole), nothing, np.int32)
+    for row, by_body in enumerate(entries):
+        for slot, (body, columns) in enumerate(by_body.items()):
+            bodies[row, slot] = body
+            places[row, slot, list(columns)] = list(columns.values())
+    return Pattern(bodies, places, count, nothing)
+
+
+def _owners(bodies: Sequence[Sequence[int]], count: int) -> list[int]:
+    """Return the body beside which the multiplier of each row stands: of those that it touches, the one with fewest."""
+    load, owners = [0] * count, []
+    for touched in bodies:
+        owner = min((body for body in touched if body < count), key=load.__getitem__)
+        load[owner] += 1
+        owners.append(owner)
+    return owners
+
+
+def _ranks(owners: Sequence[int]) -> Int[np.ndarray, " row"]:
+    """Return how many rows before it each row shares its body with."""
+    seen: dict[int, int] = {}
+    ranks = []
+    for owner in owners:
+        ranks.append(seen.get(owner, 0))
+        seen[owner] = ranks[-1] + 1
+    return np.array(ranks, int)

@@ -1,0 +1,1 @@
+"""Forces that a given motion needs: of drivers and joints, with their rates."""

@@ -1,0 +1,339 @@
+"""The equations of a mechanism as numbers: residual, Jacobian, right sides, multipliers. Sommer 2024, 1-8.
+
+Each is what the solver works with, read off the same residuals on jets, but in SI units and in the order of the file:
+the solver scales rows and columns, and keeps joints of one type together.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, cast
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.forward.accelerations import Lanes, Rows
+from jounce.dynamics.forward.loads import mass_matrices
+from jounce.dynamics.forward.mechanism_state import MotionAtState, at_state
+from jounce.dynamics.forward.saddle_point import Jacobian, MassMatrix, block_diagonal, even_scale, saddle_point
+from jounce.dynamics.inverse.motion_forces import MotionForces
+from jounce.dynamics.masses import Masses, masses_of
+from jounce.dynamics.motion_values import Coordinates, cut, derivatives_along, pose_of
+from jounce.errors import MechanismError
+from jounce.execution.chunks import in_chunks
+from jounce.execution.compilation import compiled
+from jounce.jet import Jet
+from jounce.jet.derivatives import plain_derivatives
+from jounce.kinematics import Motion, Status
+from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
+from jounce.mechanism import Mechanism
+from jounce.mechanism.element_indices import ElementIndex, element_indices
+from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.system import System
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+if TYPE_CHECKING:
+    import xarray
+
+COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "wx", "wy", "wz")}
+
+
+@concrete
+def constraint_equations(
+    motion: Motion | Mechanism, state: Mapping[str, Any] | None = None, time: float | None = None
+) -> "xarray.Dataset":
+    """Return the constraint equations of a mechanism along a motion, or at one state: Sommer 2024, equations 1-8.
+
+    Joints and drivers are ``Phi(q, t) = 0``, and each time derivative of it is linear in the highest derivative of the
+    coordinates, with one Jacobian for all orders: ``Phi_q q^(k) = right_side(k)``, S's nu, gamma, eta and sigma for
+    k = 1 to 4. Forces follow from the transpose, ``M q'' + Phi_q^T lambda = Q``.
+
+    Parameters
+    ----------
+    motion : Motion or Mechanism
+        A motion that was solved or simulated; or a mechanism at a state, which need not be one that can be solved.
+    state : mapping of str to mapping, optional
+        For each moving body ``position``, m, and its derivatives, (n + 1, c), or the position alone, (c,). In the plane
+        ``angle``, rad, and its derivatives, (n + 1,). In space ``orientation``, in any form that a `Body` takes, and
+        from n = 1 on ``angular_velocity``, rad/s, along the axes of the body, and its derivatives, (n, 3). It need
+        not fulfil the joints. For a mechanism the starting guess of its bodies unless given.
+    time : float, optional
+        When the drivers are looked at for a state, s; 0 unless given. A motion has its instants.
+
+    Returns
+    -------
+    xarray.Dataset
+        SI units, nothing is scaled. Rows are labelled "JOINT.1", "JOINT.2", ..., joints before drivers in the order of
+        the mechanism; columns "BODY.x", "BODY.y", "BODY.angle", in space "BODY.x", "BODY.y", "BODY.z", "BODY.wx",
+        "BODY.wy", "BODY.wz": the global position of the origin, and the angular velocity along the axes of the body.
+        A variable has at ``derivative=k`` its k-th derivative, or what belongs to q^(k); NaN where it has none, as
+        `right_side` at 0 where there are multipliers. The coordinate ``column_unit`` holds the units of the columns, m
+        or rad.
+
+        ``residual`` (time, row)
+            Phi; angles about axes within half a turn.
+        ``jacobian`` (time, row, column)
+            Phi_q; in space, by w instead of coordinates of attitude: there is no row of normalisation.
+        ``right_side`` (time, derivative, row)
+            Phi_q q^(k) for k = 1 to the order of the motion; at a state with n derivatives, to n + 1.
+        ``velocities`` (time, derivative, column)
+            q^(k) from k = 1 on; in space, r^(k) and w^(k-1).
+        ``position`` (time, body, component), and ``angle`` (time, body) or ``attitude`` (time, body, euler_parameter)
+            Where the bodies are, m; rad, or Euler parameters from the body to the global frame, the scalar first.
+        ``mass_matrix`` (time, column, other_column)
+            Where there are masses: M, symmetric, about the origins of the bodies.
+        ``multipliers`` (time, derivative, row)
+            Where there are masses or applied forces: lambda, lambda', ..., with ``M q'' + Phi_q^T lambda = Q``; Q holds
+            forces, global, and moments about the origins, along the axes of the bodies, with the terms of inertia that
+            have no q''. Two orders of the motion are used up. They are left out where accelerations are not known;
+            what redundant rows leave open is NaN, or as `Mechanism.redundant_reactions` chooses it.
+
+    Raises
+    ------
+    MechanismError
+        If a state is given that does not fit the mechanism, or a law has no finite value there.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> equations = jn.constraint_equations(jn.solve(jn.load("examples/four_bar.yaml"), [0.0, 0.5], order=4))
+    >>> equations.row.values.tolist(), equations.column.values.tolist()[:3]
+    (['A.1', 'A.2', 'D.1', 'D.2', 'BC.1', 'theta.1'], ['crank.x', 'crank.y', 'crank.angle'])
+    >>> along = equations.jacobian.dot(equations.velocities, dim="column")  # Phi_q q^(k), at every instant and order
+    >>> bool((abs(along - equations.right_side) < 1e-10).all())
+    True
+
+    At a state of one's own, a pendulum that points along x, has left its pin by 1 mm, and turns by 2 rad/s:
+
+    >>> pendulum = jn.Mechanism(
+    ...     space="planar",
+    ...     bodies={"arm": jn.Body([0, 0])},
+    ...     joints={"O": jn.planar.Revolute(("ground", "arm"), [0, 0], [-0.5, 0])},
+    ... )
+    >>> state = {"arm": {"position": [[0.501, 0], [0, 1]], "angle": [0, 2]}}
+    >>> equations = jn.constraint_equations(pendulum, state)
+    >>> equations.residual.values.round(12).tolist(), equations.right_side.sel(derivative=2).values.tolist()
+    ([[0.001, 0.0]], [[-2.0, 0.0]])
+    """
+    import xarray
+
+    if isinstance(motion, Mechanism) or state is not None:
+        motion, known = at_state(motion, state, 0.0 if time is None else time)
+        order = known + 1
+    elif time is not None:
+        raise MechanismError("goes with a state; a motion has its instants", name="time", value=time)
+    elif isinstance(motion, Motion):
+        order = known = motion.order
+    else:
+        raise MechanismError("must be a jn.Motion, or a jn.Mechanism with a state", name="motion", value=motion)
+    labels = _labels(motion)
+    numbers = _numbers(motion, order)
+    if isinstance(motion, MotionAtState):
+        _check_finite(numbers, labels["row"], float(motion.time[0]))
+    found = {
+        "residual": (("time", "row"), numbers["residual"]),
+        "jacobian": (("time", "row", "column"), numbers["jacobian"]),
+        "right_side": (("time", "derivative", "row"), numbers["right_side"], 1),
+        "velocities": (("time", "derivative", "column"), _velocities(motion, known), 1),
+    }
+    found |= _places(motion) | _forces(motion, numbers["jacobian"])
+    solved = motion.status == Status.OK
+    parts = []
+    for name, (dims, values, *first) in found.items():
+        coordinates = {dim: labels[dim] for dim in dims if dim != "derivative"}
+        if first:
+            coordinates["derivative"] = np.arange(first[0], first[0] + values.shape[1])
+        values = np.where(solved.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan)
+        parts.append(xarray.DataArray(values, coordinates, dims, name))
+    dataset = cast("xarray.Dataset", xarray.merge(parts, join="outer", compat="no_conflicts"))  # not a DataTree
+    dataset.attrs = {"title": motion.mechanism.title or "equations of a mechanism", "source": "jounce"}
+    dataset["time"].attrs = {"units": "s", "long_name": "time"}
+    dataset["derivative"].attrs = {"long_name": "order of the time derivative"}
+    for name, unit in (("position", "m"), ("angle", "rad"), ("attitude", "1")):
+        if name in dataset:
+            dataset[name].attrs["units"] = unit
+    turns = motion.model.pose_type.turns
+    units = (["m"] * motion.model.pose_type.shifts + ["rad"] * turns) * len(motion.mechanism.bodies)
+    return dataset.assign_coords(column_unit=("column", units))
+
+
+def _labels(motion: Motion) -> dict[str, Any]:
+    """Return the labels of all axes, rows in the order of the mechanism."""
+    mechanism = motion.mechanism
+    columns = [f"{body}.{name}" for body in mechanism.bodies for name in COLUMNS[mechanism.space]]
+    rows = [f"{name}.{k + 1}" for name, found in _in_order(motion) for k in range(len(found.own_rows))]
+    labels = {
+        "row": rows,
+        "column": columns,
+        "other_column": columns,
+        "body": list(mechanism.bodies),
+        "component": list("xyz"[: motion.model.pose_type.shifts]),
+        "euler_parameter": ["e0", "e1", "e2", "e3"],
+    }
+    return {"time": motion.time} | {axis: np.array(names, dtype=str) for axis, names in labels.items()}
+
+
+def _in_order(motion: Motion) -> list[tuple[str, ElementIndex]]:
+    """Return joints and drivers in the order of the mechanism, by name."""
+    found = element_indices(motion.model)
+    return [(name, found[name]) for name in (*motion.mechanism.joints, *motion.mechanism.drivers)]
+
+
+def _row_order(motion: Motion) -> np.ndarray:
+    """Return which row of the system each row is, in the order of the mechanism."""
+    return np.array([row for _, found in _in_order(motion) for row in found.own_rows], int)
+
+
+def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
+    """Return residual, Jacobian and right sides at all instants, the time first."""
+    pose_type, coordinates = motion.poses
+    count = pose_type.shifts + pose_type.turns
+    system = motion.model.system
+    ones = np.ones((system.shape[0], 1)), np.ones(count)
+    plain = dataclasses.replace(system, outputs=(), forces=(), row_scale=ones[0], column_scale=ones[1])
+
+    def chunk(lanes: np.ndarray) -> Any:
+        bodies = {name: values[..., lanes] for name, values in coordinates.items()}
+        residual, jacobian = _position_equations(plain, cut(bodies, 0), motion.time[lanes], pose_type)
+        if not order:
+            return residual, jacobian, np.zeros((0, *residual.shape))
+        instants = np.tile(motion.time[lanes], order)
+        rights = _right_sides(plain, _without_unknowns(bodies, order), instants, pose_type)
+        return residual, jacobian, rights
+
+    residual, jacobian, right_side = in_chunks(chunk, len(motion.time))
+    chosen = _row_order(motion)
+    return {
+        "residual": residual[chosen].T,
+        "jacobian": np.moveaxis(jacobian[chosen], -1, 0),
+        "right_side": np.moveaxis(right_side[:, chosen], -1, 0) + 0.0,  # no zero is negative
+    }
+
+
+def _without_unknowns(coordinates: Coordinates, order: int) -> Coordinates:
+    """Return coordinates once for each order from 1 on, one after the other, with those of that order set to zero."""
+    found = {}
+    for name, values in coordinates.items():
+        first = name == "angular_velocity"  # its coefficients are those of rates
+        whole = np.zeros((order + 1 - first, *values.shape[1:-1], order, values.shape[-1]))
+        known = np.asarray(values)[: len(whole)]
+        whole[: len(known)] = known[..., None, :]
+        if name != "quaternion":  # the attitude follows from where it is and from how it turns
+            for k in range(1, order + 1):
+                whole[k - first, ..., k - 1, :] = 0.0
+        found[name] = whole.reshape(*whole.shape[:-2], -1)
+    return found
+
+
+@compiled("pose_type")
+def _position_equations(
+    system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]
+) -> tuple[Rows, Jacobian]:
+    """Return the residual and the Jacobian."""
+    pose, time = pose_of(bodies, pose_type, 0), Jet([instants[None]])
+    return system.residual(pose, time).coefficients[0], system.jacobian(pose, time)
+
+
+@compiled("pose_type")
+def _right_sides(
+    system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]
+) -> Float[Numbers, "derivative row instant"]:
+    """Return the right sides from the states of `_without_unknowns`.
+
+    The coefficient of order k of the residual is affine in that of the coordinates, with the Jacobian as its slope:
+    what it is where that is zero is minus the right side, up to k!.
+    """
+    order = len(bodies["position"]) - 1
+    residual = system.residual(pose_of(bodies, pose_type, order), Jet.variable(instants[None], order)).dense()
+    parts = [c.reshape(len(c), order, c.shape[-1] // order)[:, k] for k, c in enumerate(residual.coefficients[1:])]
+    factorials = np.array([math.factorial(k + 1) for k in range(order)], float)
+    return -factorials[:, None, None] * jnp.stack(parts)
+
+
+def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivative column"]:
+    """Return the derivatives of the coordinates from the first on."""
+    _, coordinates = motion.poses
+    moving = {name: np.asarray(values)[..., 1:, :] for name, values in coordinates.items()}  # without the ground
+    plain = {name: plain_derivatives(values) for name, values in moving.items()}
+    turns = plain["angle"][1:, None] if "angle" in plain else plain["angular_velocity"]
+    parts = np.concatenate([plain["position"][1 : order + 1], turns[:order]], axis=1)
+    columns = motion.model.system.shape[1]
+    return np.transpose(parts, (3, 0, 2, 1)).reshape(len(motion.time), order, columns)
+
+
+def _places(motion: Motion) -> dict[str, Any]:
+    """Return where the bodies are at all instants."""
+    still = cut(motion.poses[1], 0)
+    first = {name: np.moveaxis(np.asarray(values[0])[..., 1:, :], -1, 0) for name, values in still.items()}
+    found = {"position": (("time", "body", "component"), np.swapaxes(first["position"], 1, 2))}
+    if "angle" in first:
+        return found | {"angle": (("time", "body"), first["angle"])}
+    return found | {"attitude": (("time", "body", "euler_parameter"), np.swapaxes(first["quaternion"], 1, 2))}
+
+
+def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> dict[str, Any]:
+    """Return the mass matrix and the multipliers, where there are some."""
+    mechanism, found = motion.mechanism, {}
+    if any(body.mass is not None for body in mechanism.bodies.values()):
+        found["mass_matrix"] = (("time", "column", "other_column"), _mass_matrix(motion))
+    elif not mechanism.forces:
+        return found
+    _, coordinates = motion.poses
+    levels = min(len(coordinates["position"]) - 2, motion.order + 1)
+    columns = jacobian.shape[-1]
+    mass = found["mass_matrix"][1] if found else np.zeros((1, columns, columns))
+    if (
+        levels < 1
+        or not jacobian.size
+        or (isinstance(motion, MotionAtState) and not _determined(motion, jacobian[0], mass[0]))
+    ):
+        return found
+    values = derivatives_along(motion, MotionForces.of(motion).unique_multipliers[:levels][:, _row_order(motion)])
+    return found | {"multipliers": (("time", "derivative", "row"), values, 0)}
+
+
+def _determined(
+    motion: Motion, jacobian: Float[np.ndarray, "row column"], mass: Float[np.ndarray, "column column"]
+) -> bool:
+    """Tell whether the multipliers are determined at a state: those of a motion are, a state may be anything."""
+    scale = np.tile(motion.model.system.column_scale, len(motion.mechanism.bodies))
+    sizes = np.max(np.abs(jacobian * scale), axis=1, keepdims=True)
+    whole = jacobian * scale / np.where(sizes > 0, sizes, 1.0)
+    if len(whole) != whole.shape[1]:
+        mass = mass * scale[:, None] * scale
+        mass = mass / (np.max(np.abs(mass)) or 1.0)
+        whole = np.asarray(saddle_point(mass[..., None], whole[..., None]))[..., 0]
+        even = even_scale(whole, len(scale))
+        whole = whole * even * even[:, None]
+    return int(np.linalg.matrix_rank(whole, rtol=RANK_TOLERANCE)) == len(whole)
+
+
+def _mass_matrix(motion: Motion) -> Float[np.ndarray, "time column column"]:
+    """Return the mass matrix at all instants."""
+    pose_type, coordinates = motion.poses
+    masses = masses_of(motion.mechanism)
+
+    def chunk(lanes: np.ndarray) -> Any:
+        bodies = {name: values[..., lanes] for name, values in cut(coordinates, 0).items()}
+        return _body_masses(bodies, masses, pose_type)
+
+    return np.moveaxis(in_chunks(chunk, len(motion.time)), -1, 0)
+
+
+@compiled("pose_type")
+def _body_masses(bodies: Coordinates, masses: Masses, pose_type: type[Pose]) -> MassMatrix:
+    blocks = mass_matrices(pose_of(bodies, pose_type, 0), masses)[:, :, 1:]
+    return block_diagonal(blocks, np.ones(len(blocks)))
+
+
+def _check_finite(numbers: dict[str, np.ndarray], rows: np.ndarray, instant: float) -> None:
+    """Raise MechanismError for a state at which a row is not a finite number."""
+    for name, values in numbers.items() if len(rows) else ():
+        bad = ~np.isfinite(np.moveaxis(values[0], -1 if name == "right_side" else 0, 0).reshape(len(rows), -1))
+        if bad.any():
+            row, k = np.argwhere(bad)[0]
+            what = f"its derivative {k + 1}" if name == "right_side" else f"its {name}"
+            message = f"{what} has no finite value at t = {instant:g} s; check its law, and its points, there"
+            raise MechanismError(message, name=str(rows[row]).rpartition(".")[0])

@@ -1,0 +1,220 @@
+"""Forces of constraints and their rates: Lagrange multipliers from the transposed factor, to any order.
+
+The equations of motion ``M q'' + Phi_q^T lambda = Q`` are a balance of jets. With the motion known, each coefficient of
+the multipliers follows from the factored Jacobian of the positions, transposed; where the motion is free in some
+directions, from the matrix of masses and Jacobian together. The jets of the Jacobian are how the residuals change with
+virtual displacements of the bodies: none is written anywhere, and a joint of one's own has its reactions.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.forward.saddle_point import (
+    BodyMatrices,
+    Column,
+    Jacobian,
+    MassMatrix,
+    as_column,
+    block_diagonal,
+    saddle_point,
+)
+from jounce.jet import Jet
+from jounce.jet.algebra import stacked, total
+from jounce.kinematics.sensitivity.jacobian_series import Slope, solver
+from jounce.linear_algebra.frontal import FrontalFactor
+from jounce.linear_algebra.linear import DenseFactor
+from jounce.mechanism.system import LeftOut, System, with_rows
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+from jounce.trajectory import AbstractMotion
+
+Slopes = Sequence[Sequence[Float[Numbers, "order coordinate _ _ batch"]]]
+"""For each group, those of each of its moving slots."""
+
+Multipliers = Float[Numbers, "order row instance batch"]
+"""Taylor coefficients of the multipliers of a group."""
+
+
+def work_along(
+    slope: Slope,
+    forces: Sequence[Float[Numbers, "row instance batch"]] | Multipliers,
+    level: int,
+    lowest: int = 0,
+) -> Float[Numbers, "coordinate instance batch"]:
+    """Return the Taylor coefficient of what multipliers do along the coordinates of the bodies: slope times them.
+
+    Parameters
+    ----------
+    slope : array of shape (levels, coordinates, rows, instances, batch)
+        As `slopes` gives it.
+    forces : array of shape (levels, rows, instances, batch)
+        Coefficients of the multipliers.
+    level : int
+        Which coefficient of the product.
+    lowest : int
+        The coefficients of the slope below this one are left out.
+    """
+    return total(jnp.sum(slope[j] * forces[level - j][None], axis=1) for j in range(lowest, level + 1))
+
+
+def balancing(mass: MassMatrix | None, jacobian: Jacobian) -> Callable[[Column], Float[Numbers, "row batch"]]:
+    """Return what solves for the multipliers that balance loads.
+
+    Where there is no mass matrix, the Jacobian is square and balances all; with one, what accelerates the bodies freely
+    is left out.
+    """
+    if mass is None:
+        factor = DenseFactor.of(jax.lax.stop_gradient(jacobian))
+        return solver(lambda x: jnp.sum(jacobian * x[:, None], axis=0), factor.solve_transposed, factor.solve)
+    matrix, rows = saddle_point(mass, jacobian), len(jacobian)
+    factor = DenseFactor.of(jax.lax.stop_gradient(matrix))
+    solve = solver(lambda x: jnp.sum(matrix * x[None], axis=1), factor.solve, factor.solve_transposed)
+    return lambda load: solve(jnp.concatenate([load, jnp.zeros((rows, load.shape[-1]))]))[-rows:]
+
+
+def multipliers(
+    system: System,
+    blocks: Slopes,
+    load: Float[Numbers, "levels coordinate body batch"],
+    mass: BodyMatrices | None = None,
+) -> Float[Numbers, "levels row batch"]:
+    """Return the multipliers of all rows, not scaled, as Taylor coefficients.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    blocks : sequence of sequence of array
+        For each group, `slopes` for each of its moving slots.
+    load : array of shape (levels, coordinates of a body, bodies, batch)
+        What the constraints have to balance, without the ground.
+    mass : array of shape (coordinates, coordinates, bodies, batch), optional
+        As `mass_matrices` gives them, without the ground; for mechanisms that are not driven in all directions.
+    """
+    if not blocks:
+        return jnp.zeros((load.shape[0], 0, load.shape[-1]))
+    scale = jnp.asarray(system.column_scale)
+    solve, count = _solver(system, blocks, mass), len(load)
+
+    def level(found: Any, wanted: Any) -> tuple[Any, Any]:
+        """Find the next coefficient from those found, the latest first and zero before the lowest."""
+        k, missing = wanted
+        for group, parts, forces in by_group(system, blocks, found):
+            for slot, slope in zip(group.moving_slots, parts, strict=True):
+                # what the order k does not need may not be finite
+                needed = [jnp.where(j <= k, slope[j], 0.0) for j in range(1, count)]
+                work = total(jnp.sum(c * f[None], axis=1) for c, f in zip(needed, forces, strict=True))
+                missing -= onto_bodies(work, group.bodies[slot], system.body_count)
+        newest = solve(as_column(missing, scale)) * system.row_scale
+        return [newest, *found[:-1]][: len(found)], newest
+
+    start = [jnp.zeros((system.shape[0], load.shape[-1]))] * (count - 1)
+    return jax.lax.scan(level, start, (np.arange(count), load))[1]  # compiled once for all orders
+
+
+def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callable[[Any], Any]:
+    """Return what solves for the multipliers of scaled rows: by the Jacobian alone where there are no masses."""
+    if mass is None and system.fronts is not None:
+        entries = _entries(system, blocks)
+        factor = FrontalFactor.of(system.fronts, jax.lax.stop_gradient(entries), system.row_scale)
+        return solver(partial(_transposed, system, entries), factor.solve_transposed, factor.solve)
+    jacobian = jacobian_of(system, blocks)
+    if mass is None:
+        return balancing(None, jacobian)
+    whole = block_diagonal(mass, jnp.asarray(system.column_scale))
+    return balancing(whole / jnp.max(jnp.abs(whole)), jacobian)  # their size does not matter to the multipliers
+
+
+def _transposed(system: System, entries: Float[Numbers, "entry batch"], rows: Any) -> Any:
+    """Return the products of the transposed matrices with these entries, in scaled rows."""
+
+    def product(columns: Any) -> Any:
+        return system.pattern.product(entries, columns) * system.row_scale
+
+    columns = jax.ShapeDtypeStruct((system.shape[1], rows.shape[-1]), rows.dtype)
+    return jax.linear_transpose(product, columns)(rows)[0]
+
+
+def jacobian_of(system: System, blocks: Slopes) -> Jacobian:
+    """Return the scaled Jacobian from the slopes of all groups."""
+    return system.pattern.dense(_entries(system, blocks)) * system.row_scale[:, :, None]
+
+
+def _entries(system: System, blocks: Slopes) -> Float[Numbers, "entry batch"]:
+    scale = jnp.asarray(system.column_scale)[:, None, None, None]
+    return jnp.concatenate([(slope[0] * scale).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts])
+
+
+def by_group(system: System, blocks: Slopes, found: list[Float[Numbers, "row batch"]]) -> list[Any]:
+    """Return groups with their blocks and those of the multipliers found so far, each (rows, instances, batch)."""
+    if not found:
+        return []
+    results, first = [], 0
+    for group, parts in zip(system.groups, blocks, strict=True):
+        _, _, rows, instances, lanes = parts[0].shape
+        last = first + rows * instances
+        results.append((group, parts, [level[first:last].reshape(rows, instances, lanes) for level in found]))
+        first = last
+    return results
+
+
+def onto_bodies(
+    work: Float[Numbers, "coordinate instance batch"], bodies: tuple[int, ...], count: int
+) -> Float[Numbers, "coordinate {count} batch"]:
+    """Return what acts on each moving body from what acts on the bodies of the instances."""
+    return jnp.zeros((work.shape[0], count + 1, work.shape[-1])).at[:, np.array(bodies)].add(work)[:, 1:]
+
+
+class _Shifted(AbstractMotion):
+    """A law moved by a constant: how the residual of a driver changes with it tells what the driver exerts."""
+
+    law: Callable[[Jet], Jet]
+    shift: Any
+
+    def __call__(self, time: Jet) -> Jet:
+        return self.law(time) + self.shift
+
+
+def _told(value: Jet, _: Jet) -> Jet:
+    return value
+
+
+def exerted(
+    driver: Any, poses: Sequence[Pose], time: Jet, forces: Multipliers
+) -> Float[Numbers, "order instance batch"]:
+    """Return the forces that drivers exert along what they prescribe, with rates.
+
+    Conjugate to the law f: ``lambda^T dPhi/df``, whose product with f' is the power that goes into the mechanism.
+
+    Parameters
+    ----------
+    driver : AbstractConstraint
+        Its values have shape (..., instances, 1). Where its law is left out, it is what the bodies tell.
+    poses, time
+        As `slopes` takes them.
+    forces : array of shape (levels, rows, instances, batch)
+        Coefficients of the multipliers; the order of the poses is one less than the levels.
+    """
+    law = driver.motion
+    if isinstance(law, LeftOut):
+        law = partial(_told, driver.evaluate(*poses))
+
+    def residual(shift: Any) -> Any:
+        element = eqx.tree_at(lambda e: e.motion, driver, _Shifted(law, shift))
+        return stacked(with_rows(element.residual(*poses, time)))
+
+    shift = jnp.zeros(forces.shape[2:])
+    _, slope = jax.jvp(residual, (shift,), (jnp.ones_like(shift),))
+    return jnp.stack([work_along(slope[:, None], forces, k)[0] for k in range(len(forces))])
+
+
+def wrench(slope: Slope, forces: Multipliers) -> Float[Numbers, "order coordinate instance batch"]:
+    """Return what joints do to the bodies of one slot: global force, and moment about its origin in its axes."""
+    return jnp.stack([-work_along(slope, forces, k) for k in range(len(forces))])

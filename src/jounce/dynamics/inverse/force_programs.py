@@ -1,0 +1,212 @@
+"""What is compiled of inverse dynamics.
+
+What differs between mechanisms, the residuals, is compiled type by type on the poses of the bodies that it joins, so
+that all mechanisms share it.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from jounce.dynamics.forward.accelerations import Lanes
+from jounce.dynamics.forward.loads import loads, mass_matrices
+from jounce.dynamics.inverse import constraint_forces, redundant_forces
+from jounce.dynamics.inverse.constraint_forces import Multipliers, Slope, Slopes
+from jounce.dynamics.masses import Gravity, Masses
+from jounce.dynamics.motion_values import Coordinates, in_lots, part_of, pose_of
+from jounce.execution.compilation import compiled
+from jounce.execution.mapped import Mapped, OnLlvm
+from jounce.execution.store import is_wanted_soon
+from jounce.jet import Jet, cross
+from jounce.jet.algebra import stacked, total
+from jounce.kinematics.sensitivity.jacobian_series import along_displacements, slopes
+from jounce.mechanism.axis_angles import with_turns
+from jounce.mechanism.system import Group, System, movable, with_rows
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+LARGE = 16  # numbers of an array that stays in memory in machine code of an instant
+LOT = 16  # instants whose dense matrices are factored together
+
+
+@compiled("pose_type", "slot", "levels", brief=True)
+def element_slopes(
+    element: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
+) -> Any:
+    """Return how the residual of a joint or driver changes with the body in a slot, as `slopes` does."""
+    time = Jet.variable(instants[None], levels - 1)
+    return slopes(element, [pose_of(pose, pose_type, levels - 1) for pose in poses], time, slot)
+
+
+@compiled("pose_type", brief=True)
+def body_loads(
+    system: System, bodies: Coordinates, instants: Lanes, masses: Masses, gravity: Gravity, pose_type: type[Pose]
+) -> tuple[Any, Any]:
+    """Return what the constraints have to balance, and at which instants each applied force is finite."""
+    order = len(bodies["position"]) - 1
+    pose = pose_of(bodies, pose_type, order)
+    time = Jet.variable(instants[None], order)
+    return loads(system, pose, time, masses, gravity), system.finite_forces(pose, time)
+
+
+@compiled("pose_type", brief=True)
+def multipliers(
+    system: System,
+    blocks: Slopes,
+    load: Float[Numbers, "levels coordinate body batch"],
+    still: Coordinates | None,
+    masses: Masses,
+    pose_type: type[Pose],
+) -> Any:
+    """Return the multipliers that balance a load, Taylor coefficients, (levels, rows, time)."""
+    mass = None if still is None else mass_matrices(pose_of(still, pose_type, 0), masses)[:, :, 1:]
+    of_lot = partial(constraint_forces.multipliers, system)
+    dense = mass is not None or system.fronts is None
+    return in_lots(of_lot, LOT, blocks, load, mass) if dense else of_lot(blocks, load, mass)
+
+
+@Mapped
+def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, Any]:
+    """Return multipliers of one instant for some cases, and which applied forces are finite there.
+
+    Parameters
+    ----------
+    shared : tuple
+        The system, one of its forces alone, masses and gravity; and, where rows are redundant, what `least_multipliers`
+        takes beside the load, else None: then there is one case, that of `multipliers`.
+    lanes : tuple
+        Of the instant: the coordinates of all bodies, the angles about axes that forces measure, and its time.
+    pose_type
+        Of the coordinates.
+    """
+    (system, loaded, masses, gravity, choice), (bodies, angles, instants) = shared, lanes
+    levels = len(bodies["position"]) - 2  # accelerations use up two
+    loaded = dataclasses.replace(loaded, forces=with_turns(loaded.forces, angles))
+    load, finite = body_loads.function(loaded, bodies, instants, masses, gravity, pose_type)
+
+    def slope(group: Group, slot: int) -> Any:
+        poses = [part_of(bodies, its, levels) for its in group.bodies]
+        return element_slopes.function(group.element, poses, instants, pose_type, slot, levels)
+
+    blocks = [[slope(group, slot) for slot in group.moving_slots] for group in system.groups]
+    if choice is not None:
+        return least_multipliers.function(system, blocks, load, *choice), finite
+    still = None if system.shape[0] == system.shape[1] else part_of(bodies, None, 1)
+    return multipliers.function(system, blocks, load, still, masses, pose_type)[None], finite
+
+
+def balance_of_instant(shared: Any, lanes: Any, pose_type: type[Pose]) -> OnLlvm | None:
+    """Return machine code for `_balanced`, None where there is none; any instant serves as an example."""
+    program = _balanced.program(shared, lanes, large=LARGE, hasty=is_wanted_soon(), pose_type=pose_type)
+    return program if isinstance(program, OnLlvm) else None  # XLA's programs are those of each kind of joint
+
+
+@compiled(brief=True)
+def least_multipliers(
+    system: System,
+    blocks: Slopes,
+    load: Float[Numbers, "levels coordinate body batch"],
+    compliance: Float[Numbers, " row"],
+    weights: Float[Numbers, " case"],
+    bent: Float[Numbers, "case row"],
+) -> Any:
+    """Return multipliers of redundant rows for some cases: a weight of the load, and what is bent, in each."""
+
+    def of_lot(blocks: Slopes, load: Numbers) -> Any:
+        def of_case(weight: Any, bent: Numbers) -> Any:
+            return redundant_forces.least_multipliers(system, blocks, weight * load, compliance, bent)
+
+        return jax.vmap(of_case)(weights, bent)  # all cases by one factorisation
+
+    return in_lots(of_lot, LOT, blocks, load)
+
+
+@compiled(brief=True)
+def scaled_jacobian(system: System, blocks: Slopes) -> Any:
+    """Return the Jacobian of scaled rows and columns."""
+    return constraint_forces.jacobian_of(system, blocks)
+
+
+@compiled("pose_type", brief=True)
+def exerted(
+    driver: Any, poses: Sequence[Coordinates], instants: Lanes, forces: Multipliers, pose_type: type[Pose]
+) -> Any:
+    """Return what drivers exert along what they prescribe, Taylor coefficients."""
+    order = len(forces) - 1
+    built = [pose_of(pose, pose_type, order) for pose in poses]
+    return constraint_forces.exerted(driver, built, Jet.variable(instants[None], order), forces)
+
+
+@compiled("pose_type", "levels", brief=True)
+def applied(force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], levels: int) -> Any:
+    """Return what applied forces exert, Taylor coefficients."""
+    built = [pose_of(pose, pose_type, levels) for pose in poses]
+    time = Jet.variable(instants[None], levels)
+    found = force.force(force.displacement(*built, time), force.velocity(*built, time), time).truncate(levels - 1)
+    return stacked(with_rows(found))
+
+
+@compiled("pose_type", "slot", "levels", brief=True)
+def force_slopes(
+    force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type: type[Pose], slot: int, levels: int
+) -> Any:
+    """Return how far applied forces act along as the body in a slot is displaced, as `slopes` does for residuals."""
+    time = Jet.variable(instants[None], levels - 1)
+    built = tuple(movable(pose_of(pose, pose_type, levels - 1)) for pose in poses)
+    still = [jax.tree.map(jnp.zeros_like, pose) for pose in built]
+
+    def acting(change: Any) -> Any:
+        changes = (*still[:slot], change, *still[slot + 1 :])
+        return stacked(with_rows(force.variation(built, changes, time)))
+
+    return along_displacements(built[slot], acting)
+
+
+@compiled(brief=True)
+def wrenches(slope: Slope, forces: Multipliers) -> Any:
+    """Return what joints do to the body in a slot: force, global, and moment about its origin, in its axes."""
+    return constraint_forces.wrench(slope, forces)
+
+
+@compiled("pose_type", brief=True)
+def passed_on(
+    works: Sequence[Float[Numbers, "levels coordinate batch"]],
+    bodies: Sequence[Coordinates],
+    point: Float[Numbers, "component 1 1"],
+    pose_type: type[Pose],
+) -> Any:
+    """Return the counterpart of what acts on some bodies: force, and moment about a point, both global."""
+    order, found = len(works[0]) - 1, []
+    for work, body in zip(works, bodies, strict=True):
+        pose = pose_of(body, pose_type, order)
+        force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))
+        lever = cross(pose.position - point, force)
+        moment = moment + lever[None] if pose.turns == 1 else pose.direction(moment) + lever
+        found.append(jnp.concatenate([stacked(force), stacked(moment)], axis=1)[:, :, 0])
+    return -total(found)
+
+
+@compiled("pose_type", brief=True)
+def expressed(
+    work: Float[Numbers, "levels coordinate batch"],
+    bodies: Sequence[Coordinates],
+    point: Float[Numbers, "component 1 1"],
+    pose_type: type[Pose],
+) -> tuple[Any, Any]:
+    """Return force and moment about a point of a body, in its axes or in those of another one."""
+    order = len(work) - 1
+    pose, *frame = (pose_of(body, pose_type, order) for body in bodies)
+    force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))
+    if pose.turns == 1:
+        moment = moment - cross(pose.direction(point), force)[None]
+    else:
+        moment = pose.direction(moment - cross(point, pose.to_body(force)))
+    for other in frame:
+        force = other.to_body(force)
+        moment = moment if pose.turns == 1 else other.to_body(moment)
+    return stacked(force)[:, :, 0], stacked(moment)[:, :, 0]

@@ -1,0 +1,398 @@
+"""Inverse dynamics of mechanisms: multipliers, forces of drivers and wrenches of joints over a whole motion."""
+
+import copy
+import dataclasses
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.inverse import force_programs as programs
+from jounce.dynamics.inverse.redundant_forces import OPEN, OpenMultipliers
+from jounce.dynamics.masses import check_loads, gravity_of, masses_of
+from jounce.dynamics.motion_values import along_motion, part_of
+from jounce.errors import MechanismError
+from jounce.jet.algebra import total
+from jounce.kinematics import Motion, Status
+from jounce.kinematics.continuation.change_points import spoiled
+from jounce.linear_algebra.pattern import Pattern
+from jounce.mechanism.axis_angles import at_lanes, measures_angle
+from jounce.mechanism.element_indices import ElementIndex, element_indices, force_names
+from jounce.mechanism.redundant_reactions import resolved_reactions
+from jounce.mechanism.system import Group, law_left_out
+from jounce.shapes import Numbers
+
+NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
+
+
+class MotionForces:
+    """The forces in a motion, computed when they are asked for and kept. Sommer 2024, section 7.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism with masses or applied forces.
+    gravity, applied : bool, default True
+        Whether the bodies have weight, and whether the applied forces act.
+
+    Raises
+    ------
+    MechanismError
+        If nothing has a mass and no force is applied, the motion has no accelerations, or the masses are not valid.
+    """
+
+    def __init__(self, motion: Motion, *, gravity: bool = True, applied: bool = True):
+        check_loads(motion.mechanism)
+        self.motion, self.model = motion, motion.model
+        self.pose_type, self.coordinates = motion.poses
+        self.levels = len(self.coordinates["position"]) - 2  # of the forces: accelerations use up two
+        if self.levels < 1:
+            raise MechanismError("forces need a motion solved to order 2 or higher", name="order", value=motion.order)
+        mechanism = motion.mechanism
+        self.masses = masses_of(mechanism)
+        self.gravity = gravity_of(mechanism) * float(gravity)
+        self.forces = motion.forces if applied else ()
+        self.indices = element_indices(self.model)
+        system = self.model.system  # programs without laws serve all of them, also those that a motion has found
+        self._bare = dataclasses.replace(system, groups=tuple(map(law_left_out, system.groups)))
+        self._kept: dict[tuple[Any, ...], Numbers] = {}
+
+    @classmethod
+    def of(cls, motion: Motion) -> "MotionForces":
+        """Return the forces of a motion, those computed before among them."""
+        if "forces" not in motion.derived:
+            motion.derived["forces"] = cls(motion)
+        return motion.derived["forces"]
+
+    @cached_property
+    def multipliers(self) -> Numbers:
+        """Multipliers of the rows of all residuals, as Taylor coefficients, (levels, rows, time).
+
+        Where constraints are redundant, those of least norm, or by the stiffnesses that the mechanism has for it. NaN
+        at change points, where they are not determined, and next to them where rounding decides them.
+        """
+        found = self._balancing[0]
+        self.check_finite(found)
+        passages, time = self.motion.passages, self.motion.time
+        if passages:  # a distance d away they grow as 1 / d, and so does what rounding makes of them
+            unknown = [spoiled(passages, time, level + 1) for level in range(len(found))]
+            found = np.where(np.array(unknown)[:, None], np.nan, found)
+        return found
+
+    @cached_property
+    def _balancing(self) -> Float[Numbers, "case level row time"]:
+        """Multipliers that balance the loads; after them some that balance none, where any are looked for."""
+        system = dataclasses.replace(self._bare, outputs=())
+        nothing = Pattern.of((), (), system.pattern.width, system.body_count)
+        unjoined = dataclasses.replace(
+            system, groups=(), pattern=nothing, row_scale=np.zeros((0, 1)), rank=None, fronts=None
+        )
+        square = system.shape[0] == system.shape[1]
+        choice = None if system.rank is None else self._choice
+        angles = [group.element.datum.near for group in self.forces if measures_angle(group)]
+
+        def lanes_of(lanes: np.ndarray) -> Any:
+            bodies = self.coordinates_at(None, lanes, self.levels + 2)
+            return bodies, tuple(angle[..., lanes] for angle in angles), self.motion.time[lanes]
+
+        first = np.zeros(1, int)
+        loaded = dataclasses.replace(unjoined, forces=at_lanes(self.forces, first))  # angles come with each instant
+        shared, one = (system, loaded, self.masses, self.gravity, choice), lanes_of(first)
+        code = programs.balance_of_instant(shared, one, self.pose_type)
+
+        def chunk(lanes: np.ndarray) -> Any:
+            if code is not None:
+                found, finite = code(lanes_of(lanes))
+                self._check_finite(finite, lanes)
+                return found
+            blocks, (bodies, _, instants) = self._blocks(lanes), lanes_of(lanes)
+            forces = dataclasses.replace(unjoined, forces=at_lanes(self.forces, lanes))
+            load, finite = programs.body_loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
+            self._check_finite(finite, lanes)
+            if choice is not None:
+                return programs.least_multipliers(system, blocks, load, *choice)
+            still = None if square else self.coordinates_at(None, lanes, 1)
+            return programs.multipliers(system, blocks, load, still, self.masses, self.pose_type)[None]
+
+        return self.in_chunks(chunk)
+
+    @property
+    def _choice(self) -> tuple[Numbers, Numbers, Numbers]:
+        """What chooses multipliers of redundant rows: their compliance; of each case, weight of the load and bend."""
+        bends = [np.zeros(len(self.model.rows)), *([self.open.chance()] if self._looks_for_open else [])]
+        return self.open.compliance, np.array([1.0, 0.0][: len(bends)]), np.array(bends)
+
+    def unique(self, quantity: Callable[["MotionForces"], Numbers], size: float = 1.0) -> Numbers:
+        """Return what is asked of the forces, NaN in components that redundant constraints leave open.
+
+        Unique is a component that vanishes for all multipliers that balance no load (Wojtyra 2005), at all instants.
+
+        Parameters
+        ----------
+        quantity : callable
+            Returns Taylor coefficients of it, (levels, components, time), from forces; linear in the multipliers.
+        size : float
+            Of the quantity for a force of one: 1 for a force, a length for a torque.
+        """
+        values = quantity(self)
+        if self.loose is None:
+            return values
+        solved = self.motion.status == Status.OK
+        given = np.abs(quantity(self.loose)[..., solved]).max(axis=-1, initial=0.0)
+        level = np.abs(self.loose.multipliers[..., solved]).max(axis=-1, initial=0.0) * self.open.weights
+        limits = OPEN * size * level.max(axis=-1)[:, None]
+        open_ = given > limits
+        if np.count_nonzero(solved) > 1:  # what vanishes at all instants has no rates
+            open_[1:] = open_[0]
+        return np.where(np.logical_or.accumulate(open_, axis=0)[..., None], np.nan, values)
+
+    @cached_property
+    def unique_multipliers(self) -> Numbers:
+        """Multipliers, NaN where redundant constraints leave them open."""
+        if self.loose is None:
+            return self.multipliers
+        weights = self.open.weights[:, None]
+        return self.unique(lambda forces: forces.multipliers * weights) / weights
+
+    @cached_property
+    def loose(self) -> "MotionForces | None":
+        """Forces of chance that balance no load, where redundant constraints leave some open and none are chosen."""
+        if not self._looks_for_open:
+            return None
+        twin = copy.copy(self)
+        twin._kept = {}
+        found = self._balancing[1]
+        solved = self.motion.status == Status.OK
+        size = np.abs(found[0][:, solved] * self.open.weights[:, None]).max(initial=0.0)
+        twin.__dict__["multipliers"] = found / (size or 1.0)
+        return twin
+
+    @property
+    def _looks_for_open(self) -> bool:
+        return self.model.system.rank is not None and self.motion.mechanism.redundant_reactions == "unique"
+
+    @cached_property
+    def open(self) -> OpenMultipliers:
+        """What redundant constraints leave open, at the first instant that was solved."""
+        model = self.model
+        lanes = np.flatnonzero(self.motion.status == Status.OK)[:1]
+        lanes = lanes if len(lanes) else np.zeros(1, int)
+        scaled = programs.scaled_jacobian(dataclasses.replace(model.system, outputs=(), forces=()), self._blocks(lanes))
+        mechanism = self.motion.mechanism
+        wanted = resolved_reactions(mechanism.redundant_reactions, mechanism.parameter_values)
+        return OpenMultipliers(model, np.asarray(scaled)[..., 0], wanted)
+
+    def _blocks(self, lanes: np.ndarray) -> list[list[Any]]:
+        """Return the slopes of all groups by the bodies of their moving slots."""
+        groups = enumerate(self.model.system.groups)
+        return [[self._slopes(index, slot, lanes) for slot in group.moving_slots] for index, group in groups]
+
+    def is_loaded(self, name: str) -> bool:
+        """Tell whether a joint or driver exerts anything anywhere in the motion."""
+        sizes = np.abs(np.nan_to_num(np.asarray(self.multipliers[0])))
+        return bool(sizes[list(self.indices[name].own_rows)].max(initial=0.0) > NOTHING * sizes.max(initial=0.0))
+
+    def driver_force(self, name: str) -> Float[Numbers, "order 1 time"]:
+        """Return what a driver exerts along what it prescribes, as Taylor coefficients."""
+        place = self.indices[name]
+        driver = law_left_out(self.model.system.groups[place.group], told=True).element
+
+        def chunk(lanes: np.ndarray) -> Any:
+            poses, exerting = self._poses(place.group, lanes), self._of_group(place)[..., lanes]
+            return programs.exerted(driver, poses, self.motion.time[lanes], exerting, self.pose_type)
+
+        return self._once(chunk, "driver", place.group)[:, place.instance : place.instance + 1]
+
+    def reaction(self, name: str, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
+        """Return what a joint, driver or applied force does to a body, as force and moment about a point of it.
+
+        What it does to all bodies together has no resultant, as it moves no mechanism as a whole. So the ground has
+        the counterpart of what the moving bodies have: also of a residual that tells more than relative poses, such
+        as a coordinate of one body, or a ratio of angles, as it is in the frame of the ground that these are measured.
+
+        Parameters
+        ----------
+        name : str
+            Of the joint, driver or force.
+        body, frame : int
+            Indices of the body and of the one in whose axes the result is wanted: 0 is the ground, None global.
+        point : array of shape (c,)
+            In the frame of the body, m.
+
+        Returns
+        -------
+        tuple of two arrays of shape (levels, components, time)
+            Taylor coefficients.
+        """
+        joined = enumerate(self._bodies_of(name))
+        if body:
+            work = total(self._wrench(name, slot) for slot, its in joined if its == body)
+            return self._expressed(work, body, frame, point)
+        moving = {slot: its for slot, its in joined if its}
+        works = [self._wrench(name, slot) for slot in moving]
+
+        def chunk(lanes: np.ndarray) -> Any:
+            poses = [self.coordinates_at((its,), lanes, self.levels) for its in moving.values()]
+            return programs.passed_on([w[..., lanes] for w in works], poses, point[:, None, None], self.pose_type)
+
+        return self._expressed(self.in_chunks(chunk), 0, frame, np.zeros_like(point))
+
+    def point_of(self, name: str, body: int) -> Float[Numbers, " component"]:
+        """Return the point of a joint, driver or force on a body, or the origin of the body where it has none there."""
+        group, instance = self._member(name)
+        slots = [slot for slot, its in enumerate(group.bodies) if its[instance] == body]
+        names = [f"point_{'ijmn'[slot : slot + 1]}" for slot in slots[:1]] + ["point"] * (len(group.bodies) == 1)
+        given = [value for key in names if (value := getattr(group.element, key, None)) is not None]
+        size = self.pose_type.shifts
+        return given[0].reshape(size, -1)[:, instance] if given else np.zeros(size)
+
+    def _bodies_of(self, name: str) -> tuple[int, ...]:
+        """Return the indices of the bodies of a joint, driver or force in their order; 0 is the ground."""
+        group, instance = self._member(name)
+        return tuple(slot[instance] for slot in group.bodies)
+
+    def _member(self, name: str) -> tuple[Group, int]:
+        """Return the group of a joint, driver or force, and which of it that is."""
+        if place := self.indices.get(name):
+            return self.model.system.groups[place.group], place.instance
+        index, instance = self._force_index(name)
+        return self.model.system.forces[index], instance
+
+    def _wrench(self, name: str, slot: int) -> Float[Numbers, "order coordinate time"]:
+        """Return what a joint, driver or force does to the body in a slot, as Taylor coefficients.
+
+        Force, global, and moment about the origin of the body, in its axes.
+        """
+        if place := self.indices.get(name):
+
+            def of_constraint(lanes: np.ndarray) -> Any:
+                return programs.wrenches(self._slopes(place.group, slot, lanes), self._of_group(place)[..., lanes])
+
+            return self._once(of_constraint, "joint", place.group, slot)[:, :, place.instance]
+        index, instance = self._force_index(name)
+
+        def of_force(lanes: np.ndarray) -> Any:
+            element, poses, instants = self._acting(index, lanes, self.levels)
+            slope = programs.force_slopes(element, poses, instants, self.pose_type, slot, self.levels)
+            return programs.wrenches(slope, -self._sizes(index)[..., lanes])  # a residual is held against
+
+        return self._once(of_force, "force", index, slot)[:, :, instance]
+
+    def applied_force(self, name: str) -> Numbers:
+        """Return an applied force, as Taylor coefficients, (levels, components, time)."""
+        found = self._applied_force(name)
+        self.check_finite(found, f"forces.{name}")
+        return found
+
+    def check_finite(self, values: Numbers, name: str | None = None) -> None:
+        """Raise MechanismError for the first instant that was solved and at which Taylor coefficients are not finite.
+
+        Parameters
+        ----------
+        values : array of shape (levels, ..., time)
+            Taylor coefficients.
+        name : str, optional
+            Of the force; the applied force that is not finite there is looked for unless given.
+        """
+        if self.motion.traced:
+            return
+        bad = ~np.isfinite(values).all(axis=tuple(range(1, values.ndim - 1))) & (self.motion.status == Status.OK)
+        if not bad.any():
+            return
+        lane = int(np.argmax(bad.any(axis=0)))
+        level = int(np.argmax(bad[:, lane]))
+        if name is None:
+            unfit = [
+                n
+                for n in force_names(self.model)
+                if not np.isfinite(self._applied_force(n)[: level + 1, :, lane]).all()
+            ]
+            name = f"forces.{unfit[0]}" if unfit else "joints"
+        at, advice = f"no finite value at t = {self.motion.time[lane]:g} s", "check its law there"
+        if level:
+            raise MechanismError(f"its derivative {level} has {at}; {advice}, or ask for fewer derivatives", name=name)
+        raise MechanismError(f"has {at}; {advice}", name=name)
+
+    def _applied_force(self, name: str) -> Float[Numbers, "order component time"]:
+        index, instance = self._force_index(name)
+        return self._sizes(index)[:, :, instance]
+
+    def _force_index(self, name: str) -> tuple[int, int]:
+        """Return the group of an applied force, and which of it the force is."""
+        return next((k, names.index(name)) for k, names in enumerate(self.model.forces) if name in names)
+
+    def _sizes(self, index: int) -> Float[Numbers, "order component instance time"]:
+        """Return the applied forces of a group, as Taylor coefficients."""
+
+        def chunk(lanes: np.ndarray) -> Any:
+            return programs.applied(*self._acting(index, lanes, self.levels + 1), self.pose_type, self.levels)
+
+        return self._once(chunk, "size", index)
+
+    def _acting(self, index: int, lanes: np.ndarray, levels: int) -> tuple[Any, tuple[dict[str, Any], ...], Any]:
+        """Return the forces of a group, where their bodies are to a number of coefficients, and the instants."""
+        (group,) = at_lanes((self.motion.forces[index],), lanes)
+        poses = tuple(self.coordinates_at(slot, lanes, levels) for slot in group.bodies)
+        return group.element, poses, self.motion.time[lanes]
+
+    def _once(self, chunk: Callable[[np.ndarray], Any], *key: Any) -> Numbers:
+        """Return what a function of indices of instants gives for all of them, kept by a key."""
+        if key not in self._kept:
+            self._kept[key] = self.in_chunks(chunk)
+        return self._kept[key]
+
+    def _expressed(self, work: Numbers, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
+        """Return a wrench on a body as force and moment about a point of it, (levels, components, time).
+
+        Parameters
+        ----------
+        work : array of shape (levels, coordinates, time)
+            Force, global, and moment about the origin of the body, in its axes.
+        body, frame : int
+            Indices of the body and of the one in whose axes the wrench is wanted: 0 is the ground, None global.
+        point : array of shape (c,)
+            In the frame of the body, m.
+        """
+
+        def chunk(lanes: np.ndarray) -> Any:
+            bodies = (body,) if frame is None else (body, frame)
+            taken = [self.coordinates_at((b,), lanes, self.levels) for b in bodies]
+            return programs.expressed(work[:, :, lanes], taken, point[:, None, None], self.pose_type)
+
+        return self.in_chunks(chunk)
+
+    def in_chunks(self, function: Callable[[np.ndarray], Any]) -> Any:
+        """Return what a function of indices of instants gives, for all of them: arrays with the time last."""
+        return along_motion(self.motion, function)
+
+    def coordinates_at(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
+        """Return coordinates at some instants, of bodies and to a number of coefficients as `part_of` has them."""
+        found = part_of(self.coordinates, bodies, levels)
+        return {name: values[..., lanes] for name, values in found.items()}
+
+    def _check_finite(self, finite: Any, lanes: np.ndarray) -> None:
+        """Raise MechanismError for the first instant that was solved and at which an applied force is not finite."""
+        if self.motion.traced:
+            return
+        bad = np.argwhere((~np.asarray(finite) & (self.motion.status[lanes] == Status.OK)).T)
+        if len(bad):
+            lane, force = bad[0]
+            message = f"has no finite value at t = {self.motion.time[lanes[lane]]:g} s; check its law there"
+            raise MechanismError(message, name=f"forces.{force_names(self.model)[force]}")
+
+    def _poses(self, index: int, lanes: np.ndarray) -> tuple[dict[str, Any], ...]:
+        bodies = self.model.system.groups[index].bodies
+        return tuple(self.coordinates_at(slot, lanes, self.levels) for slot in bodies)
+
+    def _slopes(self, index: int, slot: int, lanes: np.ndarray) -> Any:
+        element = self._bare.groups[index].element
+        poses, instants = self._poses(index, lanes), self.motion.time[lanes]
+        return programs.element_slopes(element, poses, instants, self.pose_type, slot, self.levels)
+
+    def _of_group(self, place: ElementIndex) -> Float[Numbers, "order row instance time"]:
+        """Return the multipliers of a group."""
+        found = self.multipliers[:, place.rows]
+        instances = self.model.system.groups[place.group].instances
+        return found.reshape(len(found), -1, instances, found.shape[-1])

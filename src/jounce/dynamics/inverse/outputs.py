@@ -1,0 +1,280 @@
+"""Forces as outputs: of drivers along what they prescribe, of joints on their bodies, and applied ones, with rates."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, ClassVar
+
+import equinox as eqx
+import numpy as np
+
+from jounce.constraints.base import Vector, by_ratio_alone
+from jounce.dynamics.inverse.motion_forces import MotionForces
+from jounce.dynamics.masses import check_loads
+from jounce.errors import MechanismError, check_choice, check_name, did_you_mean
+from jounce.forces import AbstractForce
+from jounce.kinematics import Motion, Status
+from jounce.mechanism import AbstractMotionOutput, Mechanism
+from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.resolve import resolve_element
+from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.shapes import ArrayLike, Numbers
+from jounce.trajectory import FollowingMotion
+
+ROUNDING = 1e-9  # of the largest force
+MOST_TOLD = 4  # instants
+RATES = ("yank", "second rate", "third rate", "fourth rate")
+
+
+class AbstractForceOutput(AbstractMotionOutput):
+    """A force or torque in a mechanism: two derivatives shorter than the motion, as accelerations are."""
+
+    lost_orders = 2
+    of_forces = True
+    source: ClassVar[str] = ""  # the field that names what exerts it: driver, joint or force
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless the mechanism has what is named, and masses or applied forces."""
+        kinds = {"driver": ("drivers",), "joint": ("joints", "drivers", "forces"), "force": ("forces",)}[self.source]
+        known = {name: element for kind in kinds for name, element in getattr(mechanism, kind).items()}
+        name = getattr(self, self.source)
+        check_name(self.source, name, known, MechanismError, name=self.source)
+        check_loads(mechanism, self.source)
+        self._check_named(known[name])
+
+    def _check_named(self, element: Any) -> None:
+        """Raise MechanismError unless the quantity is one of what is named."""
+
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN at instants that were solved: redundant constraints leave them open."""
+        forces = MotionForces.of(motion)
+        solved = motion.status == Status.OK
+        if forces.loose is None or np.isfinite(values[solved]).all():
+            return ""
+        return (
+            f"not unique, as constraints are redundant: {forces.open.words}; redundant_reactions chooses by least "
+            "norm or by stiffnesses"
+        )
+
+
+class _DriverOutput(AbstractForceOutput):
+    driver: str = eqx.field(static=True)
+
+    source = "driver"
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of what the driver exerts, (levels, 1, time)."""
+        size = motion.model.length if self.unit == "N*m" else 1.0
+        return MotionForces.of(motion).unique(lambda forces: forces.driver_force(self.driver), size)
+
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN, or where the force of a cam on its follower changes its sign."""
+        if why := super().remark(motion, values):
+            return why
+        if not isinstance(getattr(motion.mechanism.drivers[self.driver], "motion", None), FollowingMotion):
+            return ""
+        forces = values[:, 0]
+        known = np.isfinite(forces)
+        times, sign = motion.time[known], np.sign(forces[known])
+        sign[np.abs(forces[known]) <= ROUNDING * np.max(np.abs(forces[known]), initial=0.0)] = 0.0
+        times, sign = times[sign != 0], sign[sign != 0]
+        changes = times[1:][sign[1:] != sign[:-1]]
+        if not changes.size:
+            return ""
+        where = ", ".join(f"{t:.4g} s" for t in changes[:MOST_TOLD]) + (", ..." if len(changes) > MOST_TOLD else "")
+        return f"changes its sign before t = {where}: a follower that is pressed against a cam lifts off there"
+
+
+class DriverForceOutput(_DriverOutput):
+    """Force of a driver along the length that it prescribes, N; its product with the rate of the law is the power."""
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+    def _check_named(self, element):
+        if is_turning(element):
+            raise MechanismError("this driver prescribes an angle, so that it exerts a torque", name="quantity")
+
+
+class DriverTorqueOutput(_DriverOutput):
+    """Torque of a driver about the angle that it prescribes, N m; its product with the rate of the law is the power."""
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)
+
+    def _check_named(self, element):
+        if not is_turning(element):
+            raise MechanismError("this driver prescribes a length, so that it exerts a force", name="quantity")
+
+
+class _Reaction(AbstractForceOutput):
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell whether the reaction has components: a torque has in space."""
+        return self.unit == "N" or mechanism.space == "spatial"
+
+
+class _JointOutput(_Reaction):
+    joint: str = eqx.field(static=True)
+    body: str | None = eqx.field(
+        static=True, default=None
+    )  # on which it acts; the second one of the joint unless given
+    frame: str = eqx.field(static=True, default="global")  # global, body, or the name of a body of the joint
+
+    source = "joint"
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless the mechanism has the joint, its body and masses or applied forces."""
+        super().check(mechanism)
+        element = _exerting(mechanism, self.joint)
+        felt = element.bodies if _is_load(element) else (*element.bodies, GROUND)
+        if self.body is not None and self.body not in felt:
+            message = f"is not joined by '{self.joint}'; {did_you_mean(self.body, felt)}"
+            raise MechanismError(message, name="body", value=self.body)
+        check_choice("frame", self.frame, ("global", "body", *dict.fromkeys(felt)), MechanismError)
+
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN, and which gears load no bearing of their bodies."""
+        joints = motion.mechanism.joints
+        bodies = {*_exerting(motion.mechanism, self.joint).bodies} - {GROUND}
+        gears = [name for name, x in joints.items() if by_ratio_alone(x) and bodies & {*x.bodies}]
+        loaded = [name for name in gears if MotionForces.of(motion).is_loaded(name)]
+        return "; ".join(filter(None, (super().remark(motion, values), ratio_words(loaded))))
+
+    def _values(self, motion: Motion, point: ArrayLike | None, part: int, size: float) -> Numbers:
+        """Return force or moment about a point of the body, with rates; about that of the joint unless given."""
+        mechanism, forces = motion.mechanism, MotionForces.of(motion)
+        element = _exerting(mechanism, self.joint)
+        body = element.bodies[min(1, len(element.bodies) - 1)] if self.body is None else self.body
+        index = [GROUND, *mechanism.bodies].index
+        frame = {"global": None, "body": body}.get(self.frame, self.frame)
+        about: Any = forces.point_of(self.joint, index(body)) if point is None else point
+
+        def found(forces: MotionForces) -> Numbers:
+            return forces.reaction(self.joint, index(body), None if frame is None else index(frame), about)[part]
+
+        return found(forces) if isinstance(element, AbstractForce) else forces.unique(found, size)
+
+
+def ratio_words(names: Sequence[str]) -> str:
+    """Say of joints that are given by a ratio alone what their reactions leave out; nothing where there are none."""
+    verb = "is" if len(names) == 1 else "are"
+    return f"{', '.join(names)} {verb} given by a ratio alone: bearings show no tooth forces" if names else ""
+
+
+def _exerting(mechanism: Mechanism, name: str) -> Any:
+    """Return the joint or driver of a name, or the applied force if there is none."""
+    return {**mechanism.forces, **mechanism.joints, **mechanism.drivers}[name]
+
+
+def _is_load(element: Any) -> bool:
+    """Tell whether a force comes from outside: it acts on one body, and on nothing else in turn."""
+    return isinstance(element, AbstractForce) and len(element.bodies) == 1
+
+
+class JointForceOutput(_JointOutput):
+    """Reaction force of a joint, driver or force between bodies on one of its bodies, or on the ground, N."""
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the force, (levels, components, time)."""
+        return self._values(motion, None, 0, 1.0)
+
+
+class JointTorqueOutput(_JointOutput):
+    """Reaction torque of a joint, driver or force on one of its bodies, or the ground, about a point of that body, N m.
+
+    The point is that of the joint unless given, or the origin of the body where the joint has none there.
+    """
+
+    point: Vector = None  # m, in the frame of the body
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the torque, (levels, components, time)."""
+        mechanism = motion.mechanism
+        components = POSITION_COMPONENTS[mechanism.space]
+        values = resolve_element(self, mechanism.parameter_values, components, f"outputs.{self.joint}")
+        return self._values(motion, values["point"], 1, motion.model.length)
+
+
+class _GroundOutput(_Reaction):
+    source = "mechanism"  # the key of a file that says what it is of
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless there are masses or applied forces."""
+        check_loads(mechanism, self.source)
+
+    def _values(self, motion: Motion, point: ArrayLike, part: int, size: float) -> Numbers:
+        """Return total force or moment about a point of the ground, with rates."""
+        mechanism, forces, about = motion.mechanism, MotionForces.of(motion), np.asarray(point)
+        between = [name for name, force in mechanism.forces.items() if not _is_load(force)]
+
+        def found(forces: MotionForces, names: Iterable[str]) -> Numbers:
+            start = np.zeros((forces.levels, (forces.pose_type.shifts, forces.pose_type.turns)[part], len(motion.time)))
+            return sum((forces.reaction(name, 0, None, about)[part] for name in names), start)
+
+        constraints = (*mechanism.joints, *mechanism.drivers)
+        return forces.unique(lambda f: found(f, constraints), size) + found(forces, between)
+
+
+class GroundForceOutput(_GroundOutput):
+    """Total force of a mechanism on the ground, N: of all joints, drivers and forces between bodies (shaking force)."""
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the force, (levels, components, time)."""
+        return self._values(motion, np.zeros(len(self.component_labels(motion.mechanism))), 0, 1.0)
+
+
+class GroundTorqueOutput(_GroundOutput):
+    """Total torque of a mechanism on the ground about one of its points, N m (shaking moment)."""
+
+    point: Vector = None  # m; the origin unless given
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the torque, (levels, components, time)."""
+        mechanism = motion.mechanism
+        components = POSITION_COMPONENTS[mechanism.space]
+        point = resolve_element(self, mechanism.parameter_values, components, "outputs.ground")["point"]
+        return self._values(motion, np.zeros(components) if point is None else point, 1, motion.model.length)
+
+
+class _AppliedOutput(AbstractForceOutput):
+    force: str = eqx.field(static=True)
+
+    source = "force"
+
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell whether the applied force has several components."""
+        return len(mechanism.forces[self.force].velocity_names) > 1
+
+    def coefficients(self, motion: Motion) -> Numbers:
+        """Return the Taylor coefficients of the force, (levels, components, time)."""
+        return MotionForces.of(motion).applied_force(self.force)
+
+    def _check_named(self, element):
+        if element.unit != self.unit:
+            kind, other = ("force", "torque") if element.unit == "N" else ("torque", "force")
+            raise MechanismError(f"this is a {kind}, no {other}", name="quantity")
+
+
+class AppliedForceOutput(_AppliedOutput):
+    """Applied force along its displacement, or with its components, N; it drives a growing displacement if positive."""
+
+    unit = "N"
+    rate_names = ("force", *RATES)
+
+
+class AppliedTorqueOutput(_AppliedOutput):
+    """Applied torque about its angle, or with its components, N m; it drives a growing angle if positive."""
+
+    unit = "N*m"
+    rate_names = ("torque", *RATES)

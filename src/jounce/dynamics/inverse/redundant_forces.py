@@ -1,0 +1,167 @@
+"""Multipliers of redundant constraints: the few that are unique, and a choice of the others by norm or by stiffness.
+
+With more rows than the Jacobian has independent ones, the balance ``Phi_q^T lambda = load`` leaves multipliers open by
+the null space of ``Phi_q^T`` (Wojtyra 2005, Joint reaction forces in multibody systems with redundant constraints). Of
+all that balance the load, one has the least energy ``lambda^T C lambda / 2`` in joints of a compliance C, as elastic
+ones have it (Wojtyra and Fraczek 2013); C may be a measure alone, and that energy a norm. It obeys
+
+    C lambda + Phi_q mu = 0,    Phi_q^T lambda = load,
+
+on jets: coefficient after coefficient with one matrix, so that its rates are those of the choice at every instant. With
+a right side of chance instead of the load it gives what is open: no unique force has a part there.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.forward.saddle_point import as_column, by_body, saddle_point
+from jounce.dynamics.inverse.constraint_forces import Slopes, by_group, jacobian_of, onto_bodies, work_along
+from jounce.errors import MechanismError
+from jounce.kinematics.assembly.redundancy import repetitions
+from jounce.linear_algebra.least_squares import range_basis
+from jounce.linear_algebra.linear import DenseFactor
+from jounce.mechanism import Model
+from jounce.mechanism.system import System
+from jounce.shapes import Numbers
+
+RowNumbers = Float[np.ndarray, " row"]
+OPEN = 1e-7  # of the largest force that is open: what is less is none
+
+
+def least_multipliers(
+    system: System,
+    blocks: Slopes,
+    load: Float[Numbers, "levels coordinate body batch"],
+    compliance: Float[Numbers, " row"],
+    bent: Float[Numbers, " row"],
+) -> Float[Numbers, "levels row batch"]:
+    """Return the multipliers of least energy that balance a load, not scaled, as Taylor coefficients.
+
+    Parameters
+    ----------
+    system : System
+        With redundant rows.
+    blocks, load
+        As `multipliers` takes them.
+    compliance : array of shape (rows,)
+        Zero where a row is rigid.
+    bent : array of shape (rows,)
+        What stands in the place of zero on the right side of the first equation; zero, or anything to find what is
+        open under no load.
+    """
+    scale, rows = jnp.asarray(system.column_scale), system.shape[0]
+    jacobian = jacobian_of(system, blocks)
+    soft = compliance[:, None] * system.row_scale**2
+    soft = soft / jnp.max(soft)
+    basis = range_basis(jnp.swapaxes(jacobian, 0, 1), system.rank or rows)
+    within = jnp.sum(basis[:, :, None] * jnp.swapaxes(jacobian, 0, 1)[:, None], axis=0)
+    factor = DenseFactor.of(saddle_point((jnp.eye(rows) * soft)[..., None], within))
+    found: list[Any] = []
+    strains: list[Any] = []
+    for k in range(len(load)):
+        missing = load[k]
+        for group, parts, forces in by_group(system, blocks, found):
+            for slot, slope in zip(group.moving_slots, parts, strict=True):
+                missing -= onto_bodies(work_along(slope, forces, k, 1), group.bodies[slot], system.body_count)
+        rest = -_strained(system, blocks, strains, k) * system.row_scale
+        rest = rest + (bent[:, None] if k == 0 else 0.0)
+        right = jnp.sum(basis * as_column(missing, scale)[:, None], axis=0)
+        solution = factor.solve(jnp.concatenate([jnp.broadcast_to(rest, (rows, right.shape[-1])), right]))
+        found.append(solution[:rows] * system.row_scale)
+        strains.append(by_body(jnp.sum(basis * solution[rows:][None], axis=1), scale))
+    return jnp.stack(found)
+
+
+def _strained(system: System, blocks: Slopes, strains: Sequence[Any], level: int) -> Float[Numbers, "row batch"]:
+    """Return the Taylor coefficient of Jacobian times displacements, without that of the Jacobian of order zero."""
+    parts = []
+    for group, slopes in zip(system.groups, blocks, strict=True):
+        found: Any = 0.0
+        for slot, slope in zip(group.moving_slots, slopes, strict=True):
+            for j in range(1, level + 1):
+                moved = jnp.pad(strains[level - j], ((0, 0), (1, 0), (0, 0)))[:, np.array(group.bodies[slot])]
+                found = found + jnp.sum(slope[j] * moved[:, None], axis=0)
+        _, _, rows, instances, lanes = slopes[0].shape
+        parts.append(jnp.broadcast_to(found, (rows, instances, lanes)).reshape(-1, lanes))
+    return jnp.concatenate(parts)
+
+
+class OpenMultipliers:
+    """What redundant rows leave open at one position, and how much force a multiplier of each row is.
+
+    Parameters
+    ----------
+    model : Model
+        Of a mechanism with redundant rows.
+    jacobian : array of shape (rows, columns)
+        At that position, rows and columns scaled.
+    wanted : str or mapping
+        As `Mechanism.redundant_reactions` has it.
+    """
+
+    def __init__(self, model: Model, jacobian: Float[np.ndarray, "row column"], wanted: Any):
+        self.model, self.wanted = model, wanted
+        self._row_scale = np.asarray(model.system.row_scale)
+        self._jacobian = jacobian
+
+    @cached_property
+    def words(self) -> str:
+        """Which joint repeats equations of which others."""
+        return "; ".join(map(str, repetitions(self.model.rows, self._basis)))
+
+    @cached_property
+    def weights(self) -> RowNumbers:
+        """The force, N, or else the couple over the size of the mechanism, of a multiplier of one, for each row."""
+        forces, couples = self._sizes
+        return forces + couples / self.model.length
+
+    @cached_property
+    def compliance(self) -> RowNumbers:
+        """The compliance of each row: of a norm, the squares of `weights`, or of joints of a stiffness.
+
+        Raises
+        ------
+        MechanismError
+            If the stiffnesses leave multipliers open.
+        """
+        if not isinstance(self.wanted, Mapping):
+            return self.weights**2
+        forces, couples = self._sizes
+        found = np.zeros(len(forces))
+        for name, stiffness in self.wanted.items():
+            its = np.array([row.partition(".")[2] == name for row in self.model.rows])
+            for size, key in ((forces, "force"), (couples, "torque")):
+                found += np.where(its, size**2 / stiffness.get(key, math.inf), 0.0)
+        open_ = np.linalg.qr(self._basis * self._row_scale)[0]
+        if not np.linalg.eigvalsh(open_.T @ (found[:, None] * open_))[0] > 1e-12 * np.max(found, initial=0.0):
+            held = np.any(np.abs(self._basis) > OPEN, axis=1)
+            names = dict.fromkeys(row.partition(".")[2] for row, x in zip(self.model.rows, held, strict=True) if x)
+            message = f"leaves reactions open; give stiffnesses, force and torque, of more of {', '.join(names)}"
+            raise MechanismError(message, name="redundant_reactions", value=dict(self.wanted))
+        return found
+
+    def chance(self) -> RowNumbers:
+        """Return a right side that leaves nothing out of what is open; the same each time."""
+        normal = np.random.default_rng(0).standard_normal(len(self.model.rows))
+        return normal * self.weights * self._row_scale[:, 0]
+
+    @cached_property
+    def _basis(self) -> Float[np.ndarray, "row combination"]:
+        """An orthonormal basis of the multipliers, of scaled rows, that balance no load."""
+        return np.linalg.svd(self._jacobian)[0][:, self.model.system.rank :]
+
+    @cached_property
+    def _sizes(self) -> tuple[RowNumbers, RowNumbers]:
+        """Force and couple by which a multiplier of one acts on a body: a row has a force, or a couple alone."""
+        scale = np.asarray(self.model.system.column_scale)
+        shifts = self.model.pose_type.shifts
+        found = np.abs((self._jacobian / self._row_scale).reshape(len(self._jacobian), -1, len(scale)) / scale)
+        forces, couples = (np.linalg.norm(part, axis=2).max(axis=1) for part in np.split(found, [shifts], axis=2))
+        pure = forces * self.model.length <= 1e-9 * couples
+        return np.where(pure, 0.0, forces), np.where(pure, couples, 0.0)

@@ -1,0 +1,1 @@
+"""Trajectories of robots, and whether they keep the limits of the joints."""

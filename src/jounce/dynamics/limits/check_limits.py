@@ -1,0 +1,322 @@
+"""Whether a trajectory keeps the limits of a robot: position to jerk, torque and torque rate of every joint."""
+
+import dataclasses
+import warnings
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.limits.limit_jumps import Infinite, infinite_quantities, jumps_of
+from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
+from jounce.dynamics.limits.local_maxima import local_maxima
+from jounce.dynamics.limits.motion_ends import TrajectoryEnd, end_jumps, told_ends
+from jounce.dynamics.limits.trajectories import FollowedTrajectory, why_not
+from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
+from jounce.robot.model.links_and_joints import Limits
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike, seconds
+from jounce.trajectory.breaks import at_breaks, law_breaks, with_sides
+from jounce.trajectory.joint_trajectory import JointTrajectory
+
+FIELDS = ("position", "velocity", "acceleration", "jerk", "effort", "effort_rate")
+TURNING = dict(zip(FIELDS, ("rad", "rad/s", "rad/s^2", "rad/s^3", "N m", "N m/s"), strict=True))
+SLIDING = dict(zip(FIELDS, ("m", "m/s", "m/s^2", "m/s^3", "N", "N/s"), strict=True))
+ACCELERATION = 2
+EFFORTS = (4, 5)  # which of them the dynamics give
+ORDER = 3  # of the motion: jerk, and with it the rate of the torque
+
+REST = 1e-9  # of the largest velocity of a joint, below which it is at rest
+INSTANTS = 2000  # at least, over the trajectory
+BETWEEN = 4  # intervals at least, from one instant of the trajectory to the next
+POINTS = 9  # instants around each
+ROUNDS = 8  # times the step is divided
+
+
+def check_limits(
+    robot: Robot,
+    trajectory: JointTrajectory,
+    limits: Mapping[str, Limits] | None = None,
+    *,
+    times: ArrayLike | None = None,
+    drives: bool = True,
+    hand_over: bool = False,
+) -> LimitReport:
+    """Compare a trajectory, and the torques and torque rates that it needs, with the limits of the joints.
+
+    An acceleration against the velocity is compared with the limit of deceleration, where there is one; a joint at rest
+    counts as one that speeds up, and where the trajectory ends as one that has slowed down.
+
+    All values are exact derivatives of the trajectory, at its own instants and at least three between each two of them,
+    2000 in all or more, and on both sides of where a derivative of a law is known to jump or bend. Around the highest
+    peaks of each curve the step is then refined to less than a millionth of the duration: what is reported are true
+    values of the curves.
+
+    Where a derivative of a law jumps within the trajectory, those above it are infinite, and so may be torques and
+    their rates: a limit of them is broken there. Where pieces of laws meet is known; jumps and kinks of expressions and
+    of Python functions are looked for between the instants. There, what is below 1e-5 of the largest value or a fourth
+    of the change from one instant to the next is not found, nor a second one between the same two.
+
+    Before the start and after the stop the robot is taken to rest. If a joint moves there, what is above the derivative
+    that jumps is infinite: the rows are those of the motion itself, but `LimitReport.ends` tells it, and limits of it
+    are not kept. What a spline through samples makes of their errors at the ends is no jump.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with what it holds.
+    trajectory : JointTrajectory
+        Joints that it does not name stand still at zero, or at the end of their range that is nearest to it; of them
+        only torques are compared.
+    limits : dict of str to Limits, optional
+        Limits of some joints, in place of those that the robot has; those of joints that follow them hold as well.
+    times : array_like of shape (time,), optional
+        Increasing instants to look at, s, instead of those above.
+    drives : bool, default True
+        Whether torques contain armature inertia, damping and friction of the drives.
+    hand_over : bool, default False
+        Whether the robot moves already as the trajectory starts, and goes on moving as it stops.
+
+    Returns
+    -------
+    LimitReport
+        One row for each joint and quantity, also where there is no limit.
+
+    Raises
+    ------
+    TrajectoryError
+        If the robot does not have a joint of the trajectory, or a value is not finite.
+    RobotError
+        If the robot has no joints, or `limits` names one that it does not have.
+
+    Warns
+    -----
+    SampleWarning
+        If the samples of the trajectory do not support its jerk, or a lower derivative.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.dynamics.limits.check_limits import check_limits
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0], limits=jn.Limits(velocity=2.0, effort=4.0))
+    >>> pendulum = jn.Robot("pendulum", [jn.Link("base"), jn.Link("rod", rod)], [pin])
+    >>> report = check_limits(pendulum, jn.JointTrajectory({"pin": "sin(t)"}, start=0.0, stop=3.0))
+    >>> report.kept, [(row.quantity, round(row.ratio, 4), round(row.time, 4)) for row in report.limited]
+    (False, [('velocity', 0.5, 0.0), ('torque', 1.2263, 0.0)])
+    """
+    drives, hand_over = flag("drives", drives, error=RobotError), flag("hand_over", hand_over, error=RobotError)
+    followed = FollowedTrajectory(robot, trajectory)
+    held = followed.held
+
+    def curves(times: np.ndarray) -> np.ndarray:
+        """Return all quantities of all joints, (time, 6, joints)."""
+        q = followed.coordinates(times, ORDER)
+        return np.concatenate([q, followed.torques(q, times, drives)], axis=1)
+
+    merged = _merged(robot, limits)
+    grid = _grid(trajectory) if times is None else _checked_times(times)
+    first, last = float(grid[0]), float(grid[-1])
+    breaks = law_breaks(trajectory.laws.values(), first, last, ORDER)
+    grid = with_sides(grid, breaks)
+    values = curves(grid)
+    bounds = _Bounds(robot, merged, REST * np.abs(values[:, 1]).max(axis=0), trajectory.stop)
+    infinite = infinite_quantities(followed, jumps_of(followed, grid, values[:, : ORDER + 1]), drives)
+    wanted = [
+        (quantity, joint)
+        for joint, name in enumerate(robot.joint_names)
+        for quantity in range(len(FIELDS))
+        if quantity in EFFORTS or name not in held
+    ]
+    at, found, shown = worst_instants(curves, bounds, grid, values, np.array(wanted))
+    at = at_breaks(at, breaks, first, last)
+    rows = tuple(
+        _row(robot, bounds, quantity, joint, *bounds.or_infinite(infinite, quantity, joint, *worst))
+        for (quantity, joint), *worst in zip(wanted, at.tolist(), found.tolist(), shown.tolist(), strict=True)
+    )
+    ends = _ends(followed, values[:, : ORDER + 1], bounds, drives)
+    for message in followed.doubts:
+        warnings.warn(SampleWarning(message), stacklevel=2)
+    shares = bounds.shares(values, grid)
+    return LimitReport(
+        robot.name, robot.joint_names, rows, held, grid, values, shares, drives=drives, ends=ends, hand_over=hand_over
+    )
+
+
+class _Bounds:
+    """What is allowed, in arrays of shape (6, joints), infinite where there is no bound.
+
+    Accelerations are held against one bound, whether they speed a joint up or slow it down, each weighted by that bound
+    over its own. What is at rest is going to speed up, but for the end of the trajectory, at `stop`.
+    """
+
+    def __init__(self, robot: Robot, limits: Mapping[str, Limits], rest: np.ndarray, stop: float):
+        every = [limits[name] for name in robot.joint_names]
+
+        def table(*fields: str, missing: float = np.inf) -> np.ndarray:
+            found = np.array([[getattr(x, field) for x in every] for field in fields], float)  # None becomes NaN
+            return np.where(np.isnan(found), missing, found)
+
+        largest, (slower,) = table(*FIELDS[1:]), table("deceleration")
+        faster, given = largest[ACCELERATION - 1].copy(), np.isfinite(slower)
+        bound = np.where(np.isfinite(faster), faster, slower)
+        largest[ACCELERATION - 1], self.rest, self.stop = bound, rest, stop
+        self.speeding = np.where(given & ~np.isfinite(faster), 0.0, 1.0)
+        self.slowing = np.divide(bound, slower, out=np.ones(len(every)), where=given)
+        self.upper = np.concatenate([table("upper"), largest])
+        self.lower = np.concatenate([table("lower", missing=-np.inf), -largest])
+        self.limited = np.isfinite(self.upper) | np.isfinite(self.lower)
+        with np.errstate(invalid="ignore"):
+            half = (self.upper - self.lower) / 2
+        size = np.where(np.isfinite(self.upper), np.abs(self.upper), np.abs(self.lower))
+        unit = np.where(np.isfinite(size) & (size > 0), size, 1.0)
+        self.scale = np.where(np.isfinite(half) & (half > 0), half, unit)
+
+    def weights(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Return by how much values of shape (..., 6, joints) at instants (...,) count against the bounds."""
+        velocity, acceleration = values[..., 1, :], values[..., ACCELERATION, :]
+        ends = (times == self.stop)[..., None]
+        slows = np.where(np.abs(velocity) > self.rest, velocity * acceleration < 0, ends)
+        found = np.ones_like(values)
+        found[..., ACCELERATION, :] = np.where(slows, self.slowing, self.speeding)
+        return found
+
+    def sides(self, values: Any, at: Any = ...) -> tuple[Any, Any]:
+        """Return the ratios of weighted values to the upper and to the lower bound, -inf where there is none."""
+        upper, lower, scale = self.upper[at], self.lower[at], self.scale[at]
+        return (values - upper + scale) / scale, (lower - values + scale) / scale
+
+    def measure(self, values: np.ndarray, at: Any = ...) -> np.ndarray:
+        """Return what is worst where it is largest: the ratio, or the magnitude where there is no limit."""
+        return np.where(self.limited[at], np.maximum(*self.sides(values, at)), np.abs(values))
+
+    def or_infinite(
+        self, infinite: Infinite, quantity: int, joint: int, time: float, value: float, weight: float
+    ) -> tuple[float, float, float]:
+        """Return the instant, value and weight of a quantity, those of the first where it is infinite if it is."""
+        weights = self.weights(infinite.before, infinite.times)[:, quantity, joint]
+        at = np.flatnonzero((infinite.signs[:, quantity, joint] != 0) & (weights > 0))
+        if not len(at):
+            return time, value, weight
+        first = at[0]
+        value = np.copysign(np.inf, infinite.signs[first, quantity, joint])
+        return float(infinite.times[first]), float(value), float(weights[first])
+
+    def shares(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Return the ratios with the sign of the bound that is nearer, NaN where there is no limit."""
+        above, below = self.sides(values * self.weights(values, times))
+        return np.where(self.limited, np.where(above >= below, np.maximum(above, 0), -np.maximum(below, 0)), np.nan)
+
+
+def worst_instants(
+    curves: Callable[[np.ndarray], np.ndarray],
+    bounds: Any,
+    grid: np.ndarray,
+    values: np.ndarray,
+    wanted: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the worst instant of each wanted curve, its value there and the weight of that.
+
+    Around the peaks that may be the highest, the best of a few instants becomes the middle of a shorter interval, again
+    and again. A jump between two instants is found from the side on which the curve is worse.
+
+    Parameters
+    ----------
+    curves : callable
+        Maps instants, (time,), to values, (time, quantities, joints).
+    bounds : object
+        Has `weights` and `measure`, as the bounds of this module have.
+    grid, values
+        Instants to begin with, and what `curves` gives there.
+    wanted : array of shape (curves, 2)
+        Quantity and joint of each.
+    """
+    at = tuple(wanted.T)
+    weights = bounds.weights(values, grid)
+    measures = bounds.measure(values * weights)[:, *at]
+    every = np.arange(len(wanted))
+    best = np.argmax(measures, axis=0)
+    times, sizes = grid[best], measures[best, every]
+    found, weight = values[best, *at], weights[best, *at]
+    peaks = local_maxima(measures)
+    low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, len(grid) - 1)]
+    share = np.linspace(0.0, 1.0, POINTS)
+    peak, curve = np.indices(low.shape)
+    for _ in range(ROUNDS):
+        around = low + share[:, None, None] * (high - low)
+        there = curves(around.reshape(-1)).reshape(*around.shape, *values.shape[1:])
+        own, weights = (x[:, peak, curve, *at] for x in (there, bounds.weights(there, around)))
+        measured = bounds.measure(own * weights, at)
+        top = np.argmax(measured, axis=0)
+        chosen = np.argmax(np.max(measured, axis=0), axis=0)  # of the peaks of each curve
+        new = (top[chosen, every], chosen, every)
+        better = measured[new] > sizes + 1e-12 * np.abs(sizes)  # else the instant on the grid, which has a round number
+        pairs = ((measured, sizes), (around, times), (own, found), (weights, weight))
+        sizes, times, found, weight = (np.where(better, x[new], y) for x, y in pairs)
+        low = np.take_along_axis(around, np.maximum(top - 1, 0)[None], axis=0)[0]
+        high = np.take_along_axis(around, np.minimum(top + 1, POINTS - 1)[None], axis=0)[0]
+    return times, found, weight
+
+
+def _row(
+    robot: Robot, bounds: _Bounds, quantity: int, joint: int, time: float, value: float, weight: float
+) -> LimitRow:
+    name = robot.joint_names[joint]
+    word, unit = word_of(robot, quantity, joint)
+    if not bounds.limited[quantity, joint]:
+        return LimitRow(name, word, unit, value, time)
+    above, below = (float(x) for x in bounds.sides(np.array(value * weight), (quantity, joint)))
+    limit = (bounds.upper if above >= below else bounds.lower)[quantity, joint] / (weight or 1.0)
+    return LimitRow(name, word, unit, value, time, float(limit), max(above, below, 0.0))
+
+
+def _ends(
+    followed: FollowedTrajectory, values: Float[np.ndarray, "time derivative joint"], bounds: _Bounds, drives: bool
+) -> tuple[TrajectoryEnd, ...]:
+    """Return what is met at both ends, and the limits that are broken there."""
+    robot, jumps = followed.robot, end_jumps(followed, values)
+    if np.array_equal(jumps.before, jumps.after):
+        return told_ends(robot.joint_names, jumps)
+    infinite = infinite_quantities(followed, jumps, drives)
+    weights = bounds.weights(infinite.before, infinite.times)
+    broken = (infinite.signs != 0) & (weights > 0) & bounds.limited
+    return tuple(
+        dataclasses.replace(
+            end, breaks=tuple((robot.joint_names[j], word_of(robot, q, j)[0]) for j, q in np.argwhere(own.T).tolist())
+        )
+        for end, own in zip(told_ends(robot.joint_names, jumps), broken, strict=True)
+    )
+
+
+def word_of(robot: Robot, quantity: int, joint: int) -> tuple[str, str]:
+    """Return the word for a quantity of a joint, and its unit."""
+    turning = robot.joints[robot.joint_names[joint]].turning
+    field = FIELDS[quantity]
+    word = field.replace("effort", "torque" if turning else "force").replace("_", " ")
+    return word, (TURNING if turning else SLIDING)[field]
+
+
+def _merged(robot: Robot, limits: Mapping[str, Limits] | None) -> dict[str, Limits]:
+    given = dict(limits or {})
+    for name, entry in given.items():
+        if name not in robot.joint_names:
+            raise RobotError(why_not(robot, name), name="limits", value=name)
+        if not isinstance(entry, Limits):
+            raise RobotError("must be Limits", name=f"limits.{name}", value=entry)
+    return robot.limits_with(given)
+
+
+def _grid(trajectory: JointTrajectory) -> Float[np.ndarray, " time"]:
+    """Return the instants of a trajectory, its ends, and more between each two."""
+    own = np.unique(np.concatenate([[trajectory.start], trajectory.times, [trajectory.stop]]))
+    steps = max(BETWEEN, -(-INSTANTS // (len(own) - 1)))
+    between = own[:-1, None] + np.diff(own)[:, None] * (np.arange(steps) / steps)
+    return np.append(between.reshape(-1), own[-1])
+
+
+def _checked_times(times: ArrayLike) -> Float[np.ndarray, " time"]:
+    found = np.array(seconds("times", times, TrajectoryError))
+    if found.ndim != 1 or not found.size or not np.isfinite(found).all() or (np.diff(found) <= 0).any():
+        raise TrajectoryError("must be finite instants that increase, at least one", name="times", value=found.tolist())
+    return found

@@ -1,0 +1,180 @@
+"""Where derivatives of a trajectory jump, and which quantities of a robot are infinite there."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.limits.trajectories import BLOCK, FollowedTrajectory
+from jounce.execution.chunks import in_chunks
+from jounce.trajectory.seen_jumps import level_sizes, seen_jumps
+from jounce.trajectory.smoothness import known_jumps
+from jounce.trajectory.stacking import law_derivatives
+
+SMALL = 1e-9  # of the largest value of a derivative: a smaller jump is rounding
+NONE = 1e-12  # of the largest torque there: a smaller change is rounding
+SAME = 1e-9  # of the duration: instants nearer to each other, or to an end, are one
+EFFORT, EFFORT_RATE = 4, 5  # among the quantities
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Jumps:
+    """Where coordinates of a robot, or derivatives of them, jump.
+
+    Parameters
+    ----------
+    times : ndarray of shape (jump,)
+        s, increasing.
+    before, after : ndarray of shape (jump, derivative, joint)
+        Coordinates and derivatives of all joints on both sides; the same where nothing jumps.
+    """
+
+    times: Float[np.ndarray, " jump"]
+    before: Float[np.ndarray, "jump derivative joint"]
+    after: Float[np.ndarray, "jump derivative joint"]
+
+    def above(self, level: int) -> Float[np.ndarray, "jump joint"]:
+        """Return the sign of the lowest jump below a derivative, which is infinite there; 0 where there is none."""
+        signs = np.sign(self.after - self.before)[:, :level]
+        lowest = np.argmax(signs != 0, axis=1)
+        return np.take_along_axis(signs, lowest[:, None], axis=1)[:, 0]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Infinite:
+    """Which quantities of joints are infinite where.
+
+    Parameters
+    ----------
+    times : ndarray of shape (jump,)
+        s.
+    signs : ndarray of shape (jump, 6, joint)
+        Of position to torque rate: 0 where it is finite, else the sign.
+    before : ndarray of shape (jump, 6, joint)
+        Velocities before the jumps, and signs: what tells whether an acceleration slows a joint down.
+    """
+
+    times: Float[np.ndarray, " jump"]
+    signs: Float[np.ndarray, "jump 6 joint"]
+    before: Float[np.ndarray, "jump 6 joint"]
+
+
+def jumps_of(
+    followed: FollowedTrajectory,
+    grid: Float[np.ndarray, " time"],
+    values: Float[np.ndarray, "time derivative joint"],
+) -> Jumps:
+    """Return the jumps between the first and the last of some instants.
+
+    Parameters
+    ----------
+    followed : FollowedTrajectory
+        The robot on its trajectory.
+    grid : array of shape (time,)
+        Increasing instants, s.
+    values : array of shape (time, derivative, joint)
+        Coordinates there; jumps are told of all derivatives but the highest.
+    """
+    trajectory, order, joints = followed.trajectory, values.shape[1] - 1, values.shape[2]
+    first, last = float(grid[0]), float(grid[-1])
+    span = last - first
+    if not span > 0:
+        nothing = np.zeros((0, order + 1, joints))
+        return Jumps(np.zeros(0), nothing, nothing)
+    instants, sizes, unknown = [np.zeros(0)], [np.zeros((0, order, joints))], []
+    for column, law in zip(followed.columns, trajectory.laws.values(), strict=True):
+        own, jumps, everything = known_jumps(law, first, last, order - 1)
+        spread = np.zeros((len(own), order, joints))
+        spread[:, :, column] = jumps.T
+        instants.append(own)
+        sizes.append(spread)
+        if not everything:
+            unknown.append(column)
+
+    def evaluate(times: np.ndarray) -> np.ndarray:
+        """Return coordinates as `followed` does, not finite where a law is not."""
+        laws = list(trajectory.laws.values())
+
+        def block(some: np.ndarray) -> np.ndarray:
+            return np.moveaxis(np.asarray(law_derivatives(laws, jnp.asarray(times[some]), order)), -1, 0)
+
+        q = np.repeat(values[:1], len(times), axis=0)
+        q[:, :, followed.columns] = in_chunks(block, len(times), (BLOCK,), axis=0)
+        return q
+
+    if unknown:
+        seen, jumps = seen_jumps(lambda times: evaluate(times)[:, :, unknown], grid, values[:, :, unknown])
+        spread = np.zeros((len(seen), order, joints))
+        spread[:, :, unknown] = jumps
+        instants.append(seen)
+        sizes.append(spread)
+    where, found = _joined(np.concatenate(instants), np.concatenate(sizes), SAME * span)
+    found = np.where(np.abs(found) > SMALL * level_sizes(values, span)[:-1], found, 0.0)
+    inside = (where > first + SAME * span) & (where < last - SAME * span) & found.any(axis=(1, 2))
+    where, found = where[inside], found[inside]
+    after = evaluate(where + SAME * span / 2) if len(where) else np.zeros((0, order + 1, joints))
+    after = np.where(np.isfinite(after), after, 0.0)  # beside a kink that has no derivatives, as of asin(sin(t))
+    before = after.copy()
+    before[:, :-1] -= found
+    return Jumps(where, before, after)
+
+
+def _joined(
+    instants: np.ndarray, sizes: np.ndarray, apart: float
+) -> tuple[Float[np.ndarray, " jump"], Float[np.ndarray, "jump level joint"]]:
+    """Return jumps in their sequence, those at the same instant as one."""
+    if not len(instants):
+        return instants, sizes
+    sequence = np.argsort(instants, kind="stable")
+    instants, sizes = instants[sequence], sizes[sequence]
+    begins = np.flatnonzero(np.append(True, np.diff(instants) > apart))
+    most, least = np.maximum.reduceat(sizes, begins), np.minimum.reduceat(sizes, begins)
+    return instants[begins], np.where(most >= -least, most, least)
+
+
+def infinite_quantities(followed: FollowedTrajectory, jumps: Jumps, drives: bool) -> Infinite:
+    """Return which quantities are infinite at jumps.
+
+    A derivative above one that jumps is. A torque is where a position or a velocity that moves mass jumps, since the
+    momentum changes in no time. A torque rate is where the torque jumps, or is infinite.
+
+    Parameters
+    ----------
+    followed : FollowedTrajectory
+        The robot on its trajectory.
+    jumps : Jumps
+        Of coordinates, velocities and accelerations.
+    drives : bool
+        Whether torques contain armature inertia, damping and friction of the drives.
+    """
+    count, joints = len(jumps.times), jumps.after.shape[2]
+    signs, before = np.zeros((count, 6, joints)), np.zeros((count, 6, joints))
+    if not count:
+        return Infinite(jumps.times, signs, before)
+    for level in (1, 2, 3):
+        signs[:, level] = jumps.above(level)
+    before[:, 1], before[:, 2] = jumps.before[:, 1], signs[:, 2]
+    steady = jumps.after.copy()
+    steady[:, 2:] = 0.0
+    states = np.stack([jumps.after, jumps.before, steady, _pushed(steady, jumps, 0), _pushed(steady, jumps, 1)])
+    times = np.tile(jumps.times, len(states))
+    efforts = followed.torques(states.reshape(-1, *states.shape[2:]), times, drives)[:, 0]
+    efforts = efforts.reshape(len(states), count, joints)
+    least = NONE * np.abs(efforts).max(axis=(0, 2))[:, None]
+    after, early, still, *pushed = efforts
+    changes = np.stack([*(own - still for own in pushed), after - early])
+    changed = np.where(np.abs(changes) > least, np.sign(changes), 0.0)
+    for quantity, those in ((EFFORT, changed[:2]), (EFFORT_RATE, changed)):
+        lowest = np.argmax(those != 0, axis=0)
+        signs[:, quantity] = np.take_along_axis(those, lowest[None], axis=0)[0]
+    return Infinite(jumps.times, signs, before)
+
+
+def _pushed(steady: np.ndarray, jumps: Jumps, level: int) -> Float[np.ndarray, "jump derivative joint"]:
+    """Return a steady motion with an acceleration along the jump of a derivative, the largest of a joint 1."""
+    jump = jumps.after[:, level] - jumps.before[:, level]
+    size = np.abs(jump).max(axis=1, keepdims=True)
+    found = steady.copy()
+    found[:, 2] = np.divide(jump, size, out=np.zeros_like(jump), where=size > 0)
+    return found

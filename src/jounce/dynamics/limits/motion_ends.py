@@ -1,0 +1,161 @@
+"""What a controller meets at the ends of a trajectory: joints that do not rest there jump from rest, or to it."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.limits.limit_jumps import Jumps
+from jounce.dynamics.limits.trajectories import FollowedTrajectory
+from jounce.robot.robot import Robot
+from jounce.trajectory import JointTrajectory, SplineMotion
+from jounce.trajectory.seen_jumps import level_sizes
+
+ORDER = 3  # up to jerk
+SMALL = 1e-6  # of the size of a derivative: less is rest
+LEAST = np.array([0.0, 1e-9, 1e-6, 1e-3])  # the same, by s to the power of the order: rad or m
+LOOKS = 201
+INSIDE = 1e-10  # of the duration: how long before the stop it is looked at, too
+UNSUPPORTED = 0.5  # of its peak: the error of a derivative that samples say nothing of
+SAFE = 3.0  # times the estimated error: less is none
+SLOW, FAR = 0.02, 4.0  # of the largest velocity, and deviations: less is none where noise hides what splines say
+FITTED, PART = 12, 20  # samples at each end that tell its velocity then: so many, or so small a part of all
+FEW = 2  # times the degree: of fewer samples it is not noise that hides the derivatives, the spline tells what it makes
+
+
+@dataclasses.dataclass(frozen=True)
+class TrajectoryEnd:
+    """The first or the last instant of a trajectory, and which joints do not rest there.
+
+    Parameters
+    ----------
+    end : {"start", "stop"}
+        Which of both.
+    time : float
+        s.
+    velocities, accelerations, jerks : dict of str to float
+        Of the joints for which they do not vanish: by how much these jump, if the robot rests before the start and
+        after the stop; rad or m by s to the power of the order.
+    breaks : tuple of (str, str)
+        Joints, or links, and the quantities of theirs that have a limit and are infinite by such a jump.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> pin = jn.Joint("pin", "base", "rod", limits=jn.Limits(velocity=2.0, acceleration=9.0))
+    >>> robot = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", jn.Inertia(1.0))], [pin])
+    >>> report = jn.check_limits(robot, jn.JointTrajectory({"pin": "t"}, start=0.0, stop=1.0))
+    >>> report.ends[0].at_rest, report.ends[0].breaks, report.kept
+    (False, (('pin', 'acceleration'),), False)
+    """
+
+    end: str
+    time: float
+    velocities: Mapping[str, float]
+    accelerations: Mapping[str, float]
+    jerks: Mapping[str, float]
+    breaks: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether velocities and accelerations vanish."""
+        return not (self.velocities or self.accelerations)
+
+
+def trajectory_ends(robot: Robot, trajectory: JointTrajectory) -> tuple[TrajectoryEnd, TrajectoryEnd]:
+    """Return what a controller meets at the start and at the stop of a trajectory, if the robot rests before and after.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    trajectory : JointTrajectory
+        Of some or all of its joints.
+
+    Raises
+    ------
+    TrajectoryError
+        If the robot does not have a joint of the trajectory, or a value is not finite.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> robot = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", jn.Inertia(1.0))], [jn.Joint("pin", "base", "rod")])
+    >>> from jounce.dynamics import trajectory_ends
+    >>> start, stop = trajectory_ends(robot, jn.JointTrajectory({"pin": "t - t**2/4"}, 0.0, 2.0))
+    >>> dict(start.velocities), dict(stop.velocities), dict(stop.accelerations)
+    ({'pin': 1.0}, {}, {'pin': -0.5})
+    """
+    followed = FollowedTrajectory(robot, trajectory)
+    times = np.linspace(trajectory.start, trajectory.stop, LOOKS)
+    return told_ends(robot.joint_names, end_jumps(followed, followed.coordinates(times, ORDER)))
+
+
+def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time derivative joint"]) -> Jumps:
+    """Return the jumps from rest at the start of a trajectory, and to rest at its stop.
+
+    Parameters
+    ----------
+    followed : FollowedTrajectory
+        The robot on its trajectory.
+    values : array of shape (time, derivative, joint)
+        Coordinates and derivatives to jerk at least at many instants, which tell how large they are.
+    """
+    trajectory, order = followed.trajectory, values.shape[1] - 1
+    times = np.array([trajectory.start, trajectory.stop])
+    inside = INSIDE * float(times[1] - times[0])
+    *moving, before = followed.coordinates(np.append(times, times[1] - inside), order)
+    sizes = level_sizes(values, float(times[1] - times[0]))
+    least = np.zeros(order + 1)
+    least[: len(LEAST)] = LEAST[: order + 1]
+    near = np.maximum(SMALL * sizes, least[:, None])
+    near[:-1] = np.maximum(near[:-1], 2 * inside * sizes[1:])
+    near = np.stack([near, near])
+    span = float(times[1] - times[0])
+    # a law may be another one from its last instant on, as polynomials between points are
+    moving = np.stack([moving[0], np.where(np.abs(moving[1] - before) > near[1], before, moving[1])])
+    for column, name in zip(followed.columns, trajectory.names, strict=True):
+        law = trajectory.laws[name]
+        if not isinstance(law, SplineMotion) or not law.samples.value:
+            continue
+        if len(law.samples.value[0]) <= FEW * law.degree + 1:
+            continue
+        errors = trajectory.estimate_error(order, [name])[:, 0]
+        wave = np.ptp(values[:, 0, column]) / 2 * (2 * np.pi / span) ** np.arange(order + 1)  # as errors count peaks
+        noise = np.where(errors > UNSUPPORTED, np.inf, SAFE * errors * np.maximum(sizes[:, column], wave))
+        near[:, :, column] = np.maximum(near[:, :, column], noise)
+        if noise[1] > SLOW * sizes[1, column]:
+            for k, end in enumerate((1, -1)):
+                speed, scatter = _fitted_speed(*(x[::end] for x in law.samples.value))
+                moving[k, 1, column] = speed
+                near[k, 1, column] = max(FAR * scatter, SLOW * sizes[1, column])
+    moving[:, 1:] = np.where(np.abs(moving) > near, moving, 0.0)[:, 1:]
+    rest = moving.copy()
+    rest[:, 1:] = 0.0
+    return Jumps(times, np.stack([rest[0], moving[1]]), np.stack([moving[0], rest[1]]))
+
+
+def _fitted_speed(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> tuple[float, float]:
+    """Return the velocity at the first of samples by a parabola through the noise of some, and its deviation."""
+    count = min(len(times), max(FITTED, len(times) // PART))
+    reach = times[count - 1] - times[0]
+    table = np.vander((times[:count] - times[0]) / reach, 3, increasing=True)
+    found, *_ = np.linalg.lstsq(table, values[:count], rcond=None)
+    left = values[:count] - table @ found
+    spread = np.linalg.inv(table.T @ table)[1, 1] * (left @ left) / max(count - 3, 1)
+    return float(found[1] / reach), float(np.sqrt(spread) / abs(reach))
+
+
+def told_ends(names: Sequence[str], jumps: Jumps) -> tuple[TrajectoryEnd, TrajectoryEnd]:
+    """Return what is told of the jumps of joints at both ends."""
+    states = jumps.after[0], jumps.before[1]
+
+    def told(k: int, level: int) -> dict[str, float]:
+        return {name: float(x) for name, x in zip(names, states[k][level], strict=True) if x}
+
+    start, stop = (
+        TrajectoryEnd(end, float(jumps.times[k]), told(k, 1), told(k, 2), told(k, 3))
+        for k, end in enumerate(("start", "stop"))
+    )
+    return start, stop

@@ -1,0 +1,229 @@
+"""A robot on a trajectory: its coordinates with derivatives, and the torques and rates that they need."""
+
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import RobotError, SampleWarning, TrajectoryError, UnitWarning, flag, no_such
+from jounce.execution.chunks import in_chunks
+from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
+from jounce.robot.model.arguments import joints_of, whole_number
+from jounce.robot.model.links_and_joints import Limits
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike, seconds
+from jounce.trajectory.joint_trajectory import JointTrajectory
+from jounce.trajectory.unit_doubts import trajectory_doubt
+from jounce.units.shown_units import derivatives_of, time_axes
+
+if TYPE_CHECKING:
+    import xarray
+
+BLOCK = 2048  # instants evaluated at once, always as many, so that all is compiled once
+QUANTITIES = ("position", "velocity", "acceleration", "jerk")
+EFFORTS = ("effort", "effort rate")
+
+
+class FollowedTrajectory:
+    """The coordinates of a robot that follows a trajectory; joints that it does not name stand still.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    trajectory : JointTrajectory
+        Of some or all of its joints.
+    given : bool, default True
+        Whether a user gave it: then a warning says where angles are likely in degrees.
+
+    Attributes
+    ----------
+    held : dict of str to float
+        Joints that the trajectory does not name, and where they stand: at zero, or at the end of their range that is
+        nearest to it.
+    doubts : list of str
+        Warnings about samples that do not support derivatives that were asked for.
+
+    Raises
+    ------
+    RobotError, TrajectoryError
+        If the robot has no joints, or the trajectory names one that it does not have, or that moves otherwise.
+    """
+
+    def __init__(self, robot: Robot, trajectory: JointTrajectory, *, given: bool = True):
+        if not joints_of(robot):
+            raise RobotError("the robot has no moving joint; nothing can follow the trajectory", name="joints")
+        for name in trajectory.names:
+            if name not in robot.joint_names:
+                raise TrajectoryError(why_not(robot, name), name="joint", value=name)
+        check_measures(robot, trajectory)
+        self.robot, self.trajectory = robot, trajectory
+        self.columns = [robot.joint_names.index(name) for name in trajectory.names]
+        still = [name for name in robot.joint_names if name not in trajectory.names]
+        limits = robot.limits if still else {}
+        self.held = {name: _rest(limits[name]) for name in still}
+        self.doubts: list[str] = []
+        if given:
+            warn_of_degrees(robot, trajectory)
+
+    def coordinates(self, times: Float[np.ndarray, " time"], order: int) -> Float[np.ndarray, "time {order}+1 joint"]:
+        """Return coordinates and derivatives.
+
+        Raises
+        ------
+        TrajectoryError
+            If one is not finite.
+        """
+        q = np.zeros((len(times), order + 1, len(self.robot.joint_names)))
+        for name, value in self.held.items():
+            q[:, 0, self.robot.joint_names.index(name)] = value
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", SampleWarning)
+            q[:, :, self.columns] = _in_blocks(lambda block: self.trajectory.derivatives(block, order), times)
+        self.doubts += [str(w.message) for w in caught if str(w.message) not in self.doubts]
+        self._check_finite(q, times, QUANTITIES)
+        return q
+
+    def torques(
+        self, q: Float[np.ndarray, "time derivative joint"], times: Float[np.ndarray, " time"], drives: bool
+    ) -> Float[np.ndarray, "time derivative-2 joint"]:
+        """Return torques and rates for coordinates that `coordinates` gave.
+
+        Raises
+        ------
+        TrajectoryError
+            If one is not finite.
+        """
+        torques = _in_blocks(lambda block: inverse_dynamics(self.robot, block, drives=drives), q)
+        self._check_finite(torques, times, EFFORTS)
+        return torques
+
+    def _check_finite(self, values: np.ndarray, times: np.ndarray, names: tuple[str, ...]) -> None:
+        bad = np.argwhere(~np.isfinite(values))
+        if len(bad):
+            instant, level, joint = bad[0]
+            quantity = names[level] if level < len(names) else f"derivative {level} of the {names[0]}"
+            message = f"the {quantity} of this joint is not finite at t = {times[instant]:g} s"
+            raise TrajectoryError(f"{message}; choose another law there", name=self.robot.joint_names[joint])
+
+
+def warn_of_degrees(robot: Robot, trajectory: JointTrajectory) -> None:
+    """Warn of joints that turn and whose values are likely meant in degrees, unless they came with a unit.
+
+    Warns
+    -----
+    UnitWarning
+    """
+    laws = {
+        name: law
+        for name, law in trajectory.laws.items()
+        if name in robot.joint_names and robot.joints[name].turning and name not in trajectory.measures
+    }
+    if why := trajectory_doubt(
+        laws, trajectory.start, trajectory.stop, {name: robot.joints[name].limits for name in laws}
+    ):
+        warnings.warn(UnitWarning(why), stacklevel=3)
+
+
+def told_drives(drives: bool) -> str:
+    """Return in words what torques of a robot contain."""
+    kinds = "armature, damping and friction"
+    return f"{kinds}, as far as the robot file has them" if drives else f"the bare bodies, without {kinds}"
+
+
+def trajectory_torques(
+    robot: Robot, trajectory: JointTrajectory, rates: int = 0, *, times: ArrayLike | None = None, drives: bool = True
+) -> "xarray.Dataset":
+    """Return the torques and forces that a trajectory needs of the joints of a robot, with rates, labelled.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with what it holds.
+    trajectory : JointTrajectory
+        Joints that it does not name stand still at zero, or at the end of their range that is nearest to it.
+    rates : int, default 0
+        How many rates of the torques are wanted.
+    times : array_like of shape (time,), optional
+        Instants, s; those of the trajectory unless given.
+    drives : bool, default True
+        Whether torques contain armature inertia, damping and friction of the drives.
+
+    Returns
+    -------
+    xarray.Dataset
+        One variable for each joint, of dimensions time and derivative; N m, or N for prismatic joints, by s.
+
+    Raises
+    ------
+    RobotError, TrajectoryError
+        If the robot has no joints or closed loops, it does not have a joint of the trajectory, or a value is not
+        finite.
+
+    Warns
+    -----
+    SampleWarning
+        If the samples of the trajectory do not support the derivatives that are needed.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
+    >>> pendulum = jn.Robot("pendulum", [jn.Link("base"), jn.Link("rod", rod)], [pin], gravity=[0, 0, 0])
+    >>> trajectory = jn.JointTrajectory({"pin": "t**3"}, start=0.0, stop=2.0)
+    >>> torques = jn.dynamics.trajectory_torques(pendulum, trajectory, rates=1, times=[0.0, 1.0])
+    >>> torques["pin"].values.round(12).tolist()  # 6 t / 3 N m, and its rate
+    [[0.0, 2.0], [2.0, 2.0]]
+    """
+    import xarray
+
+    rates, drives = whole_number("rates", rates), flag("drives", drives, error=RobotError)
+    followed = FollowedTrajectory(robot, trajectory)
+    instants = trajectory.times if times is None else np.atleast_1d(seconds("times", times, TrajectoryError))
+    values = followed.torques(followed.coordinates(instants, rates + 2), instants, drives)
+    for message in followed.doubts:
+        warnings.warn(SampleWarning(message), stacklevel=2)
+    variables = {}
+    for k, name in enumerate(robot.joint_names):
+        told = {"units": "N*m" if robot.joints[name].turning else "N", "long_name": derivatives_of(name)}
+        variables[name] = (("time", "derivative"), values[..., k], told)
+    axes = time_axes(instants, rates + 1)
+    about = {"title": robot.name, "source": "jounce", "drives": told_drives(drives)}
+    return xarray.Dataset(variables, coords=axes, attrs=about)
+
+
+def _in_blocks(function: Callable[[np.ndarray], Any], values: np.ndarray) -> np.ndarray:
+    """Return what a function gives for values along their first axis, the last block filled up."""
+    return in_chunks(lambda some: function(values[some]), len(values), (BLOCK,), axis=0)
+
+
+def why_not(robot: Robot, name: str) -> str:
+    """Say why a name is not that of a joint that can be moved."""
+    joint = robot.joints.get(name)
+    if joint is None:
+        return no_such(f"moving joint of {robot.name}", name, robot.joint_names)
+    if joint.mimic is not None:
+        return f"this joint follows {joint.mimic.joint}; leave it out"
+    return "this joint is fixed; leave it out"
+
+
+def check_measures(robot: Robot, trajectory: JointTrajectory) -> None:
+    """Raise TrajectoryError where the units of a trajectory are not those of the joints of the robot."""
+    for name, measured in trajectory.measures.items():
+        turning = robot.joints[name].turning
+        if measured != ("angle" if turning else "length"):
+            message = (
+                "this joint turns, its coordinate is an angle, but its law has the unit of a length"
+                if turning
+                else "this joint slides, its coordinate is a length, but its law has the unit of an angle"
+            )
+            raise TrajectoryError(message, name=name)
+
+
+def _rest(limits: Limits) -> float:
+    """Return zero, or what is nearest to it in the range of a joint."""
+    low = 0.0 if limits.lower is None else max(limits.lower, 0.0)
+    return low if limits.upper is None else min(limits.upper, low)

@@ -1,0 +1,235 @@
+"""Where a mechanism can stand still: positions of equilibrium by a damped Newton method along the constraints."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.forward.accelerations import Equations
+from jounce.dynamics.forward.initial_state import TOLERANCE
+from jounce.dynamics.masses import gravity_of, masses_of
+from jounce.dynamics.statics.independent_coordinates import Place
+from jounce.dynamics.statics.variations import LEVELS, at_rest, clock_at, residuals_at, sizes_of_forces
+from jounce.errors import SolveError
+from jounce.execution.compilation import compiled
+from jounce.jet import Jet
+from jounce.kinematics import Status
+from jounce.kinematics.assembly.gauss_newton import put_together
+from jounce.kinematics.assembly.initial_revolutions import Coordinates
+from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
+from jounce.mechanism import Mechanism, Model
+from jounce.mechanism.builder import pose_at, with_reference
+from jounce.mechanism.element_indices import force_names
+from jounce.modules import with_fields
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+MAX_STEPS = 300
+LONGEST = 0.25  # rad or sizes of the mechanism, of a step
+ADRIFT = 50  # of the longest steps along what no stiffness resists, one after the other: it flies off
+CLOSED = 1e-11  # rad or sizes of the mechanism: a step as short leaves nothing to find
+BALANCED = 1e-9  # of the loads: what may be left of them
+FLAT = 1e-10  # of the stiffness: what is smaller counts as none in a step
+WORTH = 1e-14  # of the loads: what is smaller is rounding
+
+
+class Found(NamedTuple):
+    """Where a search ended.
+
+    Attributes
+    ----------
+    place : Place
+        The mechanism at rest there.
+    left : array of shape (directions,)
+        Generalised forces that nothing balances, in free directions of the scaled coordinates.
+    balanced : bool
+        Whether they are zero but for rounding.
+    """
+
+    place: Place
+    left: Float[np.ndarray, " direction"]
+    balanced: bool
+
+
+def placed(mechanism: Mechanism, model: Model, coordinates: Coordinates, instant: float) -> Place:
+    """Return a mechanism that stands still, the laws of its drivers and forces held at an instant."""
+    system = with_fields(model.system, outputs=())
+    equations = Equations(system, masses_of(mechanism), gravity_of(mechanism), 1.0, model.pose_type)
+    return Place(mechanism, model, equations, at_rest(coordinates), clock_at(instant, held=True))
+
+
+def driven(place: Place) -> Place:
+    """Return a mechanism that its drivers hold whole with the velocities and accelerations that their laws give."""
+    instant, coordinates = float(place.clock[0, 0, 0]), {name: x.copy() for name, x in place.coordinates.items()}
+    clock, shifts = clock_at(instant, held=False), place.model.pose_type.shifts
+    for level in (1, 2):  # the residual of each order is affine in the coordinates of that order
+        gaps = np.asarray(residuals_at(place.equations, coordinates, clock))[level]
+        column = np.linalg.lstsq(place.jacobian, -gaps, rcond=RANK_TOLERANCE)[0]
+        change = place.changes(column[None, :, None])[0]
+        coordinates["position"][level] = change[:shifts]
+        if "angle" in coordinates:
+            coordinates["angle"][level] = change[shifts]
+        else:
+            coordinates["angular_velocity"][level - 1] = level * change[shifts:]
+    return dataclasses.replace(place, coordinates=coordinates, clock=clock)
+
+
+def search(start: Place, *, settle: bool) -> Found:
+    """Return where the mechanism can stand still, or how near to it a search from a position came.
+
+    Parameters
+    ----------
+    start : Place
+        At rest, its constraints fulfilled.
+    settle : bool
+        Go where the forces do work, as a mechanism does that creeps to rest: only positions that are stable, or those
+        that the start is on already, are found. Otherwise Newton's method, to any position nearby.
+    """
+    place, drifted, scale = start, 0, 1.0
+    for _ in range(MAX_STEPS):
+        free = place.free
+        left = free.T @ place.loads.sum(axis=0)
+        if not free.shape[1]:
+            return Found(place, left, True)
+        stiffness = free.T @ place.varied(np.stack([free, *[np.zeros_like(free)] * 2]))[0].sum(axis=0)
+        scale = max(_scale(place), float(np.abs(stiffness).max()), 1e-300)
+        step = free @ _step(left, stiffness, scale, settle=settle)
+        size = float(np.max(np.abs(step), initial=0.0))
+        if size <= CLOSED:
+            return _ended(_moved(place, step) or place, scale)
+        following = _shortened(place, step * min(1.0, LONGEST / size), left, settle=settle)
+        flat = size > LONGEST and _is_flat(stiffness, free.T @ step, left)
+        drifted = drifted + 1 if flat else 0
+        if following is None or drifted > ADRIFT:
+            break
+        place = following
+    return _ended(place, scale)
+
+
+def _is_flat(stiffness: np.ndarray, step: np.ndarray, left: np.ndarray) -> bool:
+    """Tell whether the forces left hardly change along the longest step that is taken."""
+    change = stiffness @ step * (LONGEST / np.abs(step).max())
+    return bool(np.linalg.norm(change) < 1e-3 * np.linalg.norm(left))
+
+
+def _ended(place: Place, scale: float) -> Found:
+    left = place.free.T @ place.loads.sum(axis=0)
+    return Found(place, left, bool(np.abs(left).max(initial=0.0) <= BALANCED * scale))
+
+
+def _scale(place: Place) -> float:
+    """Return the size of the largest load: of weight, of any applied force, or of what the constraints bear, N m."""
+    borne = place.jacobian.T @ place.multipliers
+    largest = [np.abs([*place.loads, borne]).max(initial=0.0)]
+    if place.equations.system.forces:
+        still = np.zeros((LEVELS, len(place.scale), 1))
+        sizes = sizes_of_forces(place.equations, place.coordinates, place.clock, place.changes(still))
+        for group, size in zip(place.equations.system.forces, sizes, strict=True):
+            lever = place.model.length if group.element.unit == "N" else 1.0
+            largest.append(np.abs(size).max(initial=0.0) * lever)
+    return float(max(largest))
+
+
+def _step(
+    left: Float[np.ndarray, " direction"],
+    stiffness: Float[np.ndarray, "direction direction"],
+    scale: float,
+    *,
+    settle: bool,
+) -> Float[np.ndarray, " direction"]:
+    """Return Newton's step; to settle, one along which the forces do work, whatever the stiffness is."""
+    values, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
+    floor = FLAT * scale
+    if values[0] > floor or not settle:
+        found, sizes, turned = np.linalg.svd(stiffness)
+        along = found.T @ left
+        parts = np.where((sizes > floor) | (np.abs(along) > WORTH * scale), along / np.maximum(sizes, floor), 0.0)
+        return -turned.T @ parts
+    along = vectors.T @ left
+    curved = np.maximum(np.abs(values), floor)
+    return -vectors @ np.where((np.abs(values) > floor) | (np.abs(along) > WORTH * scale), along / curved, 0.0)
+
+
+def _shortened(place: Place, step: Float[np.ndarray, " column"], left: Any, *, settle: bool) -> Place | None:
+    """Return the place after a step, or after a part of it in which the forces do work, or balance better."""
+    size = float(np.max(np.abs(step)))
+    for _ in range(30):
+        trial = _moved(place, step)
+        if trial is not None:
+            after = trial.free @ (trial.free.T @ trial.loads.sum(axis=0))
+            before = place.free @ left
+            if not np.isfinite(after).all():
+                pass
+            elif size <= 1e-7:
+                return trial
+            elif settle:
+                if 0.5 * (before + after) @ step < 0 or not before @ step < 0:
+                    return trial
+            elif np.linalg.norm(after) < np.linalg.norm(before):
+                return trial
+        step, size = step * 0.5, size * 0.5
+    return None
+
+
+def _moved(place: Place, step: Float[np.ndarray, " column"]) -> Place | None:
+    """Return the mechanism after a step of the scaled coordinates, put together; None where that does not go.
+
+    Angles about axes go on from those before the step, and so count their turns.
+    """
+    model, instant = place.model, float(place.clock[0, 0, 0])
+    change = place.changes(np.broadcast_to(step[None, :, None], (1, len(step), 1)))[0]
+    shifts = model.pose_type.shifts
+    coordinates = {name: x[0] for name, x in place.coordinates.items() if name != "angular_velocity"}
+    moved = displaced(coordinates, change[:shifts], change[shifts:], model.pose_type)
+    coordinates = {name: np.asarray(x) for name, x in moved.items()}
+    if model.rows:
+        trial = put_together(model, instant, TOLERANCE, coordinates)
+        if not trial.closed:
+            return None
+        coordinates = trial.coordinates
+    model, _ = with_reference(model, coordinates, instant, model.prescribed, keep=True)
+    system = with_fields(model.system, outputs=())
+    equations = dataclasses.replace(place.equations, system=system)
+    return dataclasses.replace(place, model=model, equations=equations, coordinates=at_rest(coordinates))
+
+
+@compiled("pose_type")
+def displaced(coordinates: Mapping[str, Numbers], shift: Numbers, turn: Numbers, pose_type: type[Pose]) -> Any:
+    """Return coordinates of order zero after all bodies, the ground first, have shifted, m, and turned, rad."""
+    pose = pose_at(coordinates, pose_type).displaced(shift, turn)
+    return {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
+
+
+def check_forces(place: Place) -> None:
+    """Raise SolveError where an applied force has no finite value at rest."""
+    system, instant = place.equations.system, float(place.clock[0, 0, 0])
+    if not system.forces:
+        return
+    coordinates = {name: x[0] for name, x in place.coordinates.items() if name != "angular_velocity"}
+    pose = pose_at(coordinates, place.model.pose_type).extended(None, None)
+    fit = np.asarray(system.finite_forces(pose, Jet([np.full((1, 1), instant), np.zeros((1, 1))])))[:, 0]
+    bad = [f"forces.{name}" for name, good in zip(force_names(place.model), fit, strict=True) if not good]
+    if bad:
+        message = (
+            f"{', '.join(bad)}: the force has no finite value at rest, where an equilibrium is looked for; check its "
+            "law: a division by a velocity, as of friction, must be smoothed, for example by tanh"
+        )
+        raise SolveError(message, status=Status.INADMISSIBLE)
+
+
+def remains(found: Found) -> str:
+    """Say what nothing balances at the end of a search: which force or moment on which body, and how large it is."""
+    place = found.place
+    model, shifts = place.model, place.model.pose_type.shifts
+    by_body = -(place.free @ found.left).reshape(len(model.bodies), -1)
+    body = int(np.argmax(np.linalg.norm(by_body, axis=1)))
+    force, moment = by_body[body, :shifts], by_body[body, shifts:]
+    pieces = []
+    if np.abs(force).max() > 0.05 * np.abs(by_body[body]).max():
+        pieces.append(f"a force of ({', '.join(f'{x / model.length + 0.0:.4g}' for x in force)}) N")
+    if np.abs(moment).max() > 0.05 * np.abs(by_body[body]).max():
+        inner = ", ".join(f"{x + 0.0:.4g}" for x in moment)
+        pieces.append(f"a moment of {inner if len(moment) == 1 else f'({inner})'} N m")
+    return f"{' and '.join(pieces)} on {model.bodies[body]}"

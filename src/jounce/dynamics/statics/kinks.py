@@ -1,0 +1,56 @@
+"""Applied forces that have a kink or a jump where a mechanism is: no linear law stands for them there."""
+
+import numpy as np
+
+from jounce.dynamics.statics.independent_coordinates import ROUNDING, Reduction
+from jounce.dynamics.statics.variations import sizes_of_forces
+
+STEPS = (1e-4, 1e-6)  # rad or sizes of the mechanism, and as much by s
+BENT = 0.1  # of the larger step: where slopes still differ by so much over a step a hundred times shorter
+FAINT = 1e-6  # of the slope: a difference of slopes that is smaller is rounding
+COUNTS = 1e-9  # of the stiffness: what a force may add to it unseen
+
+
+def kinked(reduction: Reduction) -> list[str]:
+    """Return the names of applied forces whose slopes differ on the two sides of a small motion.
+
+    A smooth law bends less the shorter the step is; a kink stays. Each coordinate and each velocity is looked at.
+    """
+    place, count = reduction.place, len(reduction.names)
+    if not place.equations.system.forces or not count:
+        return []
+    columns = reduction.changes[:2, :, : 2 * count]  # of positions and velocities
+    sizes = np.abs(columns).max(axis=(0, 1), initial=1e-300)
+    columns = columns / sizes
+    counts = _that_count(reduction, sizes)
+
+    def forces(step: float) -> list[np.ndarray]:
+        changes = place.changes(columns * step)
+        return [np.asarray(x) for x in sizes_of_forces(place.equations, place.coordinates, place.clock, changes)]
+
+    still, bends = forces(0.0), []
+    for step in STEPS:
+        pairs = zip(forces(step), still, forces(-step), strict=True)
+        bends.append(
+            [(np.abs(a - 2 * b + c) / step, np.maximum(np.abs(a - b), np.abs(b - c)) / step) for a, b, c in pairs]
+        )
+    names = []
+    for group, members, large, small in zip(place.equations.system.forces, place.model.forces, *bends, strict=True):
+        lever = place.model.length if group.element.unit == "N" else 1.0
+        slope = small[1].max(axis=2, keepdims=True)  # the steepest: what rounding of the place costs follows from it
+        bent = (small[0] > BENT * large[0]) & (small[0] > FAINT * slope) & (small[0] * lever > counts)
+        # what grows as the step shrinks is a jump, and nothing but rounding if it is small
+        bent &= (small[0] < large[0] / BENT) | (small[0] * STEPS[1] * lever > COUNTS * np.abs(place.loads).max())
+        bad = (bent | ~np.isfinite(small[0])).any(axis=(0, 2))
+        names += [name for name, is_bad in zip(members, bad, strict=True) if is_bad]
+    return names
+
+
+def _that_count(reduction: Reduction, sizes: np.ndarray) -> np.ndarray:
+    """Return by how much a slope must differ to count beside stiffness and damping, N m and N m s, for each lane."""
+    count = len(reduction.names)
+    stiffness, mass = (
+        float(np.max(np.diag(reduction.noise(level)) / ROUNDING / sizes[:count] ** 2, initial=1e-300))
+        for level in (0, 2)
+    )
+    return COUNTS * np.repeat([stiffness, np.sqrt(stiffness * mass)], count)

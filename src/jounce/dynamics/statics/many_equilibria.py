@@ -1,0 +1,145 @@
+"""All positions in which a mechanism or a robot stands still that many searches find."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from jounce.dynamics.forward.initial_state import TOLERANCE
+from jounce.dynamics.statics.equilibrium_search import displaced, placed, search
+from jounce.dynamics.statics.independent_coordinates import Place
+from jounce.dynamics.statics.static_equilibrium import Equilibrium, as_mechanism, at_rest_from, told
+from jounce.errors import MechanismError, whole_number
+from jounce.kinematics.assembly.axis_directions import senses
+from jounce.kinematics.assembly.gauss_newton import put_together
+from jounce.kinematics.assembly.initial_revolutions import Coordinates
+from jounce.mechanism import Mechanism, build
+from jounce.mechanism.preconditions import concrete
+from jounce.robot import Robot
+from jounce.robot.closed_loops.closures import GivenCoordinates, given_coordinates
+from jounce.shapes import Real, Refused
+
+SAME = 1e-6  # rad or sizes of the mechanism: positions as near count as one
+
+
+@concrete
+def equilibria(
+    mechanism: Mechanism | Robot,
+    time: Real | Refused | None = None,
+    *,
+    starts: int | Refused = 100,
+    seed: int | Refused = 0,
+    without: Sequence[str] = (),
+    q: GivenCoordinates = None,
+    hold: str | Sequence[str] = (),
+    torques: Mapping[str, float] | None = None,
+    drives: bool = True,
+) -> tuple[Equilibrium, ...]:
+    """Return all equilibria that Newton's method finds from many starts, of every assembly of the mechanism.
+
+    Each start is a random position of all bodies, put together, or random coordinates of the joints of a robot, within
+    their limits; equilibria within 1e-6 rad and sizes of the mechanism count as one, and those that are indifferent are
+    one of a family. A body that lies turned over in a hinge or a guide is no assembly.
+
+    Parameters
+    ----------
+    mechanism, time, without, q, hold, torques, drives
+        As for `equilibrium`.
+    starts : int, default 100
+        How many random positions are tried besides the starting guess.
+    seed : int, default 0
+        Of the random positions.
+
+    Returns
+    -------
+    tuple of Equilibrium
+        The stable ones first, then in the order in which they were found; empty where none was.
+
+    Raises
+    ------
+    MechanismError, AssemblyError, SolveError
+        As for `equilibrium`, but for one that does not exist.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> pendulum = jn.load("examples/simple_pendulum.yaml")
+    >>> [found.stability for found in jn.equilibria(pendulum, starts=5)]
+    ['stable', 'unstable']
+    """
+    count = whole_number("starts", starts, error=MechanismError)
+    random = np.random.default_rng(whole_number("seed", seed, error=MechanismError))
+    robot = mechanism if isinstance(mechanism, Robot) else None
+    start = at_rest_from(as_mechanism(mechanism, q, hold, torques, drives), time, without, "newton")
+    places = (
+        _closed(start, _random_poses(start, random))
+        if robot is None
+        else _closed(start, _random_coordinates(robot, start, random, q, hold, drives))
+        for _ in range(count)
+    )
+    found: list[Equilibrium] = []
+    for place in (start, *places):
+        if place is None:
+            continue
+        for settle in (True, False):
+            ended = search(place, settle=settle)
+            if ended.balanced and not any(_same(ended.place, known.place) for known in found):
+                found.append(told(ended, start, of_robot=robot is not None))
+    order = ("stable", "held", "indifferent", "undetermined", "unstable")
+    return tuple(sorted(found, key=lambda one: order.index(one.stability)))
+
+
+def _random_coordinates(
+    robot: Robot,
+    start: Place,
+    random: np.random.Generator,
+    q: GivenCoordinates,
+    hold: str | Sequence[str],
+    drives: bool,
+) -> Coordinates:
+    """Return where the bodies of a robot are at random coordinates of the joints that are not held."""
+    values, limits = given_coordinates(robot, q), robot.limits
+    held = robot.joint_names if hold == "all" else (hold,) if isinstance(hold, str) else hold
+    for k, name in enumerate(robot.joint_names):
+        joint = robot.joints[name]
+        reach = np.pi if joint.turning else start.model.length
+        ends = (limits[name].lower, limits[name].upper)
+        low, high = (own if own is not None else reach * sign for own, sign in zip(ends, (-1, 1), strict=True))
+        if name not in held:
+            values[k] = random.uniform(low, high)
+    opened = robot.opened().mechanism(values, drives=drives)
+    return {name: np.asarray(x) for name, x in build(opened).guess.items()}
+
+
+def _random_poses(start: Place, random: np.random.Generator) -> Coordinates:
+    """Return random poses of all bodies."""
+    model = start.model
+    shape = (len(model.bodies), 1)
+    shift = random.uniform(-1.0, 1.0, (model.pose_type.shifts, *shape)) * model.length
+    turn = random.uniform(-np.pi, np.pi, (model.pose_type.turns, *shape))
+    parts = (np.pad(x, ((0, 0), (1, 0), (0, 0))) for x in (shift, turn))
+    coordinates = {name: x[0] for name, x in start.coordinates.items() if name != "angular_velocity"}
+    return {name: np.asarray(x) for name, x in displaced(coordinates, *parts, model.pose_type).items()}
+
+
+def _closed(start: Place, coordinates: Coordinates) -> Place | None:
+    """Return the mechanism put together from a position; None where that does not go, or turns a part over."""
+    model, instant = start.model, float(start.clock[0, 0, 0])
+    if model.rows:
+        trial = put_together(model, instant, TOLERANCE, coordinates)
+        drawn = {name: x[0] for name, x in start.coordinates.items()}
+        if not trial.closed or not np.array_equal(senses(model.system, trial.coordinates), senses(model.system, drawn)):
+            return None
+        coordinates = trial.coordinates
+    return placed(start.mechanism, model, coordinates, instant)
+
+
+def _same(one: Place, other: Place) -> bool:
+    """Tell whether two positions are the same but for rounding; whole turns count where a force counts them."""
+    a, b = one.coordinates, other.coordinates
+    if np.abs(one.loads - other.loads).max() > SAME * np.abs(one.loads).max():
+        return False
+    if np.abs(a["position"][0] - b["position"][0]).max() > SAME * one.model.length:
+        return False
+    if "angle" in a:
+        return bool(np.abs(np.sin((a["angle"][0] - b["angle"][0]) / 2)).max() <= SAME)
+    return bool((1 - np.abs((a["quaternion"][0] * b["quaternion"][0]).sum(axis=0))).max() <= SAME**2)

@@ -1,0 +1,129 @@
+"""Robots as mechanisms that stand still, or that move through a state: what equilibria and small motions start from."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.forward.initial_state import TOLERANCE
+from jounce.dynamics.statics.equilibrium_search import driven, placed
+from jounce.dynamics.statics.independent_coordinates import Place, chosen_outputs
+from jounce.errors import RobotError, check_name
+from jounce.forces.actuators import SlideForce, SpatialTorque
+from jounce.kinematics.assembly.assemble import assemble
+from jounce.mechanism import Mechanism, build
+from jounce.robot import Robot
+from jounce.robot.closed_loops.closures import GivenCoordinates, given_coordinates
+from jounce.robot.closed_loops.mechanism_parts import RobotParts
+from jounce.robot.model.arguments import floats
+from jounce.shapes import ArrayLike
+
+DRIVE = "_drive"
+
+GivenState = Mapping[str, float] | ArrayLike | None
+"""Coordinates, alone or with their rates and second derivatives, or by name of the joint; those not given are zero."""
+
+
+def standing(
+    robot: Robot, q: GivenCoordinates, hold: str | Sequence[str], torques: Mapping[str, float] | None, drives: bool
+) -> Mechanism:
+    """Return a robot as a mechanism, joints held at their coordinates, constant torques or forces in others.
+
+    With `drives` it has their armature and damping; Coulomb friction, which would hold it anywhere near, is left out.
+
+    Raises
+    ------
+    RobotError
+        If a name or a value does not fit the robot.
+    """
+    robot, start = _frictionless(robot), given_coordinates(robot, q)
+    names = robot.joint_names if hold == "all" else (hold,) if isinstance(hold, str) else tuple(hold)
+    for name in names:
+        check_name("moving joint", name, robot.joint_names, RobotError, name="hold")
+    given = dict(torques or {})
+    for name, value in given.items():
+        check_name("moving joint", name, robot.joint_names, RobotError, name="torques")
+        if name in names:
+            raise RobotError("this joint is held; its torque follows", name=f"torques.{name}", value=value)
+        if not np.isfinite(float(floats(f"torques.{name}", value))):
+            raise RobotError("must be finite", name=f"torques.{name}", value=value)
+    parts = RobotParts(robot, {*names, *given}, None, None, drives)
+    order = [joint.name for joint in robot.moving_joints]
+    forces: dict[str, Any] = {}
+    for name, value in given.items():
+        at, law = parts.placed(order.index(name)), repr(float(value))
+        if at.turning:
+            forces[f"{name}_torque"] = SpatialTorque(
+                at.bodies, axis_i=at.axis_i, law=law, vector_i=at.vector_i, vector_j=at.vector_j
+            )
+        else:
+            forces[f"{name}_force"] = SlideForce(
+                at.bodies, point_i=at.point, point_j=np.zeros(3), vector_i=at.axis_i, law=law
+            )
+    drivers = {name: float(start[robot.joint_names.index(name)]) for name in names}
+    return robot.mechanism(start, drivers=drivers, forces=forces, drives=drives)
+
+
+def through_state(
+    robot: Robot, state: GivenState, coordinates: Sequence[str] | None, drives: bool
+) -> tuple[Place, tuple[str, ...]]:
+    """Return a robot in a state, driven in independent joints, and their names.
+
+    Parameters
+    ----------
+    robot : Robot
+        With loops or without.
+    state : array_like of shape (n,), or (k, n) with k to 3
+        Coordinates, their rates and second derivatives; those of joints that are not independent are left out.
+    coordinates : sequence of str, optional
+        Independent joints; all of a tree, and chosen where there are loops, unless given.
+    drives : bool
+        Whether the joints have their armature and damping; Coulomb friction, which has no slope, is left out.
+
+    Raises
+    ------
+    RobotError
+        If a name or a value does not fit the robot.
+    """
+    levels = _levels(robot, state)
+    names = robot.joint_names if coordinates is None else tuple(coordinates)
+    for name in names:
+        check_name("moving joint", name, robot.joint_names, RobotError, name="coordinates")
+    if coordinates is None and robot.closures:
+        names = _independent(robot, levels[0])
+    places = [robot.joint_names.index(name) for name in names]
+    series = zip(names, (levels[:, places] * [[1.0], [1.0], [0.5]]).T.tolist(), strict=True)
+    laws = {name: f"{value!r} + {rate!r}*t + {half!r}*t**2" for name, (value, rate, half) in series}
+    mechanism = _frictionless(robot).mechanism(levels[0], drivers=laws, time=[0.0], drives=drives)
+    model, found = assemble(build(mechanism), 0.0, TOLERANCE)
+    return driven(placed(mechanism, model, found, 0.0)), names
+
+
+def _frictionless(robot: Robot) -> Robot:
+    """Return a robot without Coulomb friction."""
+    joints = [dataclasses.replace(joint, friction=0.0) for joint in robot.joints.values()]
+    parts = (list(robot.links.values()), joints, robot.gravity, list(robot.closures.values()), robot.strict)
+    return Robot(robot.name, *parts)
+
+
+def _levels(robot: Robot, state: GivenState) -> Float[np.ndarray, "3 joint"]:
+    """Return coordinates, rates and second derivatives, zero where they are not given."""
+    count = len(robot.joint_names)
+    values = robot.coordinates(**state) if isinstance(state, Mapping) else np.zeros(count) if state is None else state
+    given = np.atleast_2d(np.asarray(floats("q", values)))
+    if given.ndim != 2 or given.shape[1] != count or not 1 <= len(given) <= 3:
+        shown = f"not {given.shape if len(given) > 1 else given.shape[1:]}"
+        message = f"must have the shape (n,), or (k, n) with q, q' and q'' for k to 3, n = {count}, {shown}"
+        raise RobotError(message, name="q")
+    if not np.isfinite(given).all():
+        raise RobotError("must be finite", name="q")
+    return np.concatenate([given, np.zeros((3 - len(given), count))])
+
+
+def _independent(robot: Robot, q: Float[np.ndarray, " joint"]) -> tuple[str, ...]:
+    """Return joints that determine the position of a robot with loops, chosen where its loops are closed near q."""
+    mechanism = robot.mechanism(q, drives=False)
+    model, coordinates = assemble(build(mechanism), 0.0, TOLERANCE, free=True)
+    return chosen_outputs(placed(mechanism, model, coordinates, 0.0))

@@ -1,0 +1,320 @@
+"""Positions in which a mechanism stands still under its forces, and whether it stays there."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from jounce.display import Displayed
+from jounce.dynamics.forward.initial_state import TOLERANCE
+from jounce.dynamics.masses import check_loads
+from jounce.dynamics.statics.equilibrium_search import Found, check_forces, placed, remains, search
+from jounce.dynamics.statics.independent_coordinates import Place, Reduction, reduced
+from jounce.dynamics.statics.kinks import kinked
+from jounce.dynamics.statics.robot_states import standing
+from jounce.dynamics.statics.stability import Verdict, judged
+from jounce.errors import MechanismError, RobotError, SolveError, check_choice, check_name, flag
+from jounce.kinematics import Motion, Status
+from jounce.kinematics.assembly.assemble import assemble, freely_moving
+from jounce.kinematics.results.pose_outputs import output_values
+from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete
+from jounce.robot import Robot
+from jounce.robot.closed_loops.closures import GivenCoordinates
+from jounce.shapes import Real, Refused
+
+METHODS = ("settle", "newton")
+SINGULAR = "the position is singular, joints can move there that cannot elsewhere; what is near is not told"
+
+
+class Equilibrium(Displayed):
+    """A position in which a mechanism stands still, the laws of its drivers and forces held at an instant.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        That stands there, without the drivers that were released.
+    time : float
+        The instant, s.
+    motion : Motion
+        The mechanism at rest, of one instant: outputs, and by `jounce.joint_reaction`, `jounce.driver_force` and
+        `jounce.applied_force` the forces that hold it.
+    stability : str
+        ``stable``; ``unstable``; ``indifferent``, where no force resists some motion; ``held``, where nothing can
+        move; or ``undetermined``.
+    reason : str
+        Why, in words.
+    singular : bool
+        Whether joints can move there that cannot elsewhere, so that small motions are not told by linear equations.
+    of_robot : bool
+        Whether it is that of a robot, whose small motions are told by its joints.
+    cautions : tuple of str
+        What was left out of account.
+    """
+
+    def __init__(self, found: Place, singular: bool, *, of_robot: bool = False):
+        self.place, self.of_robot = found, of_robot
+        self.mechanism, self.time = found.mechanism, float(found.clock[0, 0, 0])
+        self.singular = singular
+
+    def __repr__(self) -> str:
+        title = f"{self.mechanism.title}: " if self.mechanism.title else ""
+        return f"<Equilibrium {title}{self.stability}, {self.degrees_of_freedom} degrees of freedom>"
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """How many independent small motions the constraints allow."""
+        return self.place.free.shape[1]
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether the mechanism stays there, also where nothing can move; None where that is not determined."""
+        return {"stable": True, "held": True, "unstable": False}.get(self.stability)
+
+    @property
+    def stability(self) -> str:
+        """Whether small motions stay small, in a word."""
+        return self._verdict.word
+
+    @cached_property
+    def reason(self) -> str:
+        """Why the equilibrium is stable or not, in words."""
+        verdict = self._verdict
+        if verdict.direction is None:
+            return verdict.reason
+        direction = self._reduction.basis @ verdict.direction
+        moving = freely_moving(self.place.model, np.abs(direction)[None])
+        tail = {"energy falls": "as {} move", "no stiffness": "resists motions of {}"}.get(
+            verdict.reason, "those of {}"
+        )
+        start = {"no stiffness": "no force", "energy falls": "energy falls"}.get(verdict.reason, verdict.reason)
+        separator = ": " if tail.startswith("those") else " "
+        return f"{start}{separator}{tail.format(moving)}"
+
+    @cached_property
+    def cautions(self) -> tuple[str, ...]:
+        """What was left out of account."""
+        found = (
+            [
+                f"forces.{name} has a kink or a jump there: its slope is not the same on both sides"
+                for name in kinked(self._reduction)
+            ]
+            if self.degrees_of_freedom and not self.singular
+            else []
+        )
+        return (*found, *((SINGULAR,) if self.singular else ()))
+
+    @cached_property
+    def _reduction(self) -> Reduction:
+        return reduced(self.place, drivers=False, prefer_outputs=self.of_robot)
+
+    @cached_property
+    def _verdict(self) -> Verdict:
+        if self.singular:
+            return Verdict("undetermined", SINGULAR)
+        if not self.degrees_of_freedom:
+            return Verdict("held", "nothing can move")
+        r = self._reduction
+        return judged(r.part(0), r.noise(0), r.part(1), r.noise(1), r.part(2))
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The mechanism at rest, as a motion of one instant, of order 2."""
+        place, model = self.place, self.place.model
+        lost = max((output.lost_orders for output in self.mechanism.outputs.values()), default=0)
+        coordinates = {name: _padded(x, lost) for name, x in place.coordinates.items()}
+        groups = output_values(model.system.outputs, coordinates, model.pose_type)
+        status = np.array([int(Status.OK)])
+        return Motion(self.mechanism, model, np.array([self.time]), 2, (coordinates, groups), status, {})
+
+    @cached_property
+    def outputs(self) -> dict[str, Any]:
+        """Values of all outputs, by name: a number, or an array of components; SI."""
+        return {name: values[0, 0] for name, values in self.motion.outputs.items()}
+
+    @cached_property
+    def poses(self) -> dict[str, dict[str, Any]]:
+        """Poses of the moving bodies, by name: position, m, and angle, rad, or Euler parameters."""
+        found = {}
+        for k, name in enumerate(self.place.model.bodies, 1):
+            position, attitude = (self.place.coordinates[key][0, ..., k, 0] for key in self._keys)
+            key = "angle" if self._keys[1] == "angle" else "orientation"
+            found[name] = {"position": position, key: float(attitude) if key == "angle" else attitude}
+        return found
+
+    @property
+    def placed(self) -> Mechanism:
+        """The mechanism with its bodies guessed where they stand: a simulation starts from there."""
+        bodies = {name: _posed(self.mechanism.bodies[name], pose) for name, pose in self.poses.items()}
+        return dataclasses.replace(self.mechanism, bodies=bodies, initial={})
+
+    @property
+    def _keys(self) -> tuple[str, str]:
+        return ("position", "angle") if "angle" in self.place.coordinates else ("position", "quaternion")
+
+
+def _padded(values: np.ndarray, count: int) -> np.ndarray:
+    return np.concatenate([values, np.zeros((count, *values.shape[1:]))])
+
+
+def _posed(body: Body, pose: dict[str, Any]) -> Body:
+    changed = {"position": pose["position"].tolist()}
+    if "angle" in pose:
+        return dataclasses.replace(body, **changed, angle=pose["angle"])
+    return dataclasses.replace(body, **changed, orientation=pose["orientation"].tolist())
+
+
+@concrete
+def equilibrium(
+    mechanism: Mechanism | Robot,
+    time: Real | Refused | None = None,
+    *,
+    without: Sequence[str] = (),
+    method: str = "settle",
+    q: GivenCoordinates = None,
+    hold: str | Sequence[str] = (),
+    torques: Mapping[str, float] | None = None,
+    drives: bool = True,
+) -> Equilibrium:
+    """Return a position in which a mechanism stands still under its forces, and whether it is stable.
+
+    Velocities are zero; the laws of drivers and of forces are held at an instant. All forces balance there:
+    ``Q(q, 0, t) = Phi_q^T lambda``, ``Phi(q, t) = 0``. Bodies need no masses but for their weight.
+
+    Parameters
+    ----------
+    mechanism : Mechanism or Robot
+        With masses or applied forces. The search begins where its bodies can be put together nearest to their starting
+        guess. A robot, with loops or without, is taken as the mechanism that it is (`Robot.mechanism`), whose outputs
+        are the coordinates of its joints.
+    time : float, optional
+        The instant, s; the first of the mechanism unless given, 0 if it has none.
+    without : sequence of str, optional
+        Drivers that are left out, so that what they drive is free.
+    method : {"settle", "newton"}, default "settle"
+        To settle, the bodies creep where the forces do work, until they rest: what is found is stable, unless the
+        search begins on another equilibrium. Newton's method goes to any equilibrium nearby.
+    q : array_like of shape (n,) or dict of str to float, optional
+        Of a robot: coordinates from which the search begins, and at which joints are held.
+    hold : sequence of str, or "all", optional
+        Of a robot: joints that are held. ``jn.driver_force(found.motion, "JOINT_drive")`` is the torque that it takes.
+    torques : dict of str to float, optional
+        Of a robot: constant torques, N m, or forces, N, of joints that are not held.
+    drives : bool, default True
+        Of a robot: count the armature inertia and the viscous damping of the joints, in stability and small motions.
+        Coulomb friction, which would hold it anywhere near, is left out.
+
+    Returns
+    -------
+    Equilibrium
+        Position, forces and stability.
+
+    Raises
+    ------
+    MechanismError
+        If a name or an option is not valid, or nothing has a mass and no force is applied.
+    AssemblyError
+        If the bodies cannot be put together.
+    SolveError
+        If no equilibrium is found: the message says what force stays on which body. Or if a force has no finite value
+        at rest.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> pendulum = jn.load("examples/simple_pendulum.yaml")
+    >>> hanging = jn.equilibrium(pendulum)
+    >>> round(float(hanging.outputs["place"][1]), 12), hanging.stability
+    (-1.0, 'stable')
+    """
+    robot = isinstance(mechanism, Robot)
+    start = at_rest_from(as_mechanism(mechanism, q, hold, torques, drives), time, without, method)
+    found = search(start, settle=method == "settle")
+    if not found.balanced and method == "settle":
+        found = min(found, search(start, settle=False), key=lambda f: not f.balanced)
+    if not found.balanced:
+        message = (
+            f"no equilibrium was found from the starting guess: where the search ended, {remains(found)} is balanced "
+            "by nothing; check forces and gravity, hold what is driven, or guess the bodies nearer to it"
+        )
+        raise SolveError(message, status=Status.NOT_CONVERGED)
+    return told(found, start, of_robot=robot)
+
+
+def as_mechanism(
+    subject: Mechanism | Robot,
+    q: GivenCoordinates,
+    hold: str | Sequence[str],
+    torques: Mapping[str, float] | None,
+    drives: bool,
+) -> Mechanism:
+    """Return a robot as the mechanism that stands with some joints held, or a mechanism as it is.
+
+    Raises
+    ------
+    RobotError, MechanismError
+        If a name or a value does not fit the robot, or is given for a mechanism.
+    """
+    if isinstance(subject, Robot):
+        return standing(subject, q, hold, torques, flag("drives", drives, error=RobotError))
+    given = {"q": q, "hold": hold or None, "torques": torques}
+    if unfit := [k for k, v in given.items() if v is not None]:
+        raise MechanismError("is for robots; a mechanism has its own guess, drivers and forces", name=unfit[0])
+    return subject
+
+
+def at_rest_from(mechanism: Mechanism, time: Real | Refused | None, without: Sequence[str], method: str) -> Place:
+    """Return the mechanism at rest where its bodies can be put together, or raise where something is not valid."""
+    check_mechanism(mechanism)
+    check_choice("method", method, METHODS, MechanismError)
+    if isinstance(without, str):
+        without = (without,)
+    for name in without:
+        check_name("driver", name, mechanism.drivers, MechanismError, name="without")
+    drivers = {name: driver for name, driver in mechanism.drivers.items() if name not in without}
+    mechanism = dataclasses.replace(mechanism, drivers=drivers, outputs=_outputs_without(mechanism, drivers))
+    check_loads(mechanism)
+    instant = _instant(mechanism, time)
+    check_laws(mechanism, np.array([instant]), 2, forces=True)
+    model, coordinates = assemble(build(mechanism), instant, TOLERANCE, free=True)
+    place = placed(mechanism, model, coordinates, instant)
+    check_forces(place)
+    return place
+
+
+def _outputs_without(mechanism: Mechanism, drivers: dict[str, Any]) -> dict[str, Any]:
+    """Return the outputs that a mechanism has with some of its drivers: what a driver exerts goes with it."""
+    if len(drivers) == len(mechanism.drivers):
+        return dict(mechanism.outputs)
+    left = dataclasses.replace(mechanism, drivers=drivers, outputs={})
+
+    def fits(output: Any) -> bool:
+        try:
+            output.check(left)
+        except MechanismError:
+            return False
+        return True
+
+    return {name: output for name, output in mechanism.outputs.items() if fits(output)}
+
+
+def _instant(mechanism: Mechanism, time: Any) -> float:
+    if time is None:
+        given = mechanism.time
+        return 0.0 if given is None else float(time_grid(given, mechanism.parameter_values)[0])
+    try:
+        found = float(time)
+    except (TypeError, ValueError):
+        raise MechanismError("must be one instant, in s", name="time", value=time) from None
+    if not np.isfinite(found):
+        raise MechanismError("must be finite", name="time", value=time)
+    return found
+
+
+def told(found: Found, start: Place, *, of_robot: bool = False) -> Equilibrium:
+    """Return the result; a position in which the constraints hold less than they do elsewhere is singular."""
+    singular = found.place.free.shape[1] > start.free.shape[1]
+    return Equilibrium(found.place, singular, of_robot=of_robot)

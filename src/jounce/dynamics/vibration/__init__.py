@@ -1,0 +1,1 @@
+"""Linearized equations about an equilibrium, natural frequencies and modes."""

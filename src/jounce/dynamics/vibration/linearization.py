@@ -1,0 +1,257 @@
+"""Equations of small motions about an equilibrium or along a motion, and what control and vibration take of them."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.display import Displayed
+from jounce.dynamics.statics.independent_coordinates import Reduction
+from jounce.dynamics.statics.static_equilibrium import Equilibrium
+from jounce.dynamics.statics.variations import reaches
+from jounce.dynamics.vibration.modes import Modes
+from jounce.errors import MechanismError, check_name
+from jounce.mechanism import Mechanism
+from jounce.shapes import Refused
+
+
+class StateSpace(NamedTuple):
+    """A linear system ``x' = A x + B u``, ``z = C x + D u``, of small changes of a motion.
+
+    ``scipy.signal.StateSpace(*space[:4])`` and ``control.ss(*space[:4])`` take it.
+
+    Attributes
+    ----------
+    A, B, C, D : numpy.ndarray
+        SI.
+    states, inputs, outputs : tuple of str
+        Names along their axes; a rate has ``_d1`` behind the name.
+    """
+
+    A: Float[np.ndarray, "state state"]
+    B: Float[np.ndarray, "state input"]
+    C: Float[np.ndarray, "output state"]
+    D: Float[np.ndarray, "output input"]
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+
+class Linearisation(Displayed):
+    """The equations of small motions ``M y'' + C y' + K y = B u`` of independent coordinates y.
+
+    They hold about an equilibrium, or about one instant of a motion, with all terms of its velocities: of inertia, of
+    joints and of forces. Coordinates, names and units are in ``coordinates`` and ``units``.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        What moves.
+    equilibrium : Equilibrium or None
+        About which it moves; None along a motion.
+    time : float
+        The instant, s.
+    coordinates, units : tuple of str
+        Of y: drivers that were released, outputs, or coordinates of bodies such as ``rod.angle``.
+    mass, damping, stiffness : numpy.ndarray of shape (coordinates, coordinates)
+        SI. The stiffness holds that of applied forces, of weight, and of all that joints and drivers bear.
+    inputs : tuple of str
+        Names of u: what drivers that were released exert beside their force, N or N m; what applied forces do, beside
+        what their law says, each component of them.
+    input_matrix : numpy.ndarray of shape (coordinates, inputs)
+        Generalised forces by those.
+    held : tuple of str
+        Drivers that hold; they may be inputs of `state_space` too.
+    """
+
+    def __init__(self, reduction: Reduction, about: Equilibrium | None):
+        self._reduction, self.equilibrium = reduction, about
+        self.mechanism, self.time = reduction.place.mechanism, float(reduction.place.clock[0, 0, 0])
+        self.coordinates, self.units, self.held = reduction.names, reduction.units, reduction.held
+        self.mass, self.damping, self.stiffness = (reduction.part(level) for level in (2, 1, 0))
+
+    def __repr__(self) -> str:
+        title = f"{self.mechanism.title}: " if self.mechanism.title else ""
+        where = "a motion" if self.equilibrium is None else f"an equilibrium that is {self.equilibrium.stability}"
+        return f"<Linearisation {title}{', '.join(self.coordinates)} about {where} at {self.time:g} s>"
+
+    @cached_property
+    def modes(self) -> Modes:
+        """Natural frequencies, damping ratios and shapes; along a motion, of the equations at the instant."""
+        return Modes(self._reduction)
+
+    @cached_property
+    def _inputs(self) -> tuple[tuple[str, ...], Float[np.ndarray, "coordinate input"]]:
+        reduction, place = self._reduction, self._reduction.place
+        own = len(self.coordinates)
+        names, columns = [], []
+        for k, name in enumerate(reduction.released):
+            names.append(name)
+            columns.append(np.eye(own)[k])
+        if place.equations.system.forces:
+            changes = place.changes(reduction.changes[:, :, reduction.lanes(0)])
+            found = reaches(place.equations, place.coordinates, place.clock, changes)
+            for members, reach in zip(place.model.forces, map(np.asarray, found), strict=True):
+                for instance, name in enumerate(members):
+                    labels = "xyz"[: len(reach)] if len(reach) > 1 else ("",)
+                    names += [f"{name}_{label}" if label else name for label in labels]
+                    columns += list(reach[:, instance])
+            order = {name: k for k, name in enumerate(reduction.released)} | {
+                name: len(reduction.released) + k for k, name in enumerate(self.mechanism.forces)
+            }
+            ranks = [order[name if name in order else name[:-2]] for name in names]
+            names, columns = ([x[k] for k in np.argsort(ranks, kind="stable")] for x in (names, columns))
+        return tuple(names), np.array(columns).reshape(-1, own).T
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of forces and torques that act beside those that are there."""
+        return self._inputs[0]
+
+    @property
+    def input_matrix(self) -> Float[np.ndarray, "coordinate input"]:
+        """Generalised forces of the coordinates by each input, shape (coordinates, inputs)."""
+        return self._inputs[1]
+
+    def state_space(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> StateSpace:
+        """Return the linear system in the coordinates and their rates.
+
+        Parameters
+        ----------
+        inputs : sequence of str, optional
+            Of `inputs`, all unless given; or drivers that hold. The input of one of these is the second derivative of
+            what it prescribes, rad/s^2 or m/s^2; its change and the rate of it are states then.
+        outputs : sequence of str, optional
+            Outputs of the mechanism, or components of them such as ``C_x``, that are functions of the poses; all unless
+            given. Each gives its change and the rate of that.
+
+        Returns
+        -------
+        StateSpace
+            Matrices, and names of states, inputs and outputs.
+
+        Raises
+        ------
+        MechanismError
+            If a name is not that of an input or of an output.
+
+        Examples
+        --------
+        >>> import jounce as jn
+        >>> import scipy.signal
+        >>> pendulum = jn.linearise(jn.load("examples/simple_pendulum.yaml"))
+        >>> space = pendulum.state_space(outputs=["angle"])
+        >>> space.A.round(9).tolist(), space.outputs
+        ([[0.0, 1.0], [-9.81, -0.0]], ('angle', 'angle_d1'))
+        """
+        wanted = self.inputs if inputs is None else named("inputs", inputs)
+        known = (*self.inputs, *self.held)
+        for name in wanted:
+            check_name("input", name, known, MechanismError, name="inputs")
+        forces = [name for name in wanted if name in self.inputs]
+        drivers = [name for name in wanted if name not in self.inputs]
+        return _state_space(self, wanted, forces, drivers, None if outputs is None else named("outputs", outputs))
+
+    @property
+    def A(self) -> Float[np.ndarray, "state state"]:  # noqa: N802 - the field's name
+        """Of the coordinates and their rates: ``[[0, 1], [-M^-1 K, -M^-1 C]]``."""
+        return self.state_space(outputs=()).A
+
+    @property
+    def B(self) -> Float[np.ndarray, "state input"]:  # noqa: N802 - the field's name
+        """By all `inputs`."""
+        return self.state_space(outputs=()).B
+
+    @property
+    def C(self) -> Float[np.ndarray, "output state"]:  # noqa: N802 - the field's name
+        """Of all outputs and their rates."""
+        return self.state_space().C
+
+    @property
+    def D(self) -> Float[np.ndarray, "output input"]:  # noqa: N802 - the field's name
+        """Of all outputs and their rates, by all `inputs`."""
+        return self.state_space().D
+
+
+def named(kind: str, names: str | Sequence[str] | Refused) -> tuple[str, ...]:
+    """Return names given one by one or alone, or raise MechanismError."""
+    if isinstance(names, str):
+        return (names,)
+    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        raise MechanismError("must be a list of names", name=kind, value=names)
+    return tuple(names)
+
+
+def _state_space(
+    of: Linearisation,
+    inputs: Sequence[str],
+    forces: Sequence[str],
+    drivers: Sequence[str],
+    outputs: tuple[str, ...] | None,
+) -> StateSpace:
+    """Return the system; what drivers do is a force of their change, of its rate and of its second derivative."""
+    r, own, other = of._reduction, len(of.coordinates), len(drivers)
+    chosen = [r.held.index(name) for name in drivers]
+    by_law = [-r.matrices[:, r.lanes(level, drivers=True)][:, chosen] for level in range(3)]
+    by_force = of.input_matrix[:, [of.inputs.index(name) for name in forces]]
+    # the second derivatives of the coordinates by coordinates, laws, their rates, and inputs
+    right = np.concatenate([-of.stiffness, by_law[0], -of.damping, by_law[1], by_force, by_law[2]], axis=1)
+    second = np.linalg.solve(of.mass, right) if own else right
+    size = own + other
+    a, b = np.zeros((2 * size, 2 * size)), np.zeros((2 * size, len(inputs)))
+    a[:size, size:] = np.eye(size)
+    a[size : size + own] = second[:, : 2 * size]
+    places = [inputs.index(name) for name in (*forces, *drivers)]
+    b[size : size + own, places] = second[:, 2 * size :]
+    for k, name in enumerate(drivers):
+        b[size + own + k, inputs.index(name)] = 1.0
+    names = (*of.coordinates, *drivers)
+    states = (*names, *(f"{name}_d1" for name in names))
+    c, d, measured = _outputs(of, outputs, chosen, (a, b))
+    return StateSpace(a, b, c, d, states, tuple(inputs), measured)
+
+
+def _outputs(
+    of: Linearisation, wanted: tuple[str, ...] | None, drivers: Sequence[int], state: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
+    """Return how outputs and their rates follow from states and inputs, and their names."""
+    r, (a, b) = of._reduction, state
+    size = len(a) // 2
+    place = r.place
+    if (wanted is not None and not wanted) or not place.model.system.outputs:
+        for name in wanted or ():
+            check_name("output", name, (), MechanismError, name="outputs")
+        return np.zeros((0, 2 * size)), np.zeros((0, b.shape[1])), ()
+    found = place.outputs_varied(r.changes)
+    places = place.components([x.shape[1] for x in found])
+    names = _components(of.mechanism, places, wanted)
+    # by the coordinates and the laws of drivers, by their rates, and by their second derivatives
+    lanes = [[*np.arange(r.lanes(k).start, r.lanes(k).stop), *(r.lanes(k, drivers=True).start + x for x in drivers)]
+             for k in range(3)]  # fmt: skip
+    c, d = [], []
+    for name in names:
+        group, component, instance = places[name]
+        for level in range(2):
+            value, rate, second = (found[group][level, component, instance, lanes[k]] for k in range(3))
+            c.append(np.concatenate([value, rate]) + second @ a[size:])
+            d.append(second @ b[size:])
+    labels = tuple(label for name in names for label in (name, f"{name}_d1"))
+    return np.reshape(c, (len(c), 2 * size)), np.reshape(d, (len(d), b.shape[1])), labels
+
+
+def _components(mechanism: Mechanism, places: Any, wanted: tuple[str, ...] | None) -> list[str]:
+    """Return the names of the components of the outputs that are wanted, or raise for one that is not there."""
+    if wanted is None:
+        return list(places)
+    found = []
+    for name in wanted:
+        own = [c for c in places if c == name or (name in mechanism.outputs and c.startswith(f"{name}_"))]
+        if not own:
+            if name in mechanism.outputs:
+                message = "follows from the whole motion, as a force or an energy does; name outputs of poses"
+                raise MechanismError(message, name=f"outputs.{name}")
+            check_name("output", name, (*mechanism.outputs, *places), MechanismError, name="outputs")
+        found += own
+    return found

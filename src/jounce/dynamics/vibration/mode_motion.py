@@ -1,0 +1,76 @@
+"""A mode as a motion to look at: the bodies swing about the equilibrium, large enough to be seen, joints closed."""
+
+import math
+
+import jax
+import numpy as np
+from jaxtyping import Complex, Float
+
+from jounce.dynamics.forward.initial_state import TOLERANCE
+from jounce.dynamics.statics.equilibrium_search import displaced
+from jounce.dynamics.statics.independent_coordinates import Reduction
+from jounce.errors import MechanismError, SolveError
+from jounce.kinematics import Motion, Status
+from jounce.kinematics.assembly.gauss_newton import put_together
+from jounce.kinematics.results.pose_outputs import output_values
+
+
+def mode_motion(
+    reduction: Reduction,
+    shape: Complex[np.ndarray, " coordinate"],
+    amplitude: float,
+    instants: Float[np.ndarray, " time"],
+    name: str,
+) -> Motion:
+    """Return a mode as a motion of order 0, one swing long.
+
+    Parameters
+    ----------
+    reduction : Reduction
+        About an equilibrium.
+    shape : array of shape (coordinates,)
+        Of the mode.
+    amplitude : float
+        Of the body that moves most, rad or sizes of the mechanism.
+    instants : array of shape (time,)
+        Of the motion, s; the last one is a whole swing after the first.
+    name : str
+        Of the mode, for messages.
+
+    Raises
+    ------
+    SolveError
+        If joints cannot be closed so far from the equilibrium.
+    """
+    place = reduction.place
+    columns = reduction.basis @ shape
+    columns = columns * (amplitude / np.abs(columns).max())
+    phases = np.exp(2j * math.pi * np.linspace(0.0, 1.0, len(instants)))
+    moved = np.real(columns[:, None] * phases / 1j)  # a swing begins in the middle
+    model, instant = place.model, float(place.clock[0, 0, 0])
+    changes, shifts = place.changes(moved[None])[0], model.pose_type.shifts
+    still = {key: x[0] for key, x in place.coordinates.items() if key != "angular_velocity"}
+    frames = []
+    for k in range(len(instants)):
+        change = changes[..., k : k + 1]
+        found = displaced(still, change[:shifts], change[shifts:], model.pose_type)
+        coordinates = {key: np.asarray(x) for key, x in found.items()}
+        if model.rows:
+            trial = put_together(model, instant, TOLERANCE, coordinates)
+            if not trial.closed:
+                message = f"{name} cannot be shown with an amplitude of {amplitude:g}: joints stay open; choose less"
+                raise SolveError(message, status=Status.NOT_ASSEMBLED)
+            coordinates = trial.coordinates
+        frames.append(coordinates)
+    whole = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[None], *frames)
+    groups = output_values(model.system.outputs, whole, model.pose_type)
+    status = np.full(len(instants), int(Status.OK))
+    return Motion(place.mechanism, model, instants, 0, (whole, groups), status, {})
+
+
+def checked_amplitude(amplitude: object) -> float:
+    """Return an amplitude, or raise MechanismError."""
+    if isinstance(amplitude, bool) or not isinstance(amplitude, int | float) or not 0 < amplitude <= 1:
+        message = "must be a number above zero and at most 1, rad or sizes of the mechanism"
+        raise MechanismError(message, name="amplitude", value=amplitude)
+    return float(amplitude)

@@ -1,0 +1,209 @@
+"""From an equilibrium, or an instant of a motion, to the equations of small motions about it."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.dynamics.forward.accelerations import Equations
+from jounce.dynamics.masses import gravity_of, masses_of, required_masses
+from jounce.dynamics.motion_values import cut
+from jounce.dynamics.statics.equilibrium_search import BALANCED, Found, remains
+from jounce.dynamics.statics.independent_coordinates import Place, Reduction, reduced, with_joints
+from jounce.dynamics.statics.kinks import kinked
+from jounce.dynamics.statics.robot_states import DRIVE, GivenState, through_state
+from jounce.dynamics.statics.static_equilibrium import Equilibrium, equilibrium
+from jounce.dynamics.statics.variations import clock_at
+from jounce.dynamics.vibration.linearization import Linearisation, named
+from jounce.errors import MechanismError, MobilityError, RobotError, check_name, flag
+from jounce.kinematics import Motion, Status
+from jounce.kinematics.assembly.assemble import freely_moving
+from jounce.mechanism import Mechanism
+from jounce.mechanism.axis_angles import at_lanes
+from jounce.mechanism.preconditions import concrete
+from jounce.modules import with_fields
+from jounce.robot import Robot
+from jounce.shapes import Real, Refused
+
+INSTANT = 1e-9  # of the time between the ends of a motion: an instant as near to one of its own is that one
+
+
+@concrete
+def linearise(
+    subject: Mechanism | Equilibrium | Motion | Robot | Refused,
+    time: Real | None = None,
+    *,
+    coordinates: Sequence[str] | None = None,
+    release: Sequence[str] = (),
+    q: GivenState = None,
+    drives: bool = True,
+) -> Linearisation:
+    """Return the equations of small motions of a mechanism: mass, damping and stiffness matrix, state space, modes.
+
+    They are exact: forces, inertia and constraints are differentiated along changes of the motion, to the second order
+    of the constraints, with what joints bear. Along a motion they hold at one instant.
+
+    Parameters
+    ----------
+    subject : Mechanism, Equilibrium, Motion, Simulation or Robot
+        A mechanism is taken in its `jounce.equilibrium`. All bodies that can move need masses. A robot, with loops or
+        without, is taken as it moves through the state q under the torques that this needs: its coordinates are those
+        of its joints, its inputs what they exert beside these torques.
+    time : float, optional
+        The instant, s: at which a mechanism is held, as for `jounce.equilibrium`; of a simulation, any that it has
+        reached; of another motion, one of its own.
+    coordinates : sequence of str, optional
+        As many as there are degrees of freedom: outputs that are functions of the poses, or their components such as
+        ``C_x``; or coordinates of bodies, ``BODY.x``, ``BODY.y``, ``BODY.angle``, in space ``BODY.x`` to ``BODY.z``
+        along the global axes and ``BODY.turn_x`` to ``BODY.turn_z`` about those of the body. Chosen among the latter
+        unless given, so that they are well independent.
+    release : sequence of str, optional
+        Drivers that do not hold in small motions: their force stays as it is, their coordinates are the first of the
+        coordinates, and what they exert beside that force are the first inputs.
+    q : array_like of shape (n,), or (k, n) with k to 3, or dict of str to float, optional
+        Of a robot: coordinates, their rates and second derivatives; zero unless given.
+    drives : bool, default True
+        Of a robot: count the viscous damping and the armature inertia of the joints. Coulomb friction, which has no
+        slope where a joint moves and holds it where it rests, is left out.
+
+    Returns
+    -------
+    Linearisation
+        With matrices, inputs and modes.
+
+    Raises
+    ------
+    MechanismError
+        If a name or an instant is not valid, coordinates are not independent, a body that can move has no mass, or an
+        applied force has a kink there.
+    MobilityError
+        If nothing can move, or the position is singular.
+    AssemblyError, SolveError
+        As `jounce.equilibrium`.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> small = jn.linearise(jn.load("examples/double_pendulum.yaml"))
+    >>> small.coordinates, (small.modes.angular_frequencies**2 / 9.81).round(12).tolist()  # 2 - sqrt 2, 2 + sqrt 2
+    (('upper.angle', 'lower.angle'), [0.585786437627, 3.414213562373])
+    """
+    about = None
+    if isinstance(subject, Robot):
+        return _of_robot(subject, q, coordinates, flag("drives", drives, error=RobotError))
+    if q is not None:
+        raise MechanismError("is for robots; a mechanism has its own guess", name="q")
+    if isinstance(subject, Mechanism):
+        required_masses(subject, "small motions")
+        subject = equilibrium(subject, time)
+    elif isinstance(subject, Equilibrium) and time is not None:
+        raise MechanismError("an equilibrium has its instant already", name="time", value=time)
+    if isinstance(subject, Equilibrium):
+        required_masses(subject.mechanism, "small motions")
+        about, place = subject, subject.place
+    elif isinstance(subject, Motion):
+        required_masses(subject.mechanism, "small motions")
+        place = place_along(subject, time)
+    else:
+        message = "must be a jn.Mechanism, a jn.Motion, an equilibrium or a jn.Robot"
+        raise MechanismError(message, name="subject", value=subject)
+    released = named("release", release)
+    for name in released:
+        check_name("driver", name, place.mechanism.drivers, MechanismError, name="release")
+    _check_free(place, about, released)
+    wanted = None if coordinates is None else named("coordinates", coordinates)
+    reduction = reduced(place, wanted, released, prefer_outputs=about is not None and about.of_robot)
+    _check(reduction)
+    return Linearisation(reduction, about)
+
+
+def _of_robot(robot: Robot, q: GivenState, coordinates: Sequence[str] | None, drives: bool) -> Linearisation:
+    """Return the equations of small motions of a robot about a state, in the coordinates of its joints."""
+    wanted = None if coordinates is None else named("coordinates", coordinates)
+    place, names = through_state(robot, q, wanted, drives)
+    found = reduced(place, released=[name + DRIVE for name in names], drivers=False)
+    _check(found)
+    return Linearisation(with_joints(found, names), None)
+
+
+def place_along(motion: Motion, time: Real | None) -> Place:
+    """Return a mechanism at an instant of its motion.
+
+    Raises
+    ------
+    MechanismError
+        If the motion has no such instant or failed there, has no accelerations, or is none under its forces.
+    """
+    motion, lane = _at(motion, time)
+    pose_type, coordinates = motion.poses
+    if len(coordinates["position"]) < 3:
+        raise MechanismError(
+            "small motions need a motion solved to order 2 or higher", name="order", value=motion.order
+        )
+    if motion.status[lane] != Status.OK:
+        raise MechanismError("the motion was not solved at this instant", name="time", value=float(motion.time[lane]))
+    lanes, mechanism = np.array([lane]), motion.mechanism
+    found = {name: np.asarray(x)[..., lanes] for name, x in cut(coordinates, 2).items()}
+    system = with_fields(motion.model.system, outputs=(), forces=at_lanes(motion.forces, lanes))
+    equations = Equations(system, masses_of(mechanism), gravity_of(mechanism), 1.0, pose_type)
+    place = Place(mechanism, motion.model, equations, found, clock_at(float(motion.time[lane]), held=False))
+    left = place.free.T @ place.loads.sum(axis=0)
+    if not np.abs(left).max(initial=0.0) <= 1e3 * BALANCED * max(np.abs(place.loads).max(initial=0.0), 1e-300):
+        message = f"does not follow from the forces: {remains(Found(place, left, False))} remains unbalanced"
+        raise MechanismError(message, name="motion", value=motion)
+    return place
+
+
+def _at(motion: Motion, time: Any) -> tuple[Motion, int]:
+    """Return a motion that has an instant, and its index."""
+    if time is None:
+        if len(motion.time) > 1:
+            raise MechanismError("a motion has many instants; name one", name="time")
+        return motion, 0
+    try:
+        instant = float(time)
+    except (TypeError, ValueError):
+        raise MechanismError("must be one instant, in s", name="time", value=time) from None
+    anywhere = getattr(motion, "at", None)  # of a simulation
+    if anywhere is not None:
+        return anywhere([instant], max(motion.order, 2)), 0
+    lane = int(np.argmin(np.abs(motion.time - instant)))
+    if not abs(motion.time[lane] - instant) <= INSTANT * max(np.ptp(motion.time), abs(instant)):
+        message = f"is no instant of this motion, the nearest is {motion.time[lane]:.9g} s; solve for it"
+        raise MechanismError(message, name="time", value=time)
+    return motion, lane
+
+
+def _check_free(place: Place, about: Equilibrium | None, released: Sequence[str]) -> None:
+    """Raise MobilityError where nothing can move, or more than the constraints allow elsewhere."""
+    if about is not None and about.singular:
+        raise MobilityError(f"there are no linear equations of motion: {about.reason}")
+    if not place.free.shape[1] and not released:
+        drivers = ", ".join(place.mechanism.drivers)
+        advice = f"leave a driver out of the equilibrium, or release it ({drivers})" if drivers else "free a joint"
+        raise MobilityError(f"no degree of freedom: joints and drivers hold all bodies, nothing can move; {advice}")
+
+
+def _check(reduction: Reduction) -> None:
+    """Raise MechanismError where a body that can move has no mass, or a force is not smooth."""
+    place, mass = reduction.place, reduction.part(2)
+    even = np.sqrt(np.maximum(np.diag(reduction.noise(2)), 1e-300))
+    values, vectors = np.linalg.eigh((mass + mass.T) / 2 / np.outer(even, even))
+    if values[0] <= 1e-12 * values[-1]:
+        moving = (reduction.basis / even) @ vectors[:, 0]
+        shares = np.abs(moving).reshape(len(place.model.bodies), -1)
+        lacking = [
+            k for k, body in enumerate(place.mechanism.bodies.values()) if body.mass is None or body.inertia is None
+        ]
+        chosen = max(lacking or range(len(shares)), key=lambda k: shares[k].max())
+        body = place.model.bodies[chosen]
+        lacks = "mass" if place.mechanism.bodies[body].mass is None else "inertia"
+        moved = freely_moving(place.model, moving[None])
+        message = f"{moved} can move without moving a mass, so its acceleration is not determined; give it a mass"
+        raise MechanismError(message, name=f"bodies.{body}.{lacks}")
+    if names := kinked(reduction):
+        message = (
+            "the force has a kink or a jump there, or bends within a millionth of the mechanism's size: it cannot "
+            "be linearised; smooth its law, or linearise elsewhere"
+        )
+        raise MechanismError(message, name=f"forces.{names[0]}")

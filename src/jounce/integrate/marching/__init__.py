@@ -1,0 +1,1 @@
+"""Step after step, over jumps and bends of forces and laws."""

@@ -1,0 +1,265 @@
+"""Steps of a simulation, divided where what is differentiated moves faster than the motion itself.
+
+A body at rest, or in even motion, is simulated in steps as long as the span: its series ends, whatever forces would do
+to it. The series by which it changes with a mass or a force does not end, and carries only so far. So each step is
+looked at by how its series changes with the state at its beginning and with each value that is traced, and is divided
+until all of these converge within it.
+"""
+
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.dynamics.forward.accelerations import Equations, State
+from jounce.errors import UnsupportedError
+from jounce.execution.compilation import compiled
+from jounce.integrate.marching.marching import DenseOutput
+from jounce.integrate.marching.smoothness_breaks import Break
+from jounce.integrate.steps.methods import LOWEST_ORDER, evaluated
+from jounce.shapes import Numbers
+
+MOST_STEPS = 2**17
+MOST_DIRECTIONS = 16
+HALVINGS = 17
+FINER = 100.0  # times less is left out of the series of parts than of those of steps, which are fewer
+
+ROUNDS = 3  # each makes a state behind a kink and its instant better by as much as the time to it is short
+
+Expand = Callable[..., State]
+
+
+class Kinks(NamedTuple):
+    """Which pieces lead over kinks.
+
+    Attributes
+    ----------
+    begins : array of shape (steps,)
+        From when on instants belong to a piece, s: behind a kink to the one after it.
+    back : array of bool, shape (steps,)
+        Whether a piece begins behind a kink and goes back to it.
+    velocity, spin : array of shape (steps, components, bodies)
+        Weights of `Break`.
+    """
+
+    begins: Float[np.ndarray, " step"]
+    back: Bool[np.ndarray, " step"]
+    velocity: Float[np.ndarray, "step component body"]
+    spin: Float[np.ndarray, "step component body"]
+
+
+class Pieces(NamedTuple):
+    """Steps, or parts of steps, one after the other.
+
+    Attributes
+    ----------
+    start, length : array of shape (steps,)
+        s; lengths are negative backward in time.
+    state : State
+        At the start of each, (steps, components, bodies).
+    kept : array of bool, shape (steps, order + 1)
+        Which coefficients of the series are used.
+    kinks : Kinks, optional
+        Where there are some.
+    """
+
+    start: Float[np.ndarray, " step"]
+    length: Float[np.ndarray, " step"]
+    state: State
+    kept: Bool[np.ndarray, "step order"]
+    kinks: Kinks | None = None
+
+    def at(self, instants: Float[np.ndarray, " time"]) -> Int[np.ndarray, " time"]:
+        """Return in which of them instants are."""
+        sign = -1.0 if self.length[0] < 0 else 1.0
+        begins = self.start if self.kinks is None else self.kinks.begins
+        found = np.searchsorted(sign * begins, sign * instants, "right") - 1
+        return np.clip(found, 0, len(self.start) - 1)
+
+    def padded(self) -> "Pieces":
+        """Return as many as a power of two, the last again and again with no length: few lengths are compiled."""
+        count = len(self.start)
+        fill = np.minimum(np.arange(1 << (count - 1).bit_length()), count - 1)
+        return self.chosen(fill)._replace(length=np.where(np.arange(len(fill)) < count, self.length[fill], 0.0))
+
+    def chosen(self, which: Int[np.ndarray, " chosen"]) -> "Pieces":
+        """Return some of them."""
+        return jax.tree.map(lambda part: part[which], self)
+
+    def over(self, kinks: dict[int, Break]) -> "Pieces":
+        """Return pieces of which some, by index, go to kinks only, and the next begin behind these all the same.
+
+        So none begins at a kink, where rounding would decide on which side it is. In between are pieces that go back
+        to the kink, where the two sides meet.
+        """
+        if not kinks:
+            return self
+        places = np.array(sorted(kinks))
+        before, first = np.isin(np.arange(len(self.start)), places), np.isin(np.arange(len(self.start)), places + 1)
+        which = np.repeat(np.arange(len(self.start)), np.where(first, 1 + ROUNDS, 1))
+        back = np.append(which[1:] == which[:-1], False)
+        length, begins = self.length.copy(), self.start.copy()
+        remaining, weights = np.zeros(len(length)), [np.zeros(part.shape) for part in self.state[2:]]
+        for place, kink in kinks.items():
+            remaining[place + 1], length[place] = length[place] - kink.since, kink.since
+            begins[place + 1] = self.start[place] + kink.since
+            weights[0][place + 1], weights[1][place + 1] = kink.velocity, kink.spin
+        whole = self._replace(length=length, kept=self.kept | (before | first)[:, None]).chosen(which)
+        over = Kinks(begins[which], back, *(part[which] for part in weights))
+        return whole._replace(length=np.where(back, -remaining[which], whole.length), kinks=over)
+
+
+def divided_steps(
+    dense: DenseOutput,
+    equations: Equations,
+    moving: Sequence[int],
+    length: float,
+    expand: Expand,
+    allowed: float | None,
+    kinks: Collection[Break] = (),
+) -> Pieces:
+    """Return the steps of a simulation, divided so that the series of all changes converge within each.
+
+    Parameters
+    ----------
+    dense : DenseOutput
+        The steps.
+    equations : Equations
+        Of plain numbers.
+    moving : sequence of int
+        Which of their leaves are traced.
+    length : float
+        Size of the mechanism, m.
+    expand : callable
+        Returns the series of the motion through states, from equations, states, instants (1, steps) and the order.
+    allowed : float, optional
+        Error of a step in a change, relative; the steps are not divided unless given.
+    kinks : collection of Break, optional
+        Of forces, that steps go over; these are not divided.
+
+    Raises
+    ------
+    UnsupportedError
+        If there would be too many.
+    """
+    order = dense.polynomial.position.shape[1] - 1
+    leaves = jax.tree.leaves(equations)
+    along, turns = _directions([leaves[k] for k in moving])
+    settings = {"moving": tuple(moving), "order": order, "expand": expand}
+    kept, span = _kept(dense), abs(dense.end - float(dense.start[0]))
+    count = np.ones(len(dense.start), int)
+    while True:
+        found, which = _parts(dense, kept, count)
+        over = {int(np.searchsorted(which, kink.step)): kink for kink in kinks}
+        if allowed is None:
+            return found
+        sizes = _sizes(equations, found.padded(), along, turns, np.asarray(length), **settings)
+        sizes = np.stack(sizes)[..., : len(found.start)]
+        lacking = which[_needed(sizes, found, span, allowed) > 1]
+        lacking = lacking[~np.isin(lacking, [kink.step for kink in kinks])]
+        if not lacking.size:
+            return found.over(over)
+        if not kept[lacking].all():  # a body that hardly moves took a long step of low order: first with all orders
+            kept[lacking] = True
+            continue
+        parts = count.copy()
+        needed = np.where(np.isin(which, lacking), _needed(sizes, found, span, allowed / FINER), 1)
+        np.maximum.at(parts, which, count[which] * needed)
+        if parts.sum() > MOST_STEPS:
+            message = f"changes of this motion are so fast that more than {MOST_STEPS} steps are needed; simulate less"
+            raise UnsupportedError(message, name="time")
+        count = parts
+
+
+def _kept(dense: DenseOutput) -> Bool[np.ndarray, "step order"]:
+    """Return which coefficients steps were taken with: all, where the series ended before it could be cut."""
+    used = np.any([np.any(np.asarray(part) != 0, axis=tuple(range(2, part.ndim))) for part in dense.polynomial], axis=0)
+    orders = np.arange(used.shape[1])
+    last = np.max(np.where(used, orders, 0), axis=1, keepdims=True)
+    return (orders <= last) | (last < LOWEST_ORDER)
+
+
+def _parts(
+    dense: DenseOutput, kept: Bool[np.ndarray, "step order"], count: Int[np.ndarray, " step"]
+) -> tuple[Pieces, Int[np.ndarray, " part"]]:
+    """Return the parts that steps have, and of which step each is."""
+    which = np.repeat(np.arange(len(count)), count)
+    part = np.concatenate([np.arange(number) for number in count])
+    length = np.asarray(dense.length)[which] / count[which]
+    polynomial = dense.polynomial.map(lambda c: np.moveaxis(np.asarray(c)[which], (0, 1), (-1, 0)))
+    state = evaluated(polynomial, part * length).map(lambda x: np.moveaxis(np.asarray(x), -1, 0))
+    return Pieces(np.asarray(dense.start)[which] + part * length, length, state, kept[which]), which
+
+
+def _needed(
+    sizes: Float[np.ndarray, "part order direction step"], pieces: Pieces, span: float, allowed: float
+) -> Int[np.ndarray, " step"]:
+    """Return into how many parts, powers of two, steps are to be divided.
+
+    What is left out of a series is what follows the orders that are kept: the sizes known of it, or, where all are
+    kept, as much less than the last two terms as those are less than the two before. It counts by the largest change,
+    that of velocities over the whole span.
+    """
+    places, velocities = sizes
+    orders = np.arange(len(places))[:, None, None]
+    beyond, whole = ~pieces.kept.T[:, None], pieces.kept.all(axis=1)
+    found = np.full(len(pieces.length), 2**HALVINGS)
+    for parts in 2 ** np.arange(HALVINGS)[::-1]:
+        powers = (np.abs(pieces.length) / parts) ** orders
+        terms = places * powers
+        largest = np.maximum(terms, span * velocities * powers).max(axis=0)
+        last, before = terms[-2:].max(axis=0), terms[-4:-2].max(axis=0)
+        following = last * np.minimum(last / np.maximum(before, 1e-300), 1.0)
+        left_out = np.where(whole, following, np.where(beyond, terms, 0.0).max(axis=0))
+        found[(left_out <= allowed * largest).all(axis=0)] = parts
+    return found
+
+
+def _directions(numbers: Sequence[Any]) -> tuple[list[np.ndarray], np.ndarray]:
+    """Return in which directions values change, (directions, ...) each, and by how much the state does in these.
+
+    Some values change at a time, by random numbers, and last the state alone.
+    """
+    random = np.random.default_rng(0)
+    count = min(len(numbers), MOST_DIRECTIONS)
+    chosen = np.eye(count + 1)[:, np.arange(len(numbers)) % max(count, 1)]
+    return [
+        random.normal(size=np.shape(x)) * chosen[:, k].reshape(-1, *[1] * np.ndim(x)) for k, x in enumerate(numbers)
+    ], np.eye(count + 1)[count]
+
+
+@compiled("moving", "order", "expand")
+def _sizes(
+    equations: Equations,
+    pieces: Pieces,
+    along: list[Numbers],
+    turns: Float[Numbers, " direction"],
+    length: Float[Numbers, ""],
+    *,
+    moving: tuple[int, ...],
+    order: int,
+    expand: Expand,
+) -> tuple[Numbers, Numbers]:
+    """Return the sizes of the series of changes, of places and of velocities: (order + 1, directions, steps) each."""
+    leaves, structure = jax.tree.flatten(equations)
+    state = pieces.state.map(lambda part: jnp.moveaxis(part, 0, -1))
+
+    def series(numbers: Any, state: State) -> Any:
+        whole = list(leaves)
+        for k, number in zip(moving, numbers, strict=True):
+            whole[k] = number
+        found = expand(jax.tree.unflatten(structure, whole), state, pieces.start[None], order)
+        scaled = found._replace(position=found.position / length, velocity=found.velocity / length)
+        flat = scaled.map(lambda part: part.reshape(order + 1, -1, len(pieces.start)))
+        return jnp.concatenate(flat[:2], axis=1), jnp.concatenate(flat[2:], axis=1)
+
+    def change(along: Any, turn: Any) -> Any:
+        moved = jax.tree.map(lambda x: turn * jnp.ones_like(x), state)
+        numbers = [jnp.asarray(leaves[k], float) for k in moving]
+        changes = jax.jvp(series, (numbers, state), (along, moved))[1]
+        return tuple(jnp.max(jnp.abs(x), axis=1) for x in changes)
+
+    return jax.vmap(change, out_axes=1)(along, turns)

@@ -1,0 +1,134 @@
+"""Events of robots: instants at which a joint, a rate of it, or a function of the state crosses a value."""
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import RobotError, check_name
+from jounce.execution.chunks import in_chunks
+from jounce.integrate.marching.robot_marching import RobotSteps
+from jounce.integrate.steps.events import EDGE, INTERPOLATION, NODES, WIDTHS, crossings
+from jounce.jet.compose import OfSample
+from jounce.robot.model.arguments import whole_number
+from jounce.robot.robot import Robot
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class JointEvent:
+    """A crossing of a value by a joint of a robot, by one of its derivatives, or by a function of the state.
+
+    What begins at the value, or touches it and turns back, does not cross it.
+
+    Parameters
+    ----------
+    of : str or callable
+        Name of a joint; or a function of time, q and rates, of one sample, by operations of JAX, that returns a number.
+    value : float, default 0
+        That is crossed.
+    derivative : int, default 0
+        Of a joint: which time derivative crosses it, up to 4; 1 with value 0 finds turning points.
+    direction : int, default 0
+        1 for rising crossings only, -1 for falling ones, 0 for both; as time goes on, also in a run backward.
+    terminal : bool, default False
+        Whether the simulation ends at the first crossing.
+
+    Raises
+    ------
+    RobotError
+        If a value is not valid.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.JointEvent("shoulder", 0.5, direction=1).terminal
+    False
+    """
+
+    of: str | Callable[..., Any]
+    value: float = 0.0
+    derivative: int = 0
+    direction: int = 0
+    terminal: bool = False
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.of, str) or callable(self.of)):
+            raise RobotError(
+                "must be the name of a joint, or a function of time, q and rates", name="of", value=self.of
+            )
+        if not (isinstance(self.value, int | float) and math.isfinite(self.value)):
+            raise RobotError("must be a finite number", name="value", value=self.value)
+        whole_number("derivative", self.derivative, most=0 if callable(self.of) else 4, error=RobotError)
+        if self.direction not in (-1, 0, 1):
+            raise RobotError("must be -1, 0 or 1", name="direction", value=self.direction)
+
+
+class JointEventDetector:
+    """The crossings of one event along a run, of which the steps come piece by piece."""
+
+    def __init__(self, event: JointEvent, robot: Robot):
+        self._function: OfSample | None = None
+        if isinstance(event.of, str):
+            check_name("moving joint", event.of, robot.joint_names, RobotError, name="events.of")
+        else:
+            n, function = len(robot.joint_names), event.of
+            state = jnp.zeros(()), jnp.zeros(n), jnp.zeros(n)
+            self._function = OfSample.of(function, *state)
+            if self._function.shape != ():
+                message = f"the function must return one number, not the shape {self._function.shape}"
+                raise RobotError(message, name="events.of")
+        self.event, self._names = event, robot.joint_names
+        self._last = math.nan, 0.0  # time and sense of the last crossing in either direction
+        self._begun = False
+
+    def _values(self, steps: RobotSteps) -> np.ndarray:
+        """Return the quantity at the nodes of steps, less the value, (steps, nodes)."""
+        since = steps.length[:, None] * NODES
+        derivative = self.event.derivative
+        if isinstance(self.event.of, str):
+            of = np.asarray(steps.polynomial.coordinates)[:, :, self._names.index(self.event.of)]
+            return _at(of, since, derivative)
+        parts = [np.moveaxis(np.asarray(part), -1, 0) for part in steps.polynomial[:2]]
+        q, rates = (np.stack([_at(x, since, 0) for x in part], axis=-1) for part in parts)
+        time = steps.start[:, None] + since
+        n = len(self._names)
+        given = time.ravel(), q.reshape(-1, n).T, rates.reshape(-1, n).T
+
+        def chunk(lanes: np.ndarray) -> Any:
+            return _at_samples(self._function, *(x[..., lanes] for x in given))
+
+        found = in_chunks(chunk, time.size, WIDTHS)
+        return np.asarray(found).reshape(time.shape)
+
+    def detect(self, steps: RobotSteps) -> list[tuple[int, float]]:
+        """Return the crossings in the next steps, each as the number of the step and the time from its beginning."""
+        values, found = self._values(steps) - self.event.value, []
+        for k, coefficients in enumerate(values @ INTERPOLATION.T):
+            for root, sense in crossings(coefficients, first=k == 0 and not self._begun):
+                length = steps.length[k]
+                after, rising = float(root * length), float(sense * np.sign(length))
+                again = self._last[1] == rising and abs(steps.start[k] + after - self._last[0]) < 2 * EDGE * abs(length)
+                self._last = float(steps.start[k] + after), rising
+                if not again and self.event.direction * rising >= 0:
+                    found.append((k, after))
+        self._begun = True
+        return found
+
+
+@jax.jit
+def _at_samples(function: OfSample | None, time: Any, q: Any, rates: Any) -> Any:
+    """Return the values of a function of the state at samples, which stand last."""
+    assert function is not None
+    return function(time, q, rates)
+
+
+def _at(coefficients: np.ndarray, since: np.ndarray, derivative: int) -> np.ndarray:
+    """Return values of a derivative of polynomials, (steps, order + 1), at times from their beginnings."""
+    found = np.zeros_like(since)
+    for k in range(coefficients.shape[1] - 1, derivative - 1, -1):
+        found = found * since + (coefficients[:, k] * math.perm(k, derivative))[:, None]
+    return found

@@ -1,0 +1,312 @@
+"""Marching through time: steps chosen, taken, projected, checked, and kept as polynomials."""
+
+import enum
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Indices, Lanes, State, expand, inverted
+from jounce.execution.compilation import compiled
+from jounce.integrate.steps.energy_balance import (
+    Balance,
+    begun,
+    energies,
+    followed as follow_balance,
+    is_balanced,
+    unknown,
+)
+from jounce.integrate.steps.lookahead import (
+    FINEST,
+    HARMLESS,
+    SHORTEST,
+    Lookahead,
+    finest,
+    look_ahead,
+    mobility_of,
+    steps_counted,
+)
+from jounce.integrate.steps.methods import MARGIN, NEEDED, AbstractMethod, Number, near_singular
+from jounce.integrate.steps.projection import projected
+from jounce.integrate.steps.revolution_counts import AnglesOfForces, followed, measured
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.shapes import Numbers
+
+SMALLEST_STEP = FINEST / 8.0  # of the span, or of the time itself
+REFUSED = 0.45  # of a step that was refused is tried next: no power of two, or it would end where others have ended
+SHORT = 1.0 / 4.0  # of the longest step so far: shorter ones leave out as much less
+STUCK = 64  # steps that hardly move on, one after the other: a force that switches without end
+STUBBORN = 3  # steps refused one after the other: no series that is only too short for its step needs so many
+
+
+class Outcome(enum.IntEnum):
+    """What became of a run."""
+
+    RUNNING = 0
+    ARRIVED = 1
+    COLLAPSED = 2  # steps became too small to move on
+    LOST = 3  # the motion is not finite from the start
+    UNEXPANDED = 4  # the motion is to be expanded at the start, by the first of the steps tried
+    UNBALANCED = 5  # the energy would change, though nothing takes or gives any
+
+
+MOVING = np.array([Outcome.RUNNING, Outcome.UNEXPANDED])
+
+
+class IntegratorState(NamedTuple):
+    """How far a batch of runs has come."""
+
+    time: Lanes  # s
+    rest: Lanes  # what the time is greater by than that number, which is rounded, s
+    expansion: Expansion
+    refused: Indices  # number of steps refused from here, one after the other
+    outcome: Indices  # see Outcome
+    drift: Lanes  # largest distance from the constraints before a projection, rad or sizes of the mechanism
+    begun: Lanes  # when the runs began, s
+    mobility: Float[Numbers, "body batch"]  # how readily forces move the bodies here, as `mobility_of` gives it
+    singular: Flags  # whether the equations of motion are near to singular here
+    blocked: Indices  # index of the force or law over which no step is possible from here, or -1
+    angles: AnglesOfForces  # about axes, that forces measure here, with their turns, rad, as `measured` gives them
+    longest: Lanes  # step so far, s
+    crossing: Indices  # number of steps, one after the other, too short to matter, over what is not known
+    short: Indices  # number of steps one after the other that hardly move on, whatever they lead over
+    balance: Balance  # of the energy, where that is to be kept
+
+
+class DenseOutput(NamedTuple):
+    """Steps one after the other, as polynomials; while they are taken, the batch is the last axis.
+
+    Attributes
+    ----------
+    start, length : array of shape (steps,)
+        s; lengths are negative backward in time.
+    polynomial : State
+        Coefficients in the time from the start, (steps, order + 1, components, bodies).
+    kink : array of int, shape (steps,)
+        Index of a force or law that is not resolved over a step, which is too short to matter, or -1: `watched_names`.
+    angles : tuple of array of shape (steps, instances)
+        About axes at the start, rad, for each group of forces that measures some.
+    """
+
+    start: Float[Any, "steps *batch"]
+    length: Float[Any, "steps *batch"]
+    polynomial: State
+    kink: Int[Any, "steps *batch"]
+    angles: tuple[Float[Any, "steps instance *batch"], ...]
+
+    @property
+    def end(self) -> float:
+        """Where the last step ends, s."""
+        return float(self.start[-1] + self.length[-1])
+
+
+def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -> IntegratorState:
+    """Return what `begin_march` does, but for the expansion, which is left to `march`: there is nothing to compile.
+
+    The arrays are of NumPy, but for angles about axes.
+    """
+    *_, bodies, lanes = state.position.shape
+    size, columns = equations.system.shape
+    series = state.map(lambda known: np.concatenate([known[None], np.zeros((order, *known.shape))]))
+    rates = np.zeros((1, columns // bodies, bodies, lanes)), np.zeros((1, size, lanes))
+    opening, none = (np.full(time.shape, value) for value in (int(Outcome.UNEXPANDED), -1))
+    nothing = np.zeros(time.shape)
+    known = np.zeros((bodies + 1, lanes)), np.zeros(time.shape, bool)
+    angles = _measured(equations, state) if any(map(measures_angle, equations.system.forces)) else ()
+    expansion, refused = Expansion(series, *rates), np.zeros(time.shape, int)
+    count = np.zeros(time.shape, int)
+    counts = nothing, count, count, unknown(nothing)
+    return IntegratorState(time, nothing, expansion, refused, opening, nothing, time, *known, none, angles, *counts)
+
+
+@compiled(narrow=True, alone=True)
+def _measured(equations: Equations, state: State) -> AnglesOfForces:
+    return measured(equations, state)
+
+
+@compiled("order")
+def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) -> IntegratorState:
+    """Return the start of runs from states on the constraints.
+
+    Angles about axes have the turns of what they are near to in the equations.
+    """
+    angles = measured(equations, state)
+    equations = equations.near(angles)
+    inverse = inverted(equations.factored(state, time[None]))
+    expansion = _kept(expand(equations, state, time[None], order, inverse))
+    outcome = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
+    none, nothing = jnp.full(time.shape, -1), jnp.zeros(time.shape)
+    known = mobility_of(equations, inverse), near_singular(equations, inverse)
+    count = jnp.zeros(time.shape, int)
+    began = time, nothing, expansion, count, outcome, nothing, time
+    balanced = is_balanced(equations, state, time[None])
+    balance = begun(energies(equations, state, time[None])) if balanced else unknown(nothing)
+    return IntegratorState(*began, *known, none, angles, nothing, count, count, balance)
+
+
+def _is_one(_: Equations, current: IntegratorState, *__: Any, **___: Any) -> bool:
+    """Tell whether there is one run."""
+    return len(current.time) == 1
+
+
+@compiled("count", "keep", alone=_is_one)
+def march(
+    equations: Equations,
+    current: IntegratorState,
+    stop: Number,
+    tolerance: Number,
+    longest: Float[Numbers, "*batch"],
+    *,
+    method: AbstractMethod,
+    count: int,
+    keep: bool = True,
+) -> tuple[IntegratorState, tuple[DenseOutput, Bool[Numbers, "steps batch"]] | None, Int[Numbers, ""]]:
+    """Take up to `count` steps towards a time, all runs of a batch side by side.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the mechanism.
+    current : IntegratorState
+        Where to go on from.
+    stop : float
+        Where to go, s; steps end there exactly.
+    tolerance : float
+        Of the error of a step, rad or sizes of the mechanism.
+    longest : float
+        Largest step, s.
+    method : AbstractMethod
+        How steps are taken.
+    count : int
+        Steps to try at most.
+    keep : bool, default True
+        Whether to return the steps, for dense output.
+
+    Returns
+    -------
+    current : IntegratorState
+    steps : tuple of DenseOutput and array of bool, shape (steps, batch), or None
+        Steps tried, in the order of trial, and whether they were taken.
+    tried : int
+        How many of them there are.
+    """
+    length = equations.system.column_scale[0]
+    order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
+    here = current.expansion.state.map(lambda part: part[0])
+    keeps = method.controlled and is_balanced(equations, here, current.time[None])
+
+    def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
+        left = stop - current.time - current.rest
+        usual = SHORT * current.longest
+        start, reach, allowed = method.prepared(current.expansion, length, tolerance, current.singular, usual)
+        wished = jnp.minimum(reach, jnp.minimum(longest, jnp.abs(left)))
+        step = wished * REFUSED ** current.refused.astype(float)
+        look = Lookahead(jnp.sign(left) * step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), current.blocked)
+        angles = followed(equations, current.angles, start.state, look.step)
+        span = jnp.abs(stop - current.begun)
+        if method.controlled:
+            limits = span, allowed, finest(span, current.time, current.crossing + current.refused)
+            look = look_ahead(equations, start.state, angles, current.mobility, current.time, look.step, *limits)
+        suspect = (look.kink >= 0) & (jnp.abs(look.step) < step) | (current.refused >= STUBBORN)
+        step = jnp.abs(look.step)
+        last = step >= 0.999 * jnp.abs(left)  # no sliver of a step at the end
+        step = jnp.where(last, left, jnp.sign(left) * step)
+        since = step + current.rest
+        time = jnp.where(last, stop, current.time + since)
+        rest = jnp.where(last, 0.0, since - (time - current.time))
+        running, opening = (current.outcome == int(x) for x in (Outcome.RUNNING, Outcome.UNEXPANDED))
+        step = jnp.where(running, step, 0.0)
+        time, rest = (jnp.where(running, x, y) for x, y in ((time, current.time), (rest, current.rest)))
+
+        there = equations.near(angles.at(step))
+        arrived = method.arrive(there, start, current.time, step)
+        state, distance, inverse = projected(there, arrived, time[None])
+        state = jax.tree.map(lambda a, b: jnp.where(opening, a, b), arrived, state)  # it is on the constraints already
+        expansion = _kept(expand(there, state, time[None], order, inverse))
+        error = method.error(start, expansion, step, length)
+        good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.resolved
+        if method.controlled:
+            kick = 0.5 * order * (order + 1) * error
+            good = good & ~(suspect & _lasting(kick, step, span, MARGIN * allowed, current))
+        balanced, balance = jnp.ones(step.shape, bool), current.balance
+        if keeps:
+            found = energies(there, state, time[None])
+            kick = MARGIN * allowed * order / jnp.maximum(wished, 1e-300)
+            leeway = kick * length * jnp.sqrt(equations.scale * bodies)
+            balance, balanced = follow_balance(current.balance, found, leeway)
+            balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), begun(found), balance)
+            good = good & balanced
+        tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(current.time), jnp.abs(stop - current.time))
+        polynomial = method.polynomial(start, expansion, step)
+        steps = DenseOutput(current.time, step, polynomial, look.kink, current.angles), good
+        outcome = jnp.where(good & last, int(Outcome.ARRIVED), current.outcome)
+        broken = current.balance.broken | (running & ~balanced)
+        stopped = jnp.where(~broken, int(Outcome.COLLAPSED), int(Outcome.UNBALANCED))
+        outcome = jnp.where(running & ((~good & tiny) | (current.short >= STUCK)), stopped, outcome)
+        opened = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
+        outcome = jnp.where(opening, opened, outcome)
+        drift = jnp.where(opening, current.drift, jnp.maximum(current.drift, distance))
+        known = mobility_of(equations, inverse), near_singular(equations, inverse)
+        fresh, reached = jnp.zeros_like(current.refused), measured(there, state)
+        farthest = jnp.where(reach > longest, jnp.minimum(jnp.minimum(reach, longest / SHORT), span), jnp.abs(step))
+        farthest = jnp.maximum(current.longest, farthest)
+        crossing = steps_counted(current.crossing, step, span, look.kink >= 0)
+        short = steps_counted(current.short, step, span)
+        balance = balance._replace(broken=balance.broken & (short > 0))
+        reaching = time, rest, expansion, fresh, outcome, drift, current.begun
+        ahead = jnp.where(look.limiting >= 0, look.limiting, current.blocked)
+        ahead = jnp.where(short > 0, ahead, -1)
+        onwards = IntegratorState(*reaching, *known, ahead, reached, farthest, crossing, short, balance)
+        blocked = jnp.where(look.resolved, current.blocked, look.limiting)
+        refused = current._replace(refused=current.refused + 1, outcome=outcome, blocked=blocked)
+        refused = refused._replace(balance=current.balance._replace(broken=broken))
+        return jax.tree.map(lambda a, b: jnp.where(good | opening, a, b), onwards, refused), steps
+
+    def unfinished(carry: Any) -> Any:
+        current, _, tried = carry
+        return jnp.any(jnp.isin(current.outcome, MOVING)) & (tried < count)
+
+    def iterate(carry: Any) -> Any:
+        current, kept, tried = carry
+        current, steps = attempt(current)
+        if keep:
+            kept = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), kept, steps)
+        return current, kept, tried + 1
+
+    kept = _blank(method, current, count) if keep else None
+    start = (current, kept, 0)
+    return jax.lax.while_loop(unfinished, iterate, start)
+
+
+def _blank(
+    method: AbstractMethod, current: IntegratorState, count: int
+) -> tuple[DenseOutput, Bool[Numbers, "steps batch"]]:
+    """Return room for steps and whether they were taken."""
+    time, expansion = current.time, current.expansion
+    polynomial = jax.eval_shape(method.polynomial, expansion, expansion, time)
+    room = DenseOutput(time, time, polynomial, current.blocked, current.angles), current.singular
+    return jax.tree.map(lambda part: jnp.zeros((count, *part.shape), part.dtype), room)
+
+
+def _lasting(kick: Lanes, step: Lanes, span: Lanes, bound: Lanes, current: IntegratorState) -> Flags:
+    """Tell where a kink at the beginning of a step kicks bodies so that they move by more than is harmless in the run.
+
+    What is left of it in the accelerations at the end is no next term of a series there: `kick` is the displacement
+    within the step of accelerations that are wrong all along it.
+    """
+    span = jnp.maximum(span, jnp.abs(step))
+    moved = kick * span / jnp.maximum(jnp.abs(step), SHORTEST * span)
+    return (moved > jnp.maximum(bound, HARMLESS)) & (jnp.abs(step) > SHORTEST * span) & ~current.singular
+
+
+def _kept(expansion: Expansion) -> Expansion:
+    """Return an expansion without what steps do not need."""
+    return expansion._replace(acceleration=expansion.acceleration[:1], multipliers=expansion.multipliers[:1])
+
+
+def _finite(expansion: Expansion) -> Flags:
+    needed = [x[:NEEDED] for x in jax.tree.leaves(expansion)]
+    parts = [jnp.all(jnp.isfinite(x.reshape(-1, x.shape[-1])), axis=0) for x in needed]
+    return jnp.all(jnp.stack(parts), axis=0)

@@ -1,0 +1,377 @@
+"""Steps of a robot in joint coordinates: Taylor series of its motion, each looked at along its way before it is taken.
+
+There are no constraints, so that nothing is projected. What a series cannot know, a pulse or a jump of a force ahead,
+shows where the equations of motion give other accelerations on the way than the series: a step ends before it.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Bool, Float, Int
+
+from jounce.execution.compilation import compiled
+from jounce.integrate.marching.marching import SHORT as UNUSUAL, Outcome
+from jounce.integrate.steps.lookahead import HARMLESS, NEAR, POINTS, SHORTEST, SPAN_POINTS, finest, steps_counted
+from jounce.integrate.steps.methods import MARGIN, NEEDED, ROUNDING, Lanes, furthest
+from jounce.jet.series import Recursion
+from jounce.modules import Module
+from jounce.robot.algorithms.motion_series import MotionSeries, motion_series
+from jounce.robot.algorithms.wrench_laws import WrenchLaws
+from jounce.robot.model.joint_laws import AbstractJointLaws
+from jounce.robot.recursions.tree_equations import TreeEquations, TreeState, Unknowns, free_base
+from jounce.shapes import Numbers
+
+STUCK = 64  # steps that hardly move on, one after the other: a force that switches without end
+AGAIN = 10  # such steps over a jump that end where there is no number: others are tried
+SHORT = 1e-5  # of the step that the series alone would allow
+STEEP = 1e-3  # of that step: a force that cuts it shorter may jump
+UNSEEN = (
+    1e-12  # rad or sizes of the robot: what is overlooked on a step may move a joint by this; beside a jump by less
+)
+NOISE = 32.0  # times what the equations miss where the series begins is rounding on the way too
+
+
+class RobotState(NamedTuple):
+    """Where a robot is and how it moves, or the coefficients of that, order first; the batch is last.
+
+    Attributes
+    ----------
+    coordinates, rates : array of shape (n, batch)
+        rad or m, and by s.
+    position, quaternion, twist : array of shape (3 or 4 or 6, batch), or None
+        Of a free base, as in `BaseMotion`.
+    """
+
+    coordinates: Any
+    rates: Any
+    position: Any = None
+    quaternion: Any = None
+    twist: Any = None
+
+
+class RobotProblem(Module):
+    """What moves a robot.
+
+    Attributes
+    ----------
+    equations : TreeEquations
+        Of the tree.
+    forces : AbstractJointLaws
+        Of its joints.
+    prescribed : AbstractJointLaws
+        Coordinates of driven joints; only their second derivatives count here.
+    scale : array of shape (n,)
+        What counts as one in a coordinate: 1 rad, or the size of the robot.
+    length : float
+        Size of the robot, m.
+    wrenches : WrenchLaws
+        That act on its links.
+    """
+
+    equations: TreeEquations
+    forces: AbstractJointLaws
+    prescribed: AbstractJointLaws
+    scale: Float[Numbers, " n"]
+    length: Float[Numbers, ""] | float
+    wrenches: WrenchLaws = WrenchLaws(())
+
+    @property
+    def blind(self) -> bool:
+        """Whether nothing of it could be overlooked: no law changes."""
+        return not (self.forces.changing or self.prescribed.changing or self.wrenches.changing)
+
+    def motion(self, state: RobotState) -> TreeState:
+        """Return where all bodies are."""
+        base = None
+        if state.position is not None:
+            base = free_base(state.position, state.quaternion, state.twist)
+        return self.equations.motion(state.coordinates, state.rates, base)
+
+    def applied(self, motion: TreeState, time: Float[Numbers, "1 batch"]) -> tuple[Unknowns, tuple[Any, ...]]:
+        """Return the forces and the wrenches in a state; what drives a joint is what it takes."""
+        free = 1.0 - jnp.asarray(self.equations.driven)[:, None]
+        forces = free * self.forces(time, motion.coordinates, motion.rates)
+        pushes = self.wrenches(time[0], motion.coordinates, motion.rates)
+        return Unknowns(forces, None if motion.base is None else jnp.zeros_like(motion.base.twist)), pushes
+
+    def series(self, state: RobotState, time: Float[Numbers, "1 batch"], order: int) -> MotionSeries:
+        """Return the series of the motion; the order is that of the accelerations."""
+        ticking = jnp.concatenate([time[None], jnp.ones((1, *time.shape)), jnp.zeros((max(order - 1, 0), *time.shape))])
+        driven = self._prescribed_accelerations(state, time, order)
+        return motion_series(self.equations, self.motion(state), self.applied, ticking[: order + 1], driven, order)
+
+    def prescribed_series(self, like: Any, time: Any, order: int) -> Any:
+        """Return the series of the prescribed coordinates, zero for the others, (order + 1, n, batch)."""
+        start = jnp.broadcast_to(jnp.zeros_like(like), (order + 1, *like.shape))
+        if not self.prescribed.changing:
+            return start.at[0].set(self.prescribed(time, like, like))
+        recursion = Recursion(lambda t: self.prescribed(t, jnp.zeros_like(like), jnp.zeros_like(like)), (time,), order)
+        if not order:
+            return start.at[0].set(recursion.outputs)
+
+        def level(k: Any, carry: Any) -> Any:
+            history, found = carry
+            ticks = jnp.where(k == 1, jnp.ones_like(time), jnp.zeros_like(time))
+            newest, history = recursion.advanced(history, k, (ticks,))
+            return history, jax.lax.dynamic_update_index_in_dim(found, newest, k, 0)
+
+        first = recursion.history, start.at[0].set(recursion.outputs)
+        return jax.lax.fori_loop(1, order + 1, level, first)[1]
+
+    def _prescribed_accelerations(self, state: RobotState, time: Any, order: int) -> Any:
+        if not self.prescribed.changing:
+            return jnp.zeros((order + 1, *state.coordinates.shape))
+        places = self.prescribed_series(state.coordinates, time, order + 2)
+        numbers = jnp.arange(1.0, order + 2)
+        return places[2:] * (numbers * (numbers + 1.0))[:, None, None]
+
+    def departures(self, state: RobotState, rates: RobotState, time: Any) -> tuple[Any, Any]:
+        """Return by how much the equations give other accelerations than a path, and how large those are, in its sizes.
+
+        Both of shape (n + 6 or n, batch).
+        """
+        motion = self.motion(state)
+        trial = Unknowns(rates.rates, rates.twist)
+        if self.prescribed.changing:  # what is prescribed is no matter of the equations
+            driven = self._prescribed_accelerations(state, time, 0)[0]
+            mask = jnp.asarray(self.equations.driven)[:, None]
+            gap = mask * (driven - rates.rates)
+            trial = trial._replace(joints=trial.joints + gap)
+        else:
+            gap = jnp.zeros_like(rates.rates)
+        forces, pushes = self.applied(motion, time)
+        missing = jax.tree.map(jnp.subtract, forces, self.equations.needed(motion, trial, pushes))
+        change = self.equations.factored(motion).solve(missing)
+        parts, scales = [change.joints + gap], [jnp.asarray(self.scale)[:, None]]
+        sizes = [rates.rates]
+        if change.base is not None:
+            parts.append(change.base)
+            sizes.append(rates.twist)
+            scales.append(jnp.where(jnp.arange(6.0)[:, None] < 3, self.length, 1.0))
+        scale = jnp.concatenate(scales)
+        return jnp.concatenate(parts) / scale, jnp.concatenate(sizes) / scale
+
+
+class RobotSteps(NamedTuple):
+    """Steps one after the other, as polynomials in the time from their beginnings, (steps, order + 1, n)."""
+
+    start: Float[Any, " steps"]
+    length: Float[Any, " steps"]
+    polynomial: RobotState
+    kink: Bool[Any, " steps"]  # whether a jump lies in a step, which is too short to matter
+
+    @property
+    def end(self) -> float:
+        """Where the last step ends, s."""
+        return float(self.start[-1] + self.length[-1])
+
+
+class Progress(NamedTuple):
+    """How far a run has come."""
+
+    time: Lanes  # s, of shape (1,)
+    state: RobotState
+    outcome: Int[Numbers, ""]
+    stuck: Int[Numbers, ""]  # steps of no length one after the other
+    crossing: Int[Numbers, ""]  # steps over a jump one after the other
+    rest: Lanes  # what the time is greater by than that number, which is rounded, s
+    longest: Lanes  # step so far, s
+
+
+def polynomial_of(series: MotionSeries) -> RobotState:
+    """Return the coefficients of a series as those of a state."""
+    motion = series.motion
+    if motion.base is None:
+        return RobotState(motion.coordinates, motion.rates)
+    return RobotState(motion.coordinates, motion.rates, motion.base.position, motion.base.quaternion, motion.base.twist)
+
+
+def at(polynomial: RobotState, since: Lanes) -> RobotState:
+    """Return the values of polynomials, with a quaternion of unit length, at times from their beginnings."""
+    state = jax.tree.map(lambda c: _value(c, since), polynomial)
+    if state.quaternion is None:
+        return state
+    return state._replace(quaternion=state.quaternion / jnp.sqrt(jnp.sum(state.quaternion**2, axis=0, keepdims=True)))
+
+
+def rates_at(polynomial: RobotState, since: Lanes) -> RobotState:
+    """Return the values of the derivatives of polynomials."""
+
+    def rate(c: Any) -> Any:
+        return _value(c[1:] * jnp.arange(1.0, len(c))[:, None, None], since)
+
+    return jax.tree.map(rate, polynomial)
+
+
+def _value(coefficients: Any, since: Any) -> Any:
+    """Return values of polynomials by a loop over the orders: what is compiled is to stay small."""
+    count = len(coefficients)
+    shape = (coefficients.shape[1], jnp.broadcast_shapes(coefficients.shape[2:], since.shape)[0])
+
+    def added(k: Any, value: Any) -> Any:
+        c = jax.lax.dynamic_index_in_dim(coefficients, count - 1 - k, 0, keepdims=False)
+        return value * since[None] + c
+
+    return jax.lax.fori_loop(0, count, added, jnp.zeros(shape))
+
+
+def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:
+    """Return the sizes of the coefficients of places from order one on, rad or sizes of the robot."""
+    levels = len(polynomial.rates)
+    numbers = jnp.arange(1.0, levels + 1)[:, None]
+    scale = jnp.asarray(problem.scale)[None, :, None]
+    found = jnp.max(jnp.abs(polynomial.rates) / scale, axis=1, initial=0.0) / numbers
+    if polynomial.position is None:
+        return found
+    moved = jnp.max(jnp.abs(polynomial.position[1:]), axis=1) / problem.length
+    turned = 2.0 * jnp.max(jnp.abs(polynomial.quaternion[1:]), axis=1)
+    twist = jnp.max(jnp.abs(polynomial.twist[:, 3:]), axis=1) / numbers
+    found = jnp.maximum(found, twist)
+    return jnp.concatenate([jnp.maximum(found[:-1], jnp.maximum(moved, turned)), found[-1:]])
+
+
+@compiled("order", "count")
+def march_robot(
+    problem: RobotProblem,
+    current: Progress,
+    begun: Any,
+    stop: Any,
+    tolerance: Any,
+    longest: Any,
+    *,
+    order: int,
+    count: int,
+) -> tuple[Progress, RobotSteps, Int[Numbers, ""]]:
+    """Take up to `count` steps towards a time.
+
+    Parameters
+    ----------
+    problem : RobotProblem
+        What moves the robot.
+    current : Progress
+        Where to go on from.
+    begun, stop : float
+        The run, s; steps end at its end exactly.
+    tolerance : float
+        Of the error of a step, rad or sizes of the robot.
+    longest : float
+        Largest step, s.
+    order : int
+        Of the series.
+    count : int
+        Steps at most.
+
+    Returns
+    -------
+    current : Progress
+    steps : RobotSteps
+        With room for `count` of them.
+    taken : int
+        How many there are.
+    """
+    span = jnp.abs(stop - begun)
+
+    def look(polynomial: RobotState, time: Any, step: Any, first: Any, usual: Any) -> tuple[Any, Any]:
+        """Return the error that a part of the places on a step shows, as part of what is allowed, and if it is finite.
+
+        A velocity that is wrong goes on to the end of the run, so that jumps count by what they move until then. What
+        the equations miss at the beginning, where the series follows from them, is rounding.
+        """
+        places = jnp.maximum(_places(step), POINTS)
+        shares = jnp.concatenate([jnp.zeros(1), (first + jnp.arange(1.0, POINTS + 1)) / places])
+        since = jnp.minimum(shares, 1.0) * step
+        state, rates = at(polynomial, since), rates_at(polynomial, since)
+        gap, size = problem.departures(state, rates, (time + since)[None])
+        rounding = NOISE * jnp.max(jnp.abs(gap[:, 0])) + ROUNDING * jnp.max(jnp.abs(size))
+        largest = jnp.maximum(jnp.max(jnp.abs(gap[:, 1:])) - rounding, 0.0)
+        local = largest * step**2 / (order * (order + 1.0)) / (MARGIN * tolerance)
+        harmless = jnp.clip(UNSEEN * jnp.abs(step) / (STEEP * usual), HARMLESS, UNSEEN)
+        lasting = largest * jnp.abs(step) * span / jnp.maximum(tolerance, harmless)
+        return jnp.maximum(local, lasting), jnp.all(jnp.isfinite(gap))
+
+    def _places(step: Any) -> Any:
+        return float(POINTS) if problem.blind else jnp.maximum(SPAN_POINTS * jnp.abs(step) / span, POINTS)
+
+    def fits(polynomial: RobotState, time: Any, step: Any, usual: Any) -> tuple[Any, Any, Any]:
+        """Tell whether a step keeps to the equations all along, whether it is finite, and whether it leads over a jump.
+
+        Nothing else shows on a step that hardly moves on.
+        """
+
+        def further(carry: Any) -> Any:
+            first, error, finite = carry
+            found, fine = look(polynomial, time, step, first, usual)
+            return first + POINTS, jnp.maximum(error, found), finite & fine
+
+        def open_(carry: Any) -> Any:
+            first, error, finite = carry
+            return (first < _places(step)) & finite & (error <= 1.0)
+
+        _, error, finite = jax.lax.while_loop(open_, further, (jnp.zeros(()), jnp.zeros(()), jnp.ones((), bool)))
+        return finite & (error <= 1.0), finite, (error > 0.0) & (jnp.abs(step) <= SHORTEST * span)
+
+    def attempt(current: Progress) -> tuple[Progress, Any, Any]:
+        time, left = current.time, stop - current.time[0] - current.rest[0]
+        whole = polynomial_of(problem.series(current.state, time[None], order))
+        sizes = _sizes(problem, whole)
+        known = jnp.all(jnp.isfinite(sizes[:NEEDED]))
+        sizes = jnp.where(jnp.isfinite(sizes), sizes, jnp.inf)
+        kept, reach = furthest(sizes, jnp.full(time.shape, tolerance), UNUSUAL * current.longest)
+        polynomial = jax.tree.map(lambda c: jnp.where(kept[: len(c), None], c, 0.0), whole)
+        step = jnp.minimum(jnp.minimum(reach[0], longest), jnp.abs(left))
+        step = jnp.where(step >= 0.999 * jnp.abs(left), jnp.abs(left), step)
+        shortest, wished = finest(span, time, current.crossing)[0], step
+        sense, usual = jnp.sign(left), jnp.maximum(current.longest[0], step)
+
+        def narrowed(carry: Any) -> Any:
+            low, high, over = carry
+            step = jnp.where(low > 0, 0.5 * (low + high), 0.5 * high)
+            good, finite, jump = fits(polynomial, time[0], sense * step, usual)
+            taken = good | ((step <= shortest) & finite)
+            return jnp.where(taken, step, low), jnp.where(taken, high, step), jnp.where(taken, jump, over)
+
+        def open_(carry: Any) -> Any:
+            low, high, _ = carry
+            nearer = (high - low > NEAR * low) & (low < STEEP * usual)  # to a jump; what is only steep is seen better
+            return jnp.where(low > 0, (low < high) & nearer, high > 0.25 * shortest)
+
+        good, _, over = fits(polynomial, time[0], sense * step, usual)
+        low, _, over = jax.lax.while_loop(open_, narrowed, (jnp.where(good, step, 0.0), step, over))
+        step = jnp.where(low > 0, low, shortest)
+        last = step >= jnp.abs(left)
+        arrived = at(polynomial, sense * step[None])
+        since = sense * step + current.rest[0]
+        onwards = jnp.where(last, stop, time[0] + since)
+        rest = jnp.where(last, 0.0, since - (onwards - time[0]))
+        short = (step < SHORT * wished) & ~last
+        stuck = steps_counted(current.stuck, step, span)
+        moves = known & (low > 0) & (stuck < STUCK)
+        again = (
+            known & (low == 0.0) & (stuck < STUCK) & (current.crossing < AGAIN)
+        )  # no number at the very end of a step over a jump
+        outcome = jnp.where(last, int(Outcome.ARRIVED), int(Outcome.RUNNING))
+        failed = jnp.where(again, int(Outcome.RUNNING), jnp.where(known, int(Outcome.COLLAPSED), int(Outcome.LOST)))
+        outcome = jnp.where(moves, outcome, failed)
+        crossing = steps_counted(current.crossing, step, span, over | (low == 0.0))
+        longest_so_far = jnp.maximum(current.longest, step)
+        after = Progress(onwards[None], arrived, outcome, stuck, crossing, rest[None], longest_so_far)
+        steps = RobotSteps(time[0], sense * step, jax.tree.map(lambda c: c[..., 0], polynomial), short | over)
+        stay = current._replace(outcome=outcome, crossing=crossing)
+        return jax.tree.map(lambda a, b: jnp.where(moves, a, b), after, stay), steps, moves
+
+    def iterate(carry: Any) -> Any:
+        current, kept, taken = carry
+        current, steps, moves = attempt(current)
+        kept = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, taken, 0), kept, steps)
+        return current, kept, taken + moves.astype(int)
+
+    def unfinished(carry: Any) -> Any:
+        current, _, taken = carry
+        return (current.outcome == int(Outcome.RUNNING)) & (taken < count)
+
+    room = jax.tree.map(lambda x: jnp.zeros((count, order + 2, x.shape[0])), current.state)
+    kept = RobotSteps(jnp.zeros(count), jnp.zeros(count), room, jnp.zeros(count, bool))
+
+    # one piece of machine code, as of mechanisms, has been seen to abort XLA here, and gains nothing at this size
+    return jax.lax.while_loop(unfinished, iterate, (current, kept, jnp.zeros((), int)))

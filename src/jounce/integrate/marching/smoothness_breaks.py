@@ -1,0 +1,151 @@
+"""Where the series of one step of a simulation do not go on as those of the next: kinks and jumps of forces and laws.
+
+On either side of a kink of a force the motion is analytic, and the accelerations of both sides agree where the kink is.
+So it is found, to rounding, from the series of the step that goes over it and of the next.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.integrate.marching.marching import DenseOutput
+
+SLIGHT = 1e-12  # of accelerations: rounding
+FAINT = 1e-9  # of velocities, accelerations and jerks: a difference below does not count
+PLAIN = 1e-3  # of jerks: so much differs where the steps themselves saw no kink, as one may begin exactly at it
+ASIDE = 1e-3  # of a step: a kink lies so near to where it is found, at least
+ALIKE = 0.1  # of a difference: it stays the same all along a step that goes over a kink or a jump, but for this
+LAST = 4  # terms of a series that tell what it leaves out
+BEYOND = 100.0  # times these
+ROUNDS = 3
+
+
+Terms = Float[np.ndarray, "order part"]
+"""Taylor coefficients of velocities, rad/s or sizes of the mechanism by s."""
+
+
+class Break(NamedTuple):
+    """A kink or a jump.
+
+    Attributes
+    ----------
+    step : int
+        Number of the step that goes over it.
+    order : int
+        The lowest time derivative of places that jumps: 1 for a kink of a motion law, 2 for a jump of a force, 3 for
+        its kink.
+    since : float
+        When it is, from the beginning of the step, s; its end where forces or laws jump.
+    velocity, spin : array of shape (components, bodies)
+        Weights for the difference of accelerations before and after; their sum with them grows as time does, by one
+        each second, and vanishes at the kink.
+    """
+
+    step: int
+    order: int
+    since: float
+    velocity: Float[np.ndarray, "component body"]
+    spin: Float[np.ndarray, "component body"]
+
+
+def breaks(dense: DenseOutput, length: float) -> list[Break]:
+    """Return the kinks and jumps that steps go over, or begin and end at.
+
+    Parameters
+    ----------
+    dense : DenseOutput
+        The steps.
+    length : float
+        Size of the mechanism, m.
+    """
+    velocity, spin = (np.asarray(part) for part in dense.polynomial[2:])
+    parts = [(velocity / length).reshape(*velocity.shape[:2], -1), spin.reshape(*spin.shape[:2], -1)]
+    series, found = np.concatenate(parts, axis=2), []
+    if series.shape[1] <= LAST:
+        return []
+    largest = [float(np.nanmax(np.abs(series[:, k]), initial=0.0)) for k in range(3)]
+    for step in np.flatnonzero((dense.kink[:-1] >= 0) | _bent(series, dense.length, largest[2])).tolist():
+        over, noted = float(dense.length[step]), bool(dense.kink[step] >= 0)
+        order, since, weight = _between(series[step], series[step + 1], over, noted, largest)
+        if order:
+            weights = weight[: parts[0].shape[2]] / length, weight[parts[0].shape[2] :]
+            shaped = (w.reshape(part.shape[2:]) for w, part in zip(weights, (velocity, spin), strict=True))
+            found.append(Break(step, order, since, *shaped))
+    return found
+
+
+def _bent(
+    series: Float[np.ndarray, "step order part"], length: Float[np.ndarray, " step"], largest: float
+) -> Bool[np.ndarray, " step-1"]:
+    """Tell of all steps but the last whether the jerk at their end is plainly another than that of the next."""
+    orders = np.arange(2, series.shape[1])
+    with np.errstate(all="ignore"):
+        factors = orders * (orders - 1) * np.asarray(length)[:-1, None] ** (orders - 2)
+        ends = np.sum(factors[..., None] * series[:-1, 2:], axis=1)
+        return np.abs(ends - 2.0 * series[1:, 2]).max(axis=1) > PLAIN * largest
+
+
+def _between(
+    before: Terms, after: Terms, over: float, noted: bool, largest: list[float]
+) -> tuple[int, float, Float[np.ndarray, " part"]]:
+    """Return the lowest derivative that jumps from one step to the next or 0, when, and the weights of a kink.
+
+    Steps that are `noted` go over something. `largest` are the sizes of the first coefficients in the whole run.
+    """
+    none = np.zeros(before.shape[1])
+    if not (over and np.isfinite(before).all() and np.isfinite(after).all()):
+        return 0, over, none
+
+    def gap(since: float, level: int) -> Float[np.ndarray, " part"]:
+        return _derivative(before, since, level) - _derivative(after, since - over, level)
+
+    def stays(level: int) -> bool:
+        """Tell a jump from the foot of a pulse, that begins within the step."""
+        there = gap(over, level)
+        return bool(np.abs(gap(0.0, level) - there).max() <= ALIKE * np.abs(there).max())
+
+    def differ(level: int, least: float) -> bool:
+        return bool(np.abs(gap(over, level)).max() > least + BEYOND * _left_out(before, over, level))
+
+    sizes = [max(np.abs(_derivative(before, over, k)).max(), np.abs(after[k]).max() * k) for k in range(3)]
+    if noted and differ(0, FAINT * largest[0] + SLIGHT) and stays(0):
+        return 1, over, none
+    for order in (3, 4):
+        bend = gap(over, order - 1)
+        square = max(float(bend @ bend), 1e-300)
+        since = over
+        for _ in range(ROUNDS):
+            since -= float(gap(since, order - 2) @ bend) / square
+            since = min(max(since / over, -1.0), 2.0) * over
+        size = math.sqrt(square)
+        rest = ASIDE * size * abs(over) + BEYOND * SLIGHT * sizes[1]
+        aside = ASIDE if noted else SLIGHT
+        low = -aside if noted else 1.0 - aside  # where the steps saw nothing, a kink can be between them alone
+        within = low <= since / over <= 1.0 + aside and np.abs(gap(since, order - 2)).max() <= rest
+        within = within and np.abs(gap(since, order - 1) - bend).max() <= ALIKE * size
+        plain = size * abs(over) > SLIGHT * largest[1] and differ(2, FAINT * sizes[2] if noted else PLAIN * largest[2])
+        if order == 3 and within and plain:
+            since = min(max(since / over, 0.0), 1.0) * over
+            bend = gap(since, 2)
+            return 3, since, bend / float(bend @ bend)
+        if within and np.abs(gap(since, 1)).max() <= ASIDE * size * abs(over) ** (order - 2) + SLIGHT * largest[1]:
+            return 0, over, none
+    return (2, over, none) if noted and differ(1, FAINT * largest[1]) and stays(1) else (0, over, none)
+
+
+def _left_out(series: Terms, since: float, level: int) -> float:
+    """Return the size of the last terms of a derivative of a series, which tell what it leaves out."""
+    orders = np.flatnonzero(np.abs(series).max(axis=1))[-LAST:]
+    orders = orders[orders >= max(level, len(series) // 2)]
+    factors = np.array([math.perm(int(k), level) for k in orders], float)
+    terms = factors * abs(since) ** (orders - level).astype(float) * np.abs(series[orders]).max(axis=1)
+    return float(terms.max(initial=0.0))
+
+
+def _derivative(series: Terms, since: float, level: int) -> Float[np.ndarray, " part"]:
+    """Return a derivative of series at a time from where they begin."""
+    orders = np.arange(level, len(series))
+    factors = np.array([math.perm(int(k), level) for k in orders], float)
+    return (factors * since ** (orders - level).astype(float)) @ series[level:]

@@ -1,0 +1,1 @@
+"""Simulations of mechanisms, alone and in batches."""

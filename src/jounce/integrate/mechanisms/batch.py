@@ -1,0 +1,370 @@
+"""Many simulations of one mechanism side by side: initial conditions, masses, forces and lengths by parameters."""
+
+import dataclasses
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.display import Displayed
+from jounce.dynamics.forward.accelerations import Equations, State
+from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
+from jounce.execution.threads import in_callers_context
+from jounce.integrate.marching.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
+from jounce.integrate.marching.user_methods import integrator
+from jounce.integrate.mechanisms.batch_equations import BatchStart, ParametricMechanism, Turns
+from jounce.integrate.results.simulation import expanded
+from jounce.integrate.steps.events import pose_coordinates
+from jounce.integrate.steps.methods import AbstractMethod
+from jounce.integrate.steps.options import checked_options, instants_of
+from jounce.integrate.steps.revolution_counts import PLACES, attitudes_at
+from jounce.jet.derivatives import plain_derivatives
+from jounce.jet.turns import brought_near, whole_periods
+from jounce.kinematics import Status
+from jounce.kinematics.families.solve_batch import checked_values
+from jounce.kinematics.results.pose_outputs import output_series
+from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
+from jounce.mechanism.axis_angles import measures_angle, raw_angles, with_turns
+from jounce.mechanism.builder import with_reference
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.turn_counting import counted_along
+from jounce.shapes import ArrayLike
+
+LANES = 64  # runs marched together: more fall out of the cache
+STEPS = 16  # tried before runs that have ended make room for others
+
+
+@dataclasses.dataclass(frozen=True)
+class Batch(Displayed):
+    """The results of many simulations.
+
+    Attributes
+    ----------
+    time : numpy.ndarray of shape (time,)
+        s.
+    parameters : dict of str to numpy.ndarray of shape (runs,)
+        What the runs differ in.
+    outputs : dict of str to numpy.ndarray
+        Outputs of the mechanism with derivatives, (runs, time, order + 1) or (runs, time, order + 1, component), SI;
+        NaN where a run did not get so far. Forces and energies, which follow from a whole motion, are left out.
+    status : numpy.ndarray of int, shape (runs, time)
+        See `Status`.
+    steps : numpy.ndarray of int, shape (runs,)
+        Steps taken.
+    """
+
+    time: Float[np.ndarray, " time"]
+    parameters: dict[str, Float[np.ndarray, " run"]]
+    outputs: dict[str, Float[np.ndarray, "run time derivative *component"]]
+    status: Int[np.ndarray, "run time"]
+    steps: Int[np.ndarray, " run"]
+
+    def __repr__(self) -> str:
+        complete = int((self.status == Status.OK).all(axis=1).sum())
+        return f"<Batch {complete} of {len(self.status)} runs complete, {len(self.time)} instants>"
+
+
+@concrete
+def simulate_batch(
+    mechanism: Mechanism,
+    parameters: Mapping[str, ArrayLike],
+    time: ArrayLike | TimeGrid | None = None,
+    order: int = 4,
+    *,
+    method: AbstractMethod | None = None,
+    tolerance: float = 1e-15,
+    longest_step: float = np.inf,
+) -> Batch:
+    """Return many simulations of a mechanism that differ in its parameters, computed side by side.
+
+    Initial conditions differ where their laws have parameters. What is compiled serves all runs.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        As for `simulate`.
+    parameters : dict of str to array_like of shape (runs,)
+        Values of some parameters in each run, SI.
+    time, order, method, tolerance, longest_step
+        As for `simulate`; each run has steps of its own.
+
+    Returns
+    -------
+    Batch
+        A run that fails does not stop the others: `status` says so.
+
+    Raises
+    ------
+    MechanismError
+        If a parameter does not exist, or values are not finite or of unequal number; and as `simulate`.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> pendulum = jn.Mechanism(
+    ...     space="planar",
+    ...     gravity=[0, -9.81],
+    ...     parameters={"lift": 0.1},
+    ...     bodies={"rod": jn.Body([0, 0], mass=2.0, inertia=0.5, center_of_mass=[1, 0])},
+    ...     joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
+    ...     initial={"rise": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion="lift")},
+    ...     outputs={"angle": jn.AngleOutput("rod")},
+    ... )
+    >>> jn.simulate_batch(pendulum, {"lift": [0.1, 0.2, 0.3]}, [0.0, 0.5]).outputs["angle"].shape
+    (3, 2, 5)
+    """
+    check_mechanism(mechanism)
+    values = checked_values(mechanism, parameters, "run")
+    names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
+    first = mechanism.with_parameters(**dict(zip(names, rows[0].tolist(), strict=True)))
+    order, method = checked_options(order, method, tolerance, longest_step)
+    instants = instants_of(mechanism.time if time is None else time, first.parameter_values)
+    check_laws(mechanism, instants, order, forces=True)
+    nominal = consistent_start(first, float(instants[0]))
+    parametric = ParametricMechanism(first, nominal.model, names)
+    begun = parametric
+    if first.initial:
+        model, _ = with_reference(build(initial_as_drivers(first)), nominal.model.reference, float(instants[0]))
+        begun = ParametricMechanism(initial_as_drivers(first), model, names)
+    runs = _Runs(parametric, rows, instants, order, (float(tolerance), float(longest_step), method))
+
+    starts = BatchStart(parametric, begun, nominal.state, rows, float(instants[0]))
+
+    def depart(some: np.ndarray) -> None:
+        runs.depart(some, *starts.of(some))
+
+    advance, depart_others = in_callers_context(runs.advance), in_callers_context(depart)
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:  # XLA works outside of Python's lock
+        lots = runs.lots(np.arange(len(rows)))
+        depart(lots[0])  # compiles, once for all threads; so does the first advance
+        list(pool.map(depart_others, lots[1:]))
+        if len(runs.moving):
+            runs.advance(runs.lots(runs.moving)[0])
+        while len(runs.moving):
+            list(pool.map(advance, runs.lots(runs.moving)))
+    status = runs.status
+    for run, reason in starts.failed.items():
+        status[run, 0] = int(reason)
+    return Batch(instants, values, runs.outputs, status, runs.steps)
+
+
+class _Runs:
+    """The runs of a batch on their way; those that still move are marched side by side, however far they are.
+
+    What is asked for is kept, not the steps: derivatives at the instants follow from the equations of motion there.
+    """
+
+    def __init__(
+        self,
+        parametric: ParametricMechanism,
+        rows: np.ndarray,
+        instants: np.ndarray,
+        order: int,
+        settings: tuple[float, float, AbstractMethod],
+    ):
+        self.parametric, self.instants, self.order, self.settings = parametric, instants, order, settings
+        self.width = min(LANES, 1 << (len(rows) - 1).bit_length())
+        self.steps = np.zeros(len(rows), int)
+        self._made = parametric.of(rows)
+        self._reached = np.zeros((len(rows), len(instants)), bool)
+        self._sense = 1.0 if instants[-1] >= instants[0] else -1.0
+        lost = max((output.lost_orders for output in parametric.mechanism.outputs.values()), default=0)
+        self._expansion = max(order + max(lost, 1), 2)  # turns of angles are counted by two derivatives
+        self._current: Any = None
+        self._values: dict[int, np.ndarray] = {}  # of each group, (runs, time, order + 1, components, outputs)
+        self._begun = np.full(len(rows), instants[0])  # the time at which the last step began
+        self._angles: dict[int, np.ndarray] = {}  # the series of turning outputs there
+        self._turns: tuple[np.ndarray, ...] = ()  # their angles about axes at the start, (instances, runs)
+        self._turns_reached: tuple[np.ndarray, ...] = ()  # and where the last step ended
+
+    @property
+    def moving(self) -> np.ndarray:
+        """The runs that are still on their way."""
+        return np.flatnonzero((self._current.outcome == Outcome.RUNNING) & (len(self.instants) > 1))
+
+    @property
+    def status(self) -> np.ndarray:
+        """See `Batch`."""
+        status = np.where(self._reached, int(Status.OK), int(Status.NOT_REACHED))
+        stuck = np.flatnonzero(~self._reached.all(axis=1))
+        unbalanced = self._current.outcome[stuck] == Outcome.UNBALANCED
+        reasons = np.where(unbalanced, int(Status.UNBALANCED), int(Status.COLLAPSED))
+        status[stuck, np.argmin(self._reached[stuck], axis=1)] = reasons
+        for values in self._values.values():
+            finite = np.isfinite(values[:, :, : self.order + 1]).all(axis=(2, 3, 4))
+            status[self._reached & ~finite] = int(Status.UNDEFINED)
+        return status
+
+    @property
+    def outputs(self) -> dict[str, np.ndarray]:
+        """See `Batch`."""
+        found = {}
+        for which, values in self._values.items():
+            for k, name in enumerate(self.parametric.model.outputs[which]):
+                plain = np.moveaxis(np.asarray(plain_derivatives(np.moveaxis(values[..., k], 2, 0))), 0, 2)
+                found[name] = plain[..., 0] if plain.shape[-1] == 1 else plain
+        return {name: found[name] for name in self.parametric.mechanism.outputs if name in found}
+
+    def lots(self, runs: np.ndarray) -> list[np.ndarray]:
+        """Return runs in lots of one size; the last repeats its last run."""
+        return [runs[np.minimum(np.arange(k, k + self.width), len(runs) - 1)] for k in range(0, len(runs), self.width)]
+
+    def depart(self, runs: np.ndarray, state: State, angles: Turns) -> None:
+        """Set runs off from states on the constraints, with the turns that angles about axes have there."""
+        equations, _ = self._picked(runs, angles)
+        tolerance, _, method = self.settings
+        time = np.full(len(runs), self.instants[0])
+        current = begin_march(equations, state, time, order=method.expansion_order(tolerance))
+        current = jax.tree.map(np.asarray, current)
+        if self._current is None:
+            self._current = jax.tree.map(lambda x: np.zeros((*x.shape[:-1], len(self.steps)), x.dtype), current)
+        self._put(runs, current)
+        if not self._turns:
+            self._turns = tuple(np.zeros((len(angle), len(self.steps))) for angle in angles.outputs)
+            self._turns_reached = tuple(map(np.zeros_like, self._turns))
+        for whole, reached, part in zip(self._turns, self._turns_reached, angles.outputs, strict=True):
+            whole[:, runs] = reached[:, runs] = part
+        self._note(runs, np.zeros(len(runs), int), current.expansion.state, time, current.angles, {})
+        lost = runs[current.outcome == Outcome.LOST]
+        self._reached[lost] = False
+        for values in self._values.values():
+            values[lost] = np.nan
+
+    def advance(self, runs: np.ndarray) -> None:
+        """March runs by some steps, and note what they pass."""
+        equations, _ = self.parametric.picked(self._made, runs)
+        tolerance, longest, method = self.settings
+        current = jax.tree.map(lambda x: x[..., runs], self._current)
+        method = integrator(method, equations, current)
+        found = march(equations, current, self.instants[-1], tolerance, longest, method=method, count=STEPS)
+        current, (steps, taken), tried = jax.tree.map(np.asarray, found)
+        self._put(runs, current)
+        self.steps[runs] += taken.sum(axis=0)
+        angles = self._counted(runs, steps, int(tried))
+        begin, now = self._sense * steps.start, self._sense * self.instants
+        end = self._sense * current.time + 1e-14 * np.abs(current.time)
+        near = np.flatnonzero((now >= begin[0].min()) & (now <= end.max()))
+        passed = taken & (begin <= now[near, None, None])  # instants, steps, runs
+        step = passed.shape[1] - 1 - np.argmax(passed[:, ::-1], axis=1)
+        instant, lane = np.nonzero(passed.any(axis=1) & (now[near, None] <= end))
+        step = step[instant, lane]
+        polynomial = steps.polynomial.map(lambda part: np.moveaxis(part[step, ..., lane], 0, -1))
+        before = {which: series[..., step, lane] for which, series in angles.items()}
+        since, length = self.instants[near[instant]] - steps.start[step, lane], steps.length[step, lane]
+        share = since / np.where(length == 0.0, 1.0, length)
+        before |= self._counted_about_axes(runs, steps, taken, (step, lane, share))
+        known = tuple(part[step, :, lane].T for part in steps.angles)
+        self._note(runs[lane], near[instant], polynomial, steps.start[step, lane], known, before)
+
+    def _picked(self, runs: np.ndarray, angles: Turns) -> tuple[Equations, Any]:
+        """Return equations of motion and outputs of some runs, whose angles about axes have the turns of these."""
+        equations, outputs = self.parametric.picked(self._made, runs)
+        return equations.near(angles.forces), with_turns(outputs, angles.outputs)
+
+    def _begun_with(self, runs: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the angles about axes of outputs at the start, (instances, runs) each."""
+        return tuple(angle[:, runs] for angle in self._turns)
+
+    def _put(self, runs: np.ndarray, current: IntegratorState) -> None:
+        for whole, part in zip(jax.tree.leaves(self._current), jax.tree.leaves(current), strict=True):
+            whole[..., runs] = part
+
+    def _counted(self, runs: np.ndarray, steps: DenseOutput, tried: int) -> dict[int, np.ndarray]:
+        """Return the series of turning outputs where steps begin, turns counted on, steps and runs last."""
+        found = {}
+        time = np.concatenate([self._begun[runs][None], steps.start[:tried]])
+        self._begun[runs] = time[-1]
+        every = np.tile(runs, len(steps.start))
+        _, outputs = self._picked(every, Turns((), self._begun_with(every)))
+        for which, group in enumerate(outputs):
+            if group.element.turning and not measures_angle(group):
+                state = steps.polynomial.map(lambda part: np.moveaxis(part[:, :3], 0, -2))
+                state = state.map(lambda part: part.reshape(*part.shape[:-2], -1))
+                (series,) = output_series((group,), pose_coordinates(state), self.parametric.model.pose_type)
+                series = np.array(series).reshape(*series.shape[:-1], *steps.start.shape)[..., :tried, :]
+                last = self._angles.setdefault(which, np.full((*series.shape[:-2], len(self.steps)), np.nan))
+                whole = np.concatenate([last[..., runs][..., None, :], series], axis=-2)
+                series[0] -= np.cumsum(turned(whole[..., :-1, :], whole[..., 1:, :], np.diff(time, axis=0)), axis=-2)
+                last[..., runs] = series[..., -1, :]
+                found[which] = series
+        return found
+
+    def _counted_about_axes(
+        self, runs: np.ndarray, steps: DenseOutput, taken: np.ndarray, places: tuple[np.ndarray, np.ndarray, np.ndarray]
+    ) -> dict[int, np.ndarray]:
+        """Return angles about axes near places, (instances, places) for each group of outputs, and count them on.
+
+        The places are given by step, lane and share of the step.
+        """
+        lane, step = np.nonzero(taken.T)
+        if not lane.size:
+            return {}
+        number = np.zeros(taken.shape, int)
+        number[step, lane] = np.arange(len(lane))
+        last = np.append(lane[1:] != lane[:-1], True)  # of the steps of a run
+        found = {}
+        measuring = [which for which, group in enumerate(self._made[1]) if measures_angle(group)]
+        for which, turns in zip(measuring, self._turns_reached, strict=True):
+
+            def measured(which_step: np.ndarray, share: np.ndarray, which: int = which) -> np.ndarray:
+                at, of = step[which_step], lane[which_step]
+                attitudes = attitudes_at(steps.polynomial.attitude[at, ..., of], share * steps.length[at, of])
+                _, outputs = self._picked(runs[of], Turns((), self._begun_with(runs[of])))
+                return raw_angles([outputs[which]], {"quaternion": attitudes})[0]
+
+            counted = counted_along(measured, lane, turns[:, runs[lane]], PLACES)
+            found[which] = counted.near(number[places[0], places[1]], places[2])
+            turns[:, runs[lane[last]]] = counted.near(np.flatnonzero(last), np.ones(last.sum()))
+        return found
+
+    def _note(
+        self,
+        runs: np.ndarray,
+        at: np.ndarray,
+        polynomial: State,
+        begin: np.ndarray,
+        angles: tuple[np.ndarray, ...],
+        before: dict[int, np.ndarray],
+    ) -> None:
+        """Keep the outputs of runs at instants, given by number, a time into steps that began at others.
+
+        What forces measure where the steps begin is known, and so are the series of turning outputs there, and angles
+        about axes near the instants, but at the start.
+        """
+        for lanes in self.lots(np.arange(len(runs))):
+            turned_by = tuple(angle[:, lanes] for angle in angles)
+            shared = self._picked(runs[lanes], Turns(turned_by, self._begun_with(runs[lanes])))
+            _, outputs = shared
+            time = self.instants[at[lanes]]
+            since = time - begin[lanes]
+            started = polynomial.map(lambda part, lanes=lanes: part[..., lanes])
+            *_, found = expanded.on_xla(shared, (turned_by, started, since, time), (("order", self._expansion),))
+            for which, (group, series) in enumerate(zip(outputs, map(np.array, found), strict=True)):
+                if which in before and measures_angle(group):
+                    series[0, 0] = brought_near(series[0, 0], before[which][:, lanes])
+                elif which in before:
+                    series[0] -= turned(before[which][..., lanes], series, since)
+                values = np.moveaxis(series[: self.order + 1], -1, 0)
+                if which not in self._values:
+                    self._values[which] = np.full((*self._reached.shape, *values.shape[1:]), np.nan)
+                self._values[which][runs[lanes], at[lanes]] = values
+            self._reached[runs[lanes], at[lanes]] = True
+
+
+def turned(before: np.ndarray, after: np.ndarray, since: np.ndarray) -> np.ndarray:
+    """Return the whole turns, in rad, by which an angle is too far ahead of an earlier one and of its derivatives.
+
+    Parameters
+    ----------
+    before, after : array of shape (order + 1, ...)
+        Taylor coefficients of the angle, to the second at least; where `before` is NaN, no turns are counted.
+    since : array
+        Time from the one to the other, s.
+    """
+    rise = since / 2 * (before[1] + after[1]) + since**2 / 6 * (before[2] - after[2])
+    return np.nan_to_num(whole_periods(after[0] - before[0] - rise))

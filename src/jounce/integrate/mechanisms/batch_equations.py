@@ -1,0 +1,228 @@
+"""One mechanism with many values of its parameters: the equations of motion and the starts of all runs of a batch."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+
+from jounce.constraints.base import value_fields
+from jounce.dynamics.forward.accelerations import Equations, State
+from jounce.dynamics.forward.initial_state import consistent_start, with_rates
+from jounce.dynamics.forward.saddle_fronts import SaddleFronts
+from jounce.dynamics.masses import gravity_of, masses_of
+from jounce.errors import JounceError, MobilityError
+from jounce.execution.compilation import compiled
+from jounce.integrate.steps.events import pose_coordinates
+from jounce.integrate.steps.projection import projected
+from jounce.jet import Jet
+from jounce.jet.turns import brought_near
+from jounce.kinematics.status import Status
+from jounce.mechanism import Mechanism, Model, build
+from jounce.mechanism.axis_angles import measures_angle, raw_angles
+from jounce.mechanism.builder import starting_guess
+from jounce.mechanism.system import POSITION_COMPONENTS, Group
+
+STAGES = 8  # in which parameters go from those of the first run to their own, so that positions follow
+LARGEST_STAGE = 0.5  # rad, by which a driver may turn in a stage: angles about axes count their turns on the way
+
+
+class Turns(NamedTuple):
+    """Angles about axes that forces and outputs measure at the start of runs, with their turns, rad.
+
+    Attributes
+    ----------
+    forces, outputs : tuple of array of shape (instances, runs)
+        For each group that measures some.
+    """
+
+    forces: tuple[np.ndarray, ...]
+    outputs: tuple[np.ndarray, ...]
+
+
+class ParametricMechanism:
+    """A mechanism whose values follow from parameters: those that do have one entry for each run, last.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With the values of one run.
+    model : Model
+        Built from it.
+    names : tuple of str
+        Parameters in which the runs differ.
+    """
+
+    def __init__(self, mechanism: Mechanism, model: Model, names: tuple[str, ...]):
+        self.mechanism, self.model, self.names = mechanism, model, names
+        self.scale = masses_of(mechanism).scale(model.length)
+        self.saddle = SaddleFronts.of(model.system.pattern)
+        self._moved: list[bool] = []
+        self._leaves, self._structure = jax.tree.flatten(self._made(mechanism, model))
+
+    def _made(self, mechanism: Mechanism, model: Model) -> tuple[Equations, Any]:
+        system = dataclasses.replace(model.system, outputs=())
+        masses, gravity = masses_of(mechanism), gravity_of(mechanism)
+        return Equations(system, masses, gravity, self.scale, model.pose_type, self.saddle), model.system.outputs
+
+    def of(self, rows: np.ndarray) -> tuple[Equations, Any]:
+        """Return equations of motion and outputs for values of the parameters, (runs, parameters)."""
+        if self._has_values_of_guess() and self.guesses_differ(rows):
+            return self._one_by_one(rows)
+
+        def one(row: Any) -> list[Any]:
+            varied = self.varied(row)
+            leaves = jax.tree.leaves(self._made(varied, build(varied, like=self.model)))
+            self._moved = [isinstance(leaf, Tracer) for leaf in leaves]
+            return [leaf for leaf in leaves if isinstance(leaf, Tracer)]
+
+        varied = iter(jax.vmap(one, out_axes=-1)(rows))
+        pairs = zip(self._leaves, self._moved, strict=True)
+        leaves = [np.asarray(next(varied))[..., 0, :] if moved else leaf for leaf, moved in pairs]
+        return jax.tree.unflatten(self._structure, leaves)
+
+    def varied(self, row: Any) -> Mechanism:
+        """Return the mechanism with values of the parameters in which the runs differ."""
+        return self.mechanism.with_parameters(**dict(zip(self.names, row, strict=True)))
+
+    def guesses_differ(self, rows: np.ndarray) -> bool:
+        """Tell whether the starting guess of the bodies depends on what the runs differ in."""
+        components = POSITION_COMPONENTS[self.mechanism.space]
+        guesses = (starting_guess(m, m.parameter_values, components) for m in map(self.varied, rows.tolist()))
+        first = jax.tree.leaves(next(guesses))
+        return any(not np.array_equal(a, b) for g in guesses for a, b in zip(jax.tree.leaves(g), first, strict=True))
+
+    def _has_values_of_guess(self) -> bool:
+        """Tell whether the offset of a joint, or the sign of its Euler parameters, follows from the starting guess."""
+        joints = self.mechanism.joints.values()
+        offset = any("offset" in value_fields(type(j)) and getattr(j, "offset", 0.0) is None for j in joints)
+        return offset or any(hasattr(j, "sense") for j in joints)
+
+    def _one_by_one(self, rows: np.ndarray) -> tuple[Equations, Any]:
+        """Do what `of` does, where values follow from guesses that differ: they are found for each run alone."""
+        whole = []
+        for varied in map(self.varied, rows.tolist()):
+            system = dataclasses.replace(self.model.system, groups=build(varied).system.groups)
+            like = dataclasses.replace(self.model, system=system)
+            whole.append(jax.tree.leaves(self._made(varied, build(varied, like=like))))
+        columns = [[np.asarray(leaf, float) for leaf in column] for column in zip(*whole, strict=True)]
+        self._moved = [any(not np.array_equal(leaf, column[0]) for leaf in column) for column in columns]
+        pairs = zip(self._leaves, columns, self._moved, strict=True)
+        leaves = [np.concatenate(column, axis=-1) if moved else leaf for leaf, column, moved in pairs]
+        return jax.tree.unflatten(self._structure, leaves)
+
+    def picked(self, made: tuple[Equations, Any], runs: np.ndarray) -> tuple[Equations, Any]:
+        """Return what `of` returned for all runs, for some of them."""
+        pairs = zip(jax.tree.leaves(made), self._moved, strict=True)
+        return jax.tree.unflatten(self._structure, [leaf[..., runs] if moved else leaf for leaf, moved in pairs])
+
+
+class BatchStart:
+    """Consistent states of runs at the start: positions followed from those of the first run, least velocities.
+
+    Where the starting guess of bodies that are free to move differs, each run is put together from its own guess.
+
+    Parameters
+    ----------
+    parametric : ParametricMechanism
+        Of the runs.
+    begun : ParametricMechanism
+        With the initial conditions as drivers.
+    state : State
+        Of the first run.
+    rows : array of shape (runs, parameters)
+        The parameters of all.
+    instant : float
+        s.
+    """
+
+    def __init__(
+        self,
+        parametric: ParametricMechanism,
+        begun: ParametricMechanism,
+        state: State,
+        rows: np.ndarray,
+        instant: float,
+    ):
+        self._parametric, self._begun, self._state, self._instant = parametric, begun, state, instant
+        self._own: State | None = None
+        self._rows = rows
+        self.failed: dict[int, Status] = {}  # runs that have no start, and why
+        equations, coordinates = begun.model.system.shape
+        rank = begun.model.system.rank
+        if (equations if rank is None else rank) < coordinates and parametric.guesses_differ(rows):
+            own = [consistent_start(parametric.varied(row), instant) for row in rows.tolist()]
+            self._own = State(*(np.concatenate(parts, axis=-1) for parts in zip(*(s.state for s in own), strict=True)))
+            found = [_turns_of(s.model.system.forces, s.model.system.outputs) for s in own]
+            self._turns = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1), *found)
+            return
+        self._made, last = parametric.of(rows), begun.of(rows)
+        count = max(STAGES, int(np.ceil(self._turned(last, len(rows)) / LARGEST_STAGE)))
+        change = (rows - rows[0]) / count
+        self._stages = [begun.of(rows[0] + stage * change) for stage in range(1, count)] + [last]
+
+    def _turned(self, made: tuple[Equations, Any], count: int) -> float:
+        """Return by how much drivers of angles about axes turn from the first run to another at most, rad."""
+        clock, largest = Jet([np.full((1, 1), self._instant)]), 0.0
+        for group in filter(measures_angle, made[0].system.groups):
+            law = np.asarray(group.element.motion(clock).coefficients[0])
+            law = np.broadcast_to(law, (group.instances, count))
+            largest = max(largest, float(np.max(np.abs(law - law[:, :1]))))
+        return largest if np.isfinite(largest) else 0.0
+
+    def of(self, runs: np.ndarray) -> tuple[State, Turns]:
+        """Return the states of some runs, and the angles about axes there."""
+        if self._own is not None:
+            return jax.tree.map(lambda x: x[..., runs], (self._own, self._turns))
+        equations, outputs = self._parametric.picked(self._made, runs)
+        measuring = [group for group in (*equations.system.forces, *outputs) if measures_angle(group)]
+        angles = [np.asarray(group.element.datum.near) for group in measuring]
+        clock = np.full((1, len(runs)), self._instant)
+        still = self._state._replace(velocity=np.zeros_like(self._state.velocity), spin=np.zeros_like(self._state.spin))
+        state = still.map(lambda part: np.repeat(np.asarray(part), len(runs), axis=-1))
+        stages = [self._begun.picked(made, runs)[0] for made in self._stages]
+        together = np.ones(len(runs), bool)
+        for stage in stages:
+            state, reached = _followed(stage, state, clock)
+            together &= np.asarray(reached)
+            if measuring:
+                coordinates = pose_coordinates(state.map(lambda part: np.asarray(part)[None]))
+                raw = raw_angles(measuring, {"quaternion": coordinates["quaternion"][0]})
+                angles = [brought_near(angle, near) for near, angle in zip(angles, raw, strict=True)]
+        count = len([group for group in equations.system.forces if measures_angle(group)])
+        turns = Turns(tuple(angles[:count]), tuple(angles[count:]))
+        found = jax.tree.map(np.array, (with_rates(stages[-1], state, clock), turns))
+        for place in np.flatnonzero(~together).tolist():
+            self._put_alone(found, place, int(runs[place]))
+        return found
+
+    def _put_alone(self, found: tuple[State, Turns], place: int, run: int) -> None:
+        """Put a run to which no way from the first was found together from its own guess; NaN where that fails."""
+        try:
+            start = consistent_start(self._parametric.varied(self._rows[run].tolist()), self._instant)
+        except JounceError as error:
+            reason = Status.SINGULAR if isinstance(error, MobilityError) else Status.INADMISSIBLE
+            self.failed[run] = getattr(error, "status", None) or reason
+            for part in found[0]:
+                part[..., place] = np.nan
+            return
+        own = start.state, _turns_of(start.model.system.forces, start.model.system.outputs)
+        for whole, part in zip(jax.tree.leaves(found), jax.tree.leaves(own), strict=True):
+            whole[..., place] = part[..., 0]
+
+
+def _turns_of(forces: Sequence[Group], outputs: Sequence[Group]) -> Turns:
+    """Return the angles about axes that groups count from."""
+    parts = ([np.asarray(g.element.datum.near) for g in part if measures_angle(g)] for part in (forces, outputs))
+    return Turns(*map(tuple, parts))
+
+
+@compiled()
+def _followed(equations: Equations, state: State, clock: Any) -> tuple[State, Any]:
+    """Return states at rest on the constraints, and which of them could be put there."""
+    followed, distance, _ = projected(equations, state, clock)
+    at_rest = followed._replace(velocity=jnp.zeros_like(state.velocity), spin=jnp.zeros_like(state.spin))
+    return at_rest, jnp.isfinite(distance)

@@ -1,0 +1,365 @@
+"""From a mechanism with masses and forces to its motion."""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Unpack, overload
+
+import jax
+import numpy as np
+from jaxtyping import Bool
+
+from jounce.constraints import AbstractConstraint
+from jounce.dynamics.forward.accelerations import Equations, Instants, State
+from jounce.dynamics.forward.initial_state import ConsistentStart, consistent_start
+from jounce.dynamics.motion_values import Coordinates, cut, pose_of
+from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
+from jounce.execution.backends import backend_of, joined
+from jounce.execution.compilation import compiled
+from jounce.execution.store import expect
+from jounce.integrate.marching.marching import MOVING, STUCK, DenseOutput, IntegratorState, Outcome, march, unexpanded
+from jounce.integrate.marching.user_methods import integrator
+from jounce.integrate.mechanisms.programs_ahead import STEPS, ProgramsAhead
+from jounce.integrate.results.robot_simulation import RobotSimulation
+from jounce.integrate.results.sensitivities import traced_simulation
+from jounce.integrate.results.simulation import Simulation
+from jounce.integrate.simulate_robot import RobotOptions, simulate_robot
+from jounce.integrate.steps.events import Event, EventDetector, EventLog, pose_coordinates
+from jounce.integrate.steps.lookahead import hiding_names, watched_names
+from jounce.integrate.steps.methods import AbstractMethod, evaluated
+from jounce.integrate.steps.options import checked_options, instants_of
+from jounce.jet import Jet
+from jounce.kinematics import Status, raise_for_status
+from jounce.kinematics.results.motion import check_output, output_group
+from jounce.mechanism import Mechanism, check_mechanism
+from jounce.mechanism.element_indices import force_names
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete_or
+from jounce.mechanism.time import TimeLike
+from jounce.robot import BaseMotion, Robot
+from jounce.robot.algorithms.wrenches import Wrench
+from jounce.robot.model.joint_laws import GivenLaws
+from jounce.shapes import ArrayLike, Numbers
+
+AHEAD = 1e-9  # of the time so far: where steps collapse, what is not finite lies that close
+FEW = 4  # derivatives that are looked at for one that is not finite
+GOING = frozenset(MOVING.tolist())
+ROBOT_OPTIONS = tuple(RobotOptions.__annotations__)
+
+
+@overload
+def simulate(
+    mechanism: Mechanism,
+    time: TimeLike | None = None,
+    order: int = 4,
+    *,
+    method: AbstractMethod | None = None,
+    tolerance: float = 1e-15,
+    initial: Mapping[str, AbstractConstraint] | None = None,
+    events: object = (),
+    longest_step: float = np.inf,
+    strict: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> Simulation: ...
+@overload
+def simulate(
+    mechanism: Robot,
+    time: TimeLike,
+    order: int = 4,
+    *,
+    method: AbstractMethod | None = None,
+    tolerance: float = 1e-15,
+    events: object = (),
+    longest_step: float = np.inf,
+    strict: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+    state: ArrayLike | Mapping[str, float] | None = None,
+    torque: GivenLaws | None = None,
+    driven: Mapping[str, Any] | None = None,
+    drives: bool = True,
+    base: BaseMotion | None = None,
+    wrenches: Sequence[Wrench] = (),
+) -> RobotSimulation: ...
+@concrete_or(traced_simulation)
+def simulate(
+    mechanism: Mechanism | Robot,
+    time: TimeLike | None = None,
+    order: int = 4,
+    *,
+    method: AbstractMethod | None = None,
+    tolerance: float = 1e-15,
+    initial: Mapping[str, AbstractConstraint] | None = None,
+    events: object = (),
+    longest_step: float = np.inf,
+    strict: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+    **robot: Unpack[RobotOptions],
+) -> Simulation | RobotSimulation:
+    """Return the motion of a mechanism, or of a robot, under forces, with time derivatives of any order.
+
+    Accelerations, multipliers and all their rates follow from one factored matrix at each step; positions and
+    velocities are projected onto the constraints (Sommer 2024, section 7). Robots move in joint coordinates, by
+    articulated bodies: `forward_dynamics`.
+
+    Parameters
+    ----------
+    mechanism : Mechanism or Robot
+        With masses. Joints and drivers may leave degrees of freedom; drivers go on prescribing what they drive.
+    time : array_like of shape (time,), optional
+        Instants, s, increasing, or decreasing to go backward; those of the mechanism unless given. The first is the
+        start.
+    order : int, default 4
+        Highest derivative of the outputs, up to 30.
+    method : AbstractMethod, optional
+        `Taylor` unless given.
+    tolerance : float, default 1e-15
+        Of the error of a step, rad or sizes of the mechanism; 1e-17 to 0.01.
+    initial : dict of str to driver, optional
+        In the place of ``mechanism.initial``: each fixes one coordinate and its rate at the start.
+    events : sequence of Event, or of JointEvent for a robot, optional
+        Crossings to look for.
+    longest_step : float, optional
+        s.
+    strict : bool, default True
+        Raise if an instant is not reached. Otherwise it is NaN and `Motion.status` says why.
+    progress : callable, optional
+        Called with the number of instants passed and their total.
+    **robot
+        Of a robot only. `state`: q and q', of shape (2, n), or a mapping of joints to coordinates; at rest at zero
+        unless given. `torque`: the forces of its joints, N m or N: n numbers; a function of time, q and q' of one
+        sample, by operations of JAX, that returns n; or a mapping of joints to numbers, expressions of ``t``, of the
+        names of joints and of their rates as ``NAME_d1``, motion laws, and functions that return one force. `driven`: a
+        mapping of joints to laws of time that they follow, whatever it takes. `drives`: False leaves out armature,
+        damping and friction, which count otherwise. `base`: the `BaseMotion` with which a base that moves freely
+        begins. `wrenches`: a sequence of `Wrench`, whose forces and torques are constant, functions of time, or
+        functions of time, q and q', that return three components.
+
+    Returns
+    -------
+    Simulation, also a `Motion`; or RobotSimulation
+
+    Raises
+    ------
+    MechanismError
+        If the mechanism, the instants or an option is not valid, or a body that can move has no mass.
+    AssemblyError
+        If joints, drivers and initial conditions contradict each other.
+    MobilityError
+        If the start is a singular position.
+    SolveError
+        If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
+    UnsupportedError
+        If JAX traces anything but values of the mechanism.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> pendulum = jn.Mechanism(
+    ...     space="planar",
+    ...     gravity=[0, -9.81],
+    ...     bodies={"rod": jn.Body([0, 0], mass=2.0, inertia=0.5, center_of_mass=[1, 0])},
+    ...     joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
+    ...     outputs={"angle": jn.AngleOutput("rod")},
+    ... )
+    >>> fall = jn.simulate(pendulum, [0.0, 0.5, 1.0], order=3)
+    >>> bool(abs(fall.energy - fall.energy[0]).max() < 1e-12)
+    True
+    """
+    if not isinstance(mechanism, Robot):
+        check_mechanism(mechanism)
+    order, method = checked_options(order, method, tolerance, longest_step)
+    if progress is not None and not callable(progress):
+        raise MechanismError("must be a function of two numbers", name="progress", value=progress)
+    if not isinstance(events, Sequence):
+        raise MechanismError("must be a list of jn.Event", name="events", value=events)
+    _check_names(mechanism, robot, initial)
+    if isinstance(mechanism, Robot):
+        options = {"method": method, "tolerance": float(tolerance), "longest_step": float(longest_step)}
+        options |= {"events": events, "strict": strict, "progress": progress}
+        return simulate_robot(mechanism, instants_of(time, {}), order, **options, **robot)
+    if initial is not None:
+        if not isinstance(initial, Mapping):
+            raise MechanismError("must be a mapping of names to drivers", name="initial", value=initial)
+        mechanism = dataclasses.replace(mechanism, initial=dict(initial))
+    instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
+    check_laws(mechanism, instants, order, forces=True)
+    expect(len(instants))
+    for event in events:
+        _check_event(event, mechanism)
+    first = float(instants[0])
+    with ProgramsAhead(mechanism, instants, order, method, float(tolerance), float(longest_step)) as ahead:
+        start = consistent_start(mechanism, first, ahead.begin)
+        _check_forces(start, first)
+        detectors = [_detector_of(event, mechanism, start) for event in events]
+        ahead.go_on(start)
+    run = _Run(start, method, float(tolerance), float(longest_step), detectors)
+    run.go(instants, progress)
+    outcome = run.ending, run.events.happened, joined(run.backends)
+    simulation = Simulation(mechanism, start, run.dense_output, instants, order, *outcome)
+    if strict and run.events.stopped_at is None:
+        raise_for_status(simulation)
+    return simulation
+
+
+def _check_names(mechanism: Mechanism | Robot, given: Mapping[str, Any], initial: object) -> None:
+    """Raise JounceError for an option that there is not, or that belongs to simulations of the other kind."""
+    for name in given:
+        if name not in ROBOT_OPTIONS:
+            raise JounceError(f"simulate has no such option; {did_you_mean(name, ROBOT_OPTIONS)}", name=name)
+        if not isinstance(mechanism, Robot):
+            message = "belongs to simulations of robots in joint coordinates; a mechanism has forces and `initial`"
+            raise MechanismError(message, name=name)
+    if isinstance(mechanism, Robot) and initial is not None:
+        raise JounceError("belongs to simulations of mechanisms; a robot begins in a `state`", name="initial")
+
+
+def _check_event(event: object, mechanism: Mechanism) -> None:
+    """Raise MechanismError unless an event looks at an output that the mechanism can have."""
+    if not isinstance(event, Event):
+        raise MechanismError("must be a jn.Event", name="events", value=event)
+    check_output(event.output, mechanism, "events")
+    output_group(event.output, mechanism)
+
+
+def _detector_of(event: Event, mechanism: Mechanism, start: ConsistentStart) -> EventDetector:
+    """Return what looks for an event, or raise if its output has no such component."""
+    group = output_group(event.output, mechanism, start.model)
+    pose = start.equations.pose(start.state)
+    components = jax.eval_shape(lambda: group.evaluate(pose).coefficients[0]).shape[0]
+    if event.component >= components:
+        message = f"the output has {components} component{'s' if components > 1 else ''}, counted from 0"
+        raise MechanismError(message, name="events.component", value=event.component)
+    return EventDetector(event, group, start.model.pose_type)
+
+
+def _check_forces(start: ConsistentStart, instant: float) -> None:
+    """Raise SolveError where an applied force has no finite value at the start."""
+    names = _unsound(start, start.sound)
+    if names:
+        status = Status.INADMISSIBLE
+        message = f"t = {instant:g} s, {names}: the force is not finite: check its law and its parameters"
+        raise SolveError(message, status=status)
+
+
+def _unfit(start: ConsistentStart, state: State, instant: float) -> str:
+    """Name the applied forces that are not finite in a state."""
+    system = start.equations.system
+    if not system.forces:
+        return ""
+    return _unsound(start, np.asarray(_finite_forces(start.equations, state, np.array([[instant]])))[:, 0])
+
+
+def _unsound(start: ConsistentStart, sound: Bool[np.ndarray, " force"]) -> str:
+    return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), sound, strict=True) if not good)
+
+
+@compiled(narrow=True, brief=True, alone=True)
+def _finite_forces(equations: Equations, state: State, time: Instants) -> Bool[Numbers, "force 1"]:
+    return equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
+
+
+def unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float) -> str:
+    """Name the applied forces of which a low derivative is not finite at an instant, where their values may be.
+
+    Parameters
+    ----------
+    start : ConsistentStart
+        The mechanism.
+    coordinates : dict of str to array
+        Taylor coefficients at the instant, (order + 1, ..., 1); the higher ones need not be finite.
+    instant : float
+        s.
+    """
+    known = np.isfinite(coordinates["position"]).reshape(len(coordinates["position"]), -1).all(axis=1)
+    order = min(int(np.argmin(np.append(known, False))) - 1, FEW)
+    if order < 1:
+        return ""
+    pose = pose_of(cut(coordinates, order), start.model.pose_type)
+    clock, found = Jet.variable(np.array([[instant]]), order), []
+    for group, members in zip(start.equations.system.forces, start.model.forces, strict=True):
+        with np.errstate(all="ignore"):  # what is not finite is told by name
+            sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])
+        sizes = np.broadcast_to(sizes, (*sizes.shape[:2], len(members), 1))
+        good = np.atleast_1d(np.isfinite(sizes).all(axis=(0, 1, 3)))
+        found += [f"forces.{name}" for name, fit in zip(members, good, strict=True) if not fit]
+    return ", ".join(found)
+
+
+class _Run:
+    """One run: its steps so far, the events in them, and how it ended."""
+
+    def __init__(
+        self,
+        start: ConsistentStart,
+        method: AbstractMethod,
+        tolerance: float,
+        longest: float,
+        detectors: Sequence[EventDetector],
+    ):
+        self.start, self.method, self.tolerance, self.longest = start, method, tolerance, longest
+        self.events = EventLog(detectors)
+        self.parts: list[DenseOutput] = []
+        self.ending = (Status.OK, "")
+        self.backends: set[str] = set()
+        self.sense = 1.0  # of time
+
+    @property
+    def dense_output(self) -> DenseOutput:
+        """All steps taken."""
+        return jax.tree.map(lambda *parts: np.concatenate(parts), *self.parts)
+
+    def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
+        """March from the first to the last instant."""
+        equations, stop = self.start.equations, instants[-1]
+        self.sense = sense = np.sign(instants[-1] - instants[0])
+        order = self.method.expansion_order(self.tolerance)
+        current = unexpanded(equations, self.start.state, instants[:1], order=order)
+        method = integrator(self.method, equations, current)
+        how, options = (stop, self.tolerance, self.longest), {"method": method, "count": STEPS}
+        while current.outcome.item() in GOING and self.events.stopped_at is None:
+            current, steps, attempts = march(equations, current, *how, **options)
+            found, taken = steps
+            self.backends.add(backend_of(found))
+            taken = np.asarray(taken)[: int(attempts), 0]
+            if taken.any():
+                # a view, unless some were refused: they are joined, and so copied, at the end
+                chosen = slice(len(taken)) if taken.all() else np.flatnonzero(taken)
+                part = jax.tree.map(lambda x, k=chosen: np.asarray(x)[k, ..., 0], found)
+                self.parts.append(self.events.noted(part))
+            if progress is not None:
+                progress(int(np.sum(sense * instants <= sense * current.time.item())), len(instants))
+        if not self.parts:
+            self._stand(current)
+        if current.outcome.item() in (Outcome.COLLAPSED, Outcome.LOST, Outcome.UNBALANCED):
+            self.ending = self._explained(current)
+
+    def _stand(self, current: IntegratorState) -> None:
+        """Keep the start as a step of no length."""
+        polynomial = current.expansion.state.map(lambda part: np.asarray(part)[None, ..., 0])
+        angles = tuple(np.asarray(part).T for part in current.angles)
+        self.parts.append(DenseOutput(np.asarray(current.time), np.zeros(1), polynomial, np.full(1, -1), angles))
+
+    def _explained(self, current: IntegratorState) -> tuple[Status, str]:
+        """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""
+        series, time = current.expansion.state, current.time.item()
+        here = dataclasses.replace(self.start, equations=self.start.equations.near(current.angles))
+        onwards = self.sense * AHEAD * max(abs(time), abs(time - current.begun.item()))
+        ahead = evaluated(series.map(lambda part: part[:2]), np.array([onwards]))
+        for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + onwards)):
+            finite = all(np.isfinite(part).all() for part in state)
+            if finite and (names := _unfit(here, state, instant)):
+                return Status.INADMISSIBLE, f"{names} at t = {instant:g} s"
+        if names := unfit_rates(here, pose_coordinates(series), time):
+            return Status.INADMISSIBLE, f"a derivative of {names} at t = {time:g} s"
+        if current.outcome.item() == Outcome.UNBALANCED:
+            names = hiding_names(self.start.model, here.equations, series.map(lambda x: x[0]), np.array([[time]]))
+            return Status.UNBALANCED, f"{', '.join(names) or 'all joints'} at t = {time:g} s"
+        kink = int(self.parts[-1].kink[-1]) if self.parts else -1
+        if current.short.item() >= STUCK and kink >= 0:
+            words = "switches without end, as dry friction does at rest: smooth it, as by tanh(v/v0)"
+            return Status.COLLAPSED, f"{watched_names(self.start.model)[kink]} at t = {time:g} s {words}"
+        if (blocked := current.blocked.item()) >= 0:
+            return Status.COLLAPSED, f"{watched_names(self.start.model)[blocked]} at t = {time:g} s"
+        acceleration = np.abs(np.asarray(current.expansion.acceleration[0])[..., 0])
+        scale = np.asarray(self.start.equations.system.column_scale)[:, None]
+        sizes = np.nan_to_num(acceleration / scale, nan=np.inf).max(axis=0)
+        return Status.COLLAPSED, f"body {self.start.model.bodies[int(np.argmax(sizes))]}"

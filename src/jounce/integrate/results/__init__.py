@@ -1,0 +1,1 @@
+"""What a simulation is handed out as, and its derivatives with respect to parameters."""

@@ -1,0 +1,287 @@
+"""The result of a simulation of a robot: coordinates with derivatives of any order, torques, energy and events."""
+
+import dataclasses
+import itertools
+import math
+from collections.abc import Sequence
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.display import Displayed
+from jounce.errors import RobotError
+from jounce.execution.backends import xla_backend
+from jounce.execution.chunks import in_chunks
+from jounce.execution.compilation import compiled
+from jounce.integrate.marching.robot_marching import RobotProblem, RobotState, RobotSteps, at
+from jounce.integrate.steps.methods import Lanes
+from jounce.jet import Jet, compose
+from jounce.kinematics import Status
+from jounce.robot.algorithms.base_motion import BaseMotion
+from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
+from jounce.robot.algorithms.wrench_laws import WrenchPart
+from jounce.robot.algorithms.wrenches import Wrench
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike, Numbers, seconds
+from jounce.units.shown_units import derivatives_of, time_axes
+
+if TYPE_CHECKING:
+    import xarray
+
+WIDTHS = (64,)  # instants that are computed together: one program for few and for many
+MUCH_LONGER = 1e3  # than the step over a jump are those beside it
+CLOSE = 1e-5  # of the longest step: steps that come so near to a jump are of that
+
+
+class RobotSimulation(Displayed):
+    """The motion of a robot under forces of its joints, at the instants asked for and at any other.
+
+    At each instant the derivatives of every order follow from the equations of motion, not from the steps. `status`
+    says of each instant whether it was reached; values are NaN where it was not.
+
+    Attributes
+    ----------
+    robot : Robot
+        As it was given.
+    time : numpy.ndarray of shape (time,)
+        s.
+    order : int
+        Highest derivative.
+    q : numpy.ndarray of shape (time, order + 1, n)
+        Coordinates and their derivatives, rad or m by s.
+    base : BaseMotion or None
+        Of a free base, its twist with derivatives to `order`, at least to 1.
+    status : numpy.ndarray of shape (time,)
+        A `Status` for each instant.
+    faults : dict of int to str
+        What failed at an instant.
+    events : list of list of float
+        For each event asked for, the times at which it happened, s.
+    steps : RobotSteps
+        As polynomials.
+    backend : str
+        Which arithmetic gave the numbers: "xla", with the device unless that is the processor.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        problem: RobotProblem,
+        steps: RobotSteps,
+        instants: np.ndarray,
+        order: int,
+        ending: tuple[Status, str] = (Status.OK, ""),
+        events: list[list[float]] | None = None,
+        wrenches: tuple[Wrench, ...] = (),
+    ):
+        self.backend = xla_backend()
+        self.robot, self.time, self.order, self.steps = robot, instants, order, steps
+        self.events = [] if events is None else events
+        self._problem, self._ending, self._wrenches = problem, ending, wrenches
+        reached, state = _states(steps, instants)
+        levels = max(order - 2, 0)
+
+        def chunk(lanes: np.ndarray) -> Any:
+            part = jax.tree.map(lambda x: x[..., lanes], state)
+            return derivatives_at(problem, part, instants[lanes], order=levels)
+
+        q, twist = in_chunks(chunk, len(instants), WIDTHS)
+        self._state = state
+        self.q = _derivatives(q)[:, : order + 1]
+        self.base: BaseMotion | None = None
+        if twist is not None:
+            self.base = BaseMotion(state.position.T.copy(), state.quaternion.T.copy(), _derivatives(twist))
+        fine = np.isfinite(self.q).all(axis=(1, 2))
+        self.status: Int[np.ndarray, " time"] = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
+        self.faults: dict[int, str] = {}
+        self.status[reached & ~fine] = int(Status.UNDEFINED)
+        beyond = np.flatnonzero(~reached)
+        if ending[0] != Status.OK and beyond.size:
+            self.status[beyond[0]], self.faults[int(beyond[0])] = int(ending[0]), ending[1]
+        self.q[~reached] = np.nan
+        if self.base is not None:
+            for part in (self.base.position, self.base.quaternion, self.base.twist):
+                part[~reached] = np.nan
+
+    def __repr__(self) -> str:
+        solved = int((self.status == Status.OK).sum())
+        return (
+            f"<RobotSimulation of {self.robot.name}: {solved} of {len(self.time)} instants to order {self.order}, "
+            f"{len(self.steps.start)} steps>"
+        )
+
+    @property
+    def ended_at(self) -> float:
+        """Time to which the motion was followed, s."""
+        return self.steps.end
+
+    @property
+    def kinks(self) -> list[float]:
+        """Times at which a force had a jump or a kink, s: derivatives do not exist there."""
+        length, kink = np.abs(self.steps.length), self.steps.kink
+        ends = self.steps.start + self.steps.length
+        found = [k for k in np.flatnonzero(kink) if k == 0 or length[: k + 1].max() > MUCH_LONGER * length[k]]
+        close = [a for a, b in itertools.pairwise(found) if abs(ends[b] - ends[a]) <= CLOSE * length.max()]
+        return [float(ends[k]) for k in found if k not in close]
+
+    @cached_property
+    def torque(self) -> Float[np.ndarray, "time level n"]:
+        """Torques and forces of the joints with their rates to the order - 2, (time, order - 1, n), N m or N by s.
+
+        Those of driven joints are what it takes to drive them. Where drives count, they are the torques before
+        armature, damping and friction.
+        """
+        found = inverse_dynamics(
+            self.robot,
+            self.q,
+            drives=self._problem.equations.drives,
+            base=self._cut_base(),
+            wrenches=[self._told(*both) for both in zip(self._wrenches, self._problem.wrenches.parts, strict=True)],
+            time=self.time if self._wrenches else None,
+        )
+        found = found if self.base is None else found[..., 6:]
+        return np.asarray(found)
+
+    def _told(self, wrench: Wrench, parts: Sequence[WrenchPart]) -> Wrench:
+        """Return a wrench with its values along the motion where it depends on the state; functions as they were."""
+        told = {name: self._along(part) for name, part in zip(("force", "torque"), parts, strict=True)}
+        return dataclasses.replace(wrench, **told)
+
+    def _along(self, part: WrenchPart) -> Any:
+        """Return the derivatives of a function of time and state along the motion, or what depends on time alone."""
+        given = part.constant if part.function is None else part.at
+        if not part.of_state:
+            return given
+        levels = max(self.order - 1, 1)
+
+        factorials = jnp.array([math.factorial(k) for k in range(self.order + 1)], float)
+
+        def derivatives(time: Any, q: Any) -> Any:
+            shares = q / factorials[:, None]
+
+            def component(i: int, since: Any) -> Any:
+                place, rate = shares[-1], jnp.zeros(q.shape[1:])
+                for share in shares[-2::-1]:  # Horner's rule, and its derivative
+                    rate = rate * since + place
+                    place = place * since + share
+                return jnp.asarray(given(time + since, place, rate), float)[i]
+
+            zero = Jet.variable(jnp.zeros(()), levels - 1)
+            return jnp.stack([compose(partial(component, i), zero).derivatives() for i in range(3)], axis=-1)
+
+        return np.asarray(jax.vmap(derivatives)(jnp.asarray(self.time), jnp.asarray(self.q)))
+
+    def _cut_base(self) -> BaseMotion | None:
+        if self.base is None:
+            return None
+        return BaseMotion(self.base.position, self.base.quaternion, self.base.twist[:, : max(self.order, 1)])
+
+    @cached_property
+    def applied(self) -> Float[np.ndarray, "time n"]:
+        """Forces that the laws of the joints give, (time, n), N m or N; none of those that are driven."""
+
+        def chunk(lanes: np.ndarray) -> Any:
+            return forces_at(self._problem, jax.tree.map(lambda x: x[..., lanes], self._state), self.time[lanes])
+
+        return np.where(self.status == Status.OK, in_chunks(chunk, len(self.time), WIDTHS), np.nan).T
+
+    @property
+    def energy(self) -> Float[np.ndarray, " time"]:
+        """Kinetic energy and potential energy in gravity, J, shape (time,)."""
+        return self._energies.sum(axis=0)
+
+    @property
+    def kinetic_energy(self) -> Float[np.ndarray, " time"]:
+        """Kinetic energy, that of armatures included where drives count, J, shape (time,)."""
+        return self._energies[0]
+
+    @cached_property
+    def _energies(self) -> Float[np.ndarray, "2 time"]:
+        def chunk(lanes: np.ndarray) -> Any:
+            return np.stack(energy_at(self._problem, jax.tree.map(lambda x: x[..., lanes], self._state)))
+
+        return np.where(self.status == Status.OK, in_chunks(chunk, len(self.time), WIDTHS), np.nan)
+
+    def at(self, time: ArrayLike, order: int | None = None) -> "RobotSimulation":
+        """Return the same simulation at other instants, without integrating again.
+
+        Parameters
+        ----------
+        time : array_like of shape (time,)
+            s; those outside of what was simulated are NaN.
+        order : int, optional
+            Highest derivative; that of this simulation unless given.
+        """
+        instants = np.atleast_1d(seconds("time", time, RobotError))
+        order = self.order if order is None else order
+        return RobotSimulation(
+            self.robot, self._problem, self.steps, instants, order, self._ending, self.events, self._wrenches
+        )
+
+    @property
+    def dataset(self) -> "xarray.Dataset":
+        """Coordinates as an `xarray.Dataset`, a variable for each joint with dimensions time and derivative."""
+        import xarray
+
+        axes = time_axes(self.time, self.order + 1)
+        variables = {}
+        for k, name in enumerate(self.robot.joint_names):
+            unit = "rad" if self.robot.joints[name].turning else "m"
+            told = {"units": unit, "long_name": derivatives_of(name)}
+            variables[name] = (tuple(axes), self.q[:, :, k], told)
+        return xarray.Dataset(variables, axes, attrs={"title": self.robot.name, "source": "jounce"})
+
+
+_at = jax.jit(at)  # outside of a program its loop would be compiled at each call
+
+
+def _states(steps: RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, RobotState]:
+    """Return which instants the steps reach, and the states there, batch last."""
+    sense = 1.0 if steps.length[0] >= 0 else -1.0
+    rounding = 1e-14 * max(abs(steps.start[0]), abs(steps.end))
+    reached = (sense * (instants - steps.start[0]) >= -rounding) & (sense * (instants - steps.end) <= rounding)
+    chosen = np.clip(np.searchsorted(sense * steps.start, sense * instants, side="right") - 1, 0, len(steps.start) - 1)
+    since = instants - steps.start[chosen]
+    since = np.where(reached, since, 0.0)
+    polynomial = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[chosen], 0, -1), steps.polynomial)
+    return reached, jax.tree.map(np.asarray, _at(polynomial, since))
+
+
+def _derivatives(coefficients: np.ndarray) -> np.ndarray:
+    """Return plain derivatives, the batch first, from Taylor coefficients, the batch last."""
+    factorials = np.array([math.factorial(k) for k in range(len(coefficients))], float)
+    return np.moveaxis(np.asarray(coefficients) * factorials[:, None, None], -1, 0)
+
+
+@compiled("order")
+def derivatives_at(
+    problem: RobotProblem, state: RobotState, time: Lanes, *, order: int
+) -> tuple[Float[Numbers, "level n batch"], Any]:
+    """Return Taylor coefficients of coordinates in states, to the order + 2, and those of the twist, to the order + 1.
+
+    They follow from the equations of motion there.
+    """
+    series = problem.series(state, time[None], order)
+    last = series.accelerations.joints[order:] / ((order + 1) * (order + 2))
+    q = jnp.concatenate([series.motion.coordinates[: order + 2], last])
+    if series.motion.base is None:
+        return q, None
+    rate = series.accelerations.base
+    assert rate is not None
+    return q, jnp.concatenate([series.motion.base.twist[: order + 1], rate[order:] / (order + 1)])
+
+
+@compiled()
+def energy_at(problem: RobotProblem, state: RobotState) -> tuple[Lanes, Lanes]:
+    """Return kinetic and potential energy in states, J."""
+    return problem.equations.energy(problem.motion(state))
+
+
+@compiled()
+def forces_at(problem: RobotProblem, state: RobotState, time: Lanes) -> Float[Numbers, "n batch"]:
+    """Return the forces of the laws of the joints in states."""
+    return problem.forces(time[None], state.coordinates, state.rates)

@@ -1,0 +1,388 @@
+"""The motion of a simulation as a function of what JAX traces in a mechanism: its steps once more, with lengths held.
+
+What was decided on the way, how long steps are and where they end, is taken from the simulation, and so are all
+states: the program here adds to them how they change. Steps are divided where a change moves faster than the motion.
+The motion is expanded at the beginning of each step, its series evaluated at the end, and the result put on the
+constraints, as the integrator does it. The corrections that put it there vanish but for rounding, so that the matrices
+that they are found with need no derivatives.
+
+Over a kink of a force the state is carried to the instant of the kink by the series of one side, and on from there by
+that of the other, and the instant changes with the state: it is where the accelerations of both sides agree.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jax.errors import ConcretizationTypeError
+from jaxtyping import Float, Int
+
+from jounce.dynamics.forward.accelerations import Equations, Instants, State, expand
+from jounce.dynamics.forward.initial_state import initial_as_drivers
+from jounce.dynamics.forward.saddle_point import DenseInverse
+from jounce.dynamics.masses import gravity_of, masses_of
+from jounce.errors import AssemblyError, MobilityError, SolveError, UnsupportedError
+from jounce.execution.compilation import compiled
+from jounce.integrate.marching.divided_steps import Kinks, Pieces, divided_steps
+from jounce.integrate.marching.force_discontinuities import Kinked, met, shifted, with_value
+from jounce.integrate.marching.smoothness_breaks import Break, breaks
+from jounce.integrate.results.simulation import Simulation
+from jounce.integrate.steps.events import pose_coordinates
+from jounce.integrate.steps.host_calls import called
+from jounce.integrate.steps.lookahead import watched_names
+from jounce.integrate.steps.methods import Taylor, evaluated
+from jounce.integrate.steps.options import instants_of
+from jounce.integrate.steps.projection import normalised
+from jounce.jet import Jet
+from jounce.kinematics.position_analysis.solve import checked_order, lost_orders
+from jounce.kinematics.sensitivity.jacobian_series import solver
+from jounce.kinematics.sensitivity.sensitivities import Solved, check_not_redundant, failed, first_of, solved_shapes
+from jounce.kinematics.sensitivity.traced_motion import TracedMotion
+from jounce.kinematics.status import Status
+from jounce.mechanism import Mechanism, Model
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.traced import Angles, angles_of, template, traced_model, traced_values
+from jounce.modules import with_fields
+from jounce.shapes import Numbers
+
+AT_REST = 1e-12  # m/s and rad/s
+CONVERGED = 1e-13  # what is left out of the series of a change in a step, by the change
+AS_GUESSED = 1e-9  # rad or sizes of the mechanism
+
+
+def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, Any]) -> Any:
+    """Return the simulation of a mechanism of which JAX traces some values.
+
+    Parameters
+    ----------
+    simulate : callable
+        Simulates a mechanism of plain numbers.
+    given : mapping
+        Its arguments by name.
+
+    Raises
+    ------
+    UnsupportedError
+        For a method other than `Taylor`, for events, for forces that count turns of an angle about an axis, and where a
+        force or a velocity jumps.
+    MechanismError
+        If constraints are redundant.
+    """
+    mechanism, options = given["mechanism"], {k: v for k, v in given.items() if k not in ("mechanism", "initial")}
+    if given.get("initial") is not None:
+        mechanism = dataclasses.replace(mechanism, initial=dict(given["initial"]))
+    if options.get("events") or not isinstance(options.get("method") or Taylor(), Taylor):
+        raise UnsupportedError("a simulation is differentiated with jn.Taylor() and without events", name="mechanism")
+    if (recorded := _recorded(simulate, mechanism, options)) is None:
+        return _called(simulate, mechanism, options)
+    simulation, made = recorded
+    check_not_redundant(simulation.model)
+    if any(map(measures_angle, simulation.model.system.forces)):
+        message = "a simulation is not differentiated where forces count the turns of an angle about an axis in space"
+        raise UnsupportedError(message, name="forces")
+    allowed = _allowed(options)
+    kinks = [] if allowed is None else _kinks(simulation)
+    model, equations = _model_of(mechanism, simulation)
+    start = _start(mechanism, simulation, equations)
+    order = simulation.poses[1]["position"].shape[0] - 1
+    pieces = _pieces(simulation, equations, _model_of(made, simulation)[1], allowed, kinks)
+    coordinates = _coordinates(simulation, equations, pieces, start, order)
+    known = {name: np.asarray(x) for name, x in simulation.poses[1].items()}
+    coordinates = {name: known[name] + (x - jax.lax.stop_gradient(x)) for name, x in coordinates.items()}
+    solved = _solved(simulation, coordinates)
+    return TracedMotion(mechanism, (model, model), simulation.time, simulation.order, solved)
+
+
+def _recorded(
+    simulate: Callable[..., Simulation], mechanism: Mechanism, options: Mapping[str, Any]
+) -> tuple[Simulation, Mechanism] | None:
+    """Return the simulation at the values that JAX traces, and the mechanism that has them; None if it knows none."""
+    made, found = template(mechanism), []
+
+    @jax.custom_jvp
+    def record(values: tuple[Any, ...]) -> Any:
+        if not any(isinstance(value, Tracer) for value in values):
+            known = made(values)
+            found.append((simulate(known, **options), known))
+        return jnp.zeros(())
+
+    @record.defjvp
+    def held(primals: tuple[Any], _: tuple[Any]) -> tuple[Any, Any]:
+        return record(*primals), jnp.zeros(())
+
+    record(_values(mechanism))
+    return found[-1] if found else None
+
+
+def _values(mechanism: Mechanism) -> tuple[Any, ...]:
+    return tuple(jnp.asarray(value, float) for value in traced_values(mechanism))
+
+
+def _called(simulate: Callable[..., Any], mechanism: Mechanism, options: Mapping[str, Any]) -> TracedMotion:
+    """Return a simulation within `jax.jit` or `jax.vmap`: what is compiled calls it, one mechanism after another."""
+    order = checked_order(options.get("order", 4))
+    time = mechanism.time if options.get("time") is None else options["time"]
+    try:
+        instants = instants_of(time, mechanism.parameter_values)
+    except ConcretizationTypeError:
+        raise UnsupportedError("the instants depend on values that JAX traces; give them", name="time") from None
+    made, levels = template(mechanism), order + max(lost_orders(mechanism), 1) + 1
+    shapes = solved_shapes(mechanism, len(instants), levels)
+    options = {**options, "time": instants, "strict": False}
+
+    def found(values: tuple[Any, ...]) -> Solved:
+        try:
+            motion = simulate(made(values), **options)
+        except (AssemblyError, MobilityError, SolveError) as error:
+            status = np.full(len(instants), float(getattr(error, "status", None) or Status.NOT_REACHED))
+            return failed(shapes, status)
+        return motion.solved if motion.traced else _solved(motion, dict(motion.poses[1]))
+
+    solved = called(found, shapes, _values(mechanism))
+    model = traced_model(mechanism, solved.length, solved.angles, first_of(solved.coordinates))
+    check_not_redundant(model)
+    return TracedMotion(mechanism, (model, model), instants, order, solved)
+
+
+def _solved(simulation: Simulation, coordinates: dict[str, Any]) -> Solved:
+    """Return what is kept of a simulation, with these coordinates."""
+    angles, status = _angles(simulation), simulation.status.astype(float)
+    length = np.float64(simulation.model.length)
+    return Solved(coordinates, status, length, angles, angles.angle[0], simulation.continued_outputs)
+
+
+def _angles(simulation: Simulation) -> Angles:
+    """Return the angles about axes that the outputs of a simulation measure, with their turns at its instants."""
+    outputs = simulation.model.system.outputs
+    found = angles_of(simulation.model, (simulation.model.system.forces, outputs))
+    measured = [k for k, group in enumerate(outputs) if measures_angle(group)]
+    near = tuple(np.asarray(simulation.output_values(k)[0, 0]) for k in measured)
+    return found._replace(near=(found.near[0], near))
+
+
+def _model_of(mechanism: Mechanism, simulation: Simulation) -> tuple[Model, Equations]:
+    """Return the model and the equations of motion as functions of what JAX traces."""
+    first = {name: np.asarray(x)[0, ..., :1] for name, x in _first(simulation).items()}
+    known = simulation.equations
+    model = traced_model(mechanism, simulation.model.length, _angles(simulation), first)
+    system = with_fields(
+        model.system, outputs=(), column_scale=known.system.column_scale, row_scale=np.asarray(known.system.row_scale)
+    )
+    masses, gravity = masses_of(mechanism), gravity_of(mechanism)
+    return model, Equations(system, masses, gravity, known.scale, known.pose_type)
+
+
+def _first(simulation: Simulation) -> dict[str, Any]:
+    """Return the coordinates of all bodies at the start."""
+    state = simulation.dense_output.polynomial.map(lambda part: np.asarray(part)[0, :1, ..., None])
+    found = pose_coordinates(state)
+    return {name: found[name] for name in found if name != "angular_velocity"}
+
+
+def _allowed(options: Mapping[str, Any]) -> float | None:
+    """Return the relative error of a step in a change, or None where steps are chosen, not controlled."""
+    if not (options.get("method") or Taylor()).controlled:
+        return None
+    return max(CONVERGED, 100.0 * float(options.get("tolerance") or 0.0))
+
+
+def _kinks(simulation: Simulation) -> list[Break]:
+    """Return the kinks of forces along a simulation, or raise UnsupportedError if a force or a velocity jumps."""
+    dense, found = simulation.dense_output, breaks(simulation.dense_output, float(simulation.model.length))
+    names = watched_names(simulation.model)
+    for order, what in ((1, "has a kink, so that velocities jump"), (2, "jumps")):
+        for jump in found:
+            if jump.order == order:
+                name, time = names[int(dense.kink[jump.step])], float(dense.start[jump.step] + jump.since)
+                message = (
+                    f"the law {what} at t = {time:.10g} s; how that instant moves is not known, so that a simulation "
+                    "is not differentiated over it: give the law a steep passage, such as tanh(x/width)"
+                )
+                raise UnsupportedError(message, name=name)
+    return found
+
+
+def _pieces(
+    simulation: Simulation, equations: Equations, plain: Equations, allowed: float | None, kinks: list[Break]
+) -> Pieces:
+    """Return the steps of a simulation, divided as what is traced in its equations asks; `plain` are their numbers."""
+    leaves, structure = jax.tree.flatten(equations)
+    assert structure == jax.tree.structure(plain)
+    moving = [k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer)]
+    length = float(simulation.model.length)
+    return divided_steps(simulation.dense_output, plain, moving, length, _expanded, allowed, kinks)
+
+
+def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -> State:
+    """Return the state at the start: it changes so that joints, drivers and initial conditions go on holding."""
+    known = simulation.dense_output.polynomial.map(lambda part: jnp.asarray(part)[0, 0, ..., None])
+    instant = np.array([[simulation.dense_output.start[0]]])
+    begun = traced_model(initial_as_drivers(mechanism), simulation.model.length)
+    scales = {"column_scale": equations.system.column_scale}
+    whole = dataclasses.replace(equations, system=with_fields(begun.system, outputs=(), forces=(), **scales))
+    rows, columns = whole.system.shape
+    if rows == columns:
+        return _corrected(whole, _corrected(whole, known, instant), instant)  # twice, for second derivatives
+    _check_guessed(mechanism, simulation, known)
+    guess = traced_model(mechanism, simulation.model.length).guess
+    position = guess["position"][:, 1:]
+    attitude = guess["angle"][None, 1:] if "angle" in guess else guess["quaternion"][:, 1:]
+    inverse = np.linalg.pinv(np.asarray(_jacobian(simulation.equations, known, instant)))
+    return _assembled(equations, known, (position, attitude), inverse, instant)
+
+
+@compiled(narrow=True)
+def _jacobian(equations: Equations, state: State, instant: Instants) -> Float[Numbers, "row column"]:
+    """Return the Jacobian at a state."""
+    return equations.system.jacobian(equations.still(state.position, state.attitude), Jet([instant]))[..., 0]
+
+
+@compiled(narrow=True)
+def _assembled(
+    equations: Equations,
+    known: State,
+    guess: tuple[Any, Any],
+    inverse: Float[Numbers, "column row"],
+    instant: Instants,
+) -> State:
+    """Return a known state as it changes with positions and attitudes of the starting guess.
+
+    It changes by the shortest step onto the constraints, as that of the assembly: `inverse` is that of the Jacobian.
+    """
+    position, attitude = guess
+    still = equations.still(position, attitude)
+    gap = equations.system.residual(still, Jet([instant])).coefficients[0]
+    column = -(inverse @ gap)
+    pose = still.displaced(*equations.system.coordinates(column, still.shifts))
+    state = known._replace(position=pose.position.coefficients[0][:, 1:], attitude=equations.attitude_of(pose))
+    factor = jax.lax.stop_gradient(equations).factored(known, instant)
+    return equations.with_rates(factor, state, instant)
+
+
+def _check_guessed(mechanism: Mechanism, simulation: Simulation, known: State) -> None:
+    """Raise UnsupportedError unless a start that is not prescribed is the starting guess itself, at rest."""
+    guess, name = simulation.model.guess, "angle" if mechanism.space == "planar" else "quaternion"
+    attitude = np.asarray(guess[name])[None, 1:] if name == "angle" else np.asarray(guess[name])[:, 1:]
+    away = np.abs(np.asarray(guess["position"])[:, 1:] - known.position).max() / simulation.model.length
+    turned = np.abs(attitude - known.attitude).max()
+    speed = max(float(np.abs(np.asarray(part)).max()) for part in known[2:])
+    if mechanism.initial or max(away, turned) > AS_GUESSED or speed > AT_REST:
+        raise UnsupportedError(
+            "the start follows from the starting guess and from least velocities, and is differentiated only where "
+            "the guess fulfils all joints and all is at rest; give an initial condition for each degree of freedom",
+            name="initial",
+        )
+
+
+def _coordinates(
+    simulation: Simulation, equations: Equations, pieces: Pieces, start: State, order: int
+) -> dict[str, Any]:
+    """Return the Taylor coefficients of the coordinates at the instants, as the steps lead there from a start."""
+    instants = simulation.time
+    chosen = pieces.at(instants)
+    since = instants - pieces.start[chosen]
+    pieces = pieces.padded()
+    known = pieces.state.map(lambda part: part[..., None])
+    highest = pieces.kept.shape[1] - 1
+    path = pieces.kept, *pieces[:2], pieces.kinks
+    state = _marched(equations, start, known, *path, chosen, since, instants, order=order, highest=highest)
+    return pose_coordinates(state)
+
+
+@compiled("order", "highest", narrow=True)
+def _marched(
+    equations: Equations,
+    start: State,
+    known: State,
+    kept: Any,
+    begun: Float[Numbers, " step"],
+    steps: Float[Numbers, " step"],
+    kinks: Kinks | None,
+    chosen: Int[Numbers, " time"],
+    since: Float[Numbers, " time"],
+    instants: Float[Numbers, " time"],
+    *,
+    order: int,
+    highest: int,
+) -> State:
+    """Return the series of the motion at instants, (order + 1, ..., time), after a march over steps that are known.
+
+    Parameters
+    ----------
+    known : State
+        At the beginning of all steps, (steps, ..., 1): what comes of the march here has these values.
+    kept : array of bool, shape (steps, highest + 1)
+        Which coefficients of the series the steps were taken with.
+    kinks : Kinks, optional
+        Which of the steps lead over kinks.
+    """
+
+    def series(state: State, kept: Any, time: Any) -> State:
+        return _expanded(equations, state, time[None], highest).map(
+            lambda part: jnp.where(kept[:, None, None], part, 0.0)
+        )
+
+    @jax.checkpoint
+    def march(carry: Any, step: Any) -> tuple[Any, State]:
+        state, kinked = carry
+        here, kept, time, length, over = step
+        time, length, state = time[None], length[None], jax.tree.map(with_value, state, here)
+        found = series(state, kept[:, None], time)
+        arrived, end = evaluated(found, length), time + length
+        if over is not None:
+            behind, late = met(state, found, length, kinked, over)
+            left = Kinked(shifted(found, length), jnp.zeros_like(length))
+            back = (behind, time, kinked._replace(late=late))
+            arrived, end, kinked = jax.tree.map(lambda a, b: jnp.where(over.back, a, b), back, (arrived, end, left))
+        return (_corrected(equations, arrived, end[None]), kinked), state
+
+    none = None if kinks is None else Kinked(shifted(start.map(lambda part: part[None])), jnp.zeros(1))
+    _, states = jax.lax.scan(march, (start, none), (known, kept, begun, steps, kinks))
+    chosen_states = states.map(lambda part: jnp.moveaxis(part[chosen, ..., 0], 0, -1))
+    time = instants - since
+
+    @jax.checkpoint
+    def arrive(state: State) -> State:
+        arrived = evaluated(series(state, kept[chosen].T, time), since)
+        return _expanded(equations, _corrected(equations, arrived, instants[None]), instants[None], order)
+
+    return arrive(chosen_states)
+
+
+def _expanded(equations: Equations, state: State, time: Instants, order: int) -> State:
+    """Return the series of the motion through a state."""
+    inverse = _inverse(equations.matrix(state, time), jax.lax.stop_gradient(equations.factored(state, time).inverse()))
+    return expand(equations, state, time, order, DenseInverse(inverse), reversible=True).state
+
+
+def _inverse(matrix: Any, known: Any) -> Any:
+    """Return the inverse of matrices, which is known, with the derivatives that it has.
+
+    As the solution of equations: of a rule by `jax.custom_jvp` JAX keeps nothing where it computes again what it did
+    not keep (`jax.checkpoint`), so that derivatives of gradients were wrong.
+    """
+
+    def product(a: Any, b: Any) -> Any:
+        return jnp.sum(a[:, :, None] * b[None], axis=1)
+
+    unit = jnp.broadcast_to(jnp.eye(len(matrix))[:, :, None], matrix.shape)
+    transposed = jnp.swapaxes(known, 0, 1)
+    return solver(partial(product, matrix), partial(product, known), partial(product, transposed))(unit)
+
+
+@compiled(narrow=True)
+def _corrected(equations: Equations, state: State, time: Instants) -> State:
+    """Return the state after one correction onto the constraints and their rates; see `projected`."""
+    state = state._replace(attitude=normalised(state.attitude))
+    held, fixed = jax.lax.stop_gradient((equations, state))
+    factor = held.factored(fixed, time)
+    still = equations.still(state.position, state.attitude)
+    gap = equations.system.residual(still, Jet([time])).coefficients[0]
+    pose = still.displaced(*equations.system.coordinates(equations.least_change(factor, gap), still.shifts))
+    position, attitude = pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)
+    return equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)

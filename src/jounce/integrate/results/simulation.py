@@ -1,0 +1,337 @@
+"""The result of a simulation: a motion with dense output, energy, drift and events."""
+
+from functools import cached_property
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.energy.energies import body_energy, energy_of_forces
+from jounce.dynamics.forward.accelerations import Equations, Instants, Lanes, State, expand
+from jounce.dynamics.forward.initial_state import ConsistentStart
+from jounce.dynamics.motion_values import Coordinates, cut, pose_of
+from jounce.errors import MechanismError
+from jounce.execution.backends import joined
+from jounce.execution.chunks import in_chunks
+from jounce.execution.compilation import compiled
+from jounce.execution.mapped import mapped
+from jounce.execution.store import is_wanted_soon
+from jounce.integrate.marching.marching import DenseOutput
+from jounce.integrate.marching.smoothness_breaks import breaks
+from jounce.integrate.steps.events import WIDTHS, in_pieces, pose_coordinates, series_of
+from jounce.integrate.steps.lookahead import watched_names
+from jounce.integrate.steps.methods import evaluated
+from jounce.integrate.steps.projection import projected
+from jounce.integrate.steps.revolution_counts import (
+    PLACES,
+    AnglesOfForces,
+    attitudes_along,
+    attitudes_at,
+    followed,
+    measured,
+)
+from jounce.jet import Jet, dot
+from jounce.jet.derivatives import plain_derivatives
+from jounce.jet.turns import brought_near, counted_by_rates
+from jounce.kinematics import Motion, Status
+from jounce.kinematics.results.pose_outputs import output_series
+from jounce.mechanism import Mechanism
+from jounce.mechanism.axis_angles import AttitudeHistory, measures_angle, with_turns
+from jounce.mechanism.system import Group
+from jounce.shapes import ArrayLike, Numbers, seconds
+
+MUCH_LONGER = (
+    1e3  # than the step over a jump or a kink are one of those before and the next; a steep force takes several
+)
+LARGE = 32  # numbers of an array that stays in memory in machine code of an instant
+FEW_INSTANTS = 8  # evaluated together, where there are no more: the end of a long run, say
+APPROACH = 4  # steps to such a place, each much shorter than the one before
+
+
+class Simulation(Motion):
+    """The motion of a mechanism under its forces, at the instants asked for and at any other.
+
+    All that `Motion` offers is there: outputs, points and angles with their derivatives, forces of joints. At each
+    instant the derivatives of every order follow from the equations of motion, not from the steps.
+
+    Attributes
+    ----------
+    energy : numpy.ndarray of shape (time,)
+        Kinetic energy, potential energy in gravity, and what springs have stored, J.
+    drift : numpy.ndarray of shape (time,)
+        Largest residual of all joints and drivers, rad or sizes of the mechanism, on the positions.
+    mobility : str
+        Degrees of freedom and the bodies that have them.
+    events : list of list of float
+        For each event asked for, the times at which it happened, s.
+    kinks : list of tuple of float and str
+        When a force or a motion law had a jump or a kink, s, and which.
+    dense : DenseOutput
+        The steps, as polynomials.
+    steps_backend : str
+        Which arithmetic took the steps; none unless they were taken here. `backend` also tells what expanded the
+        motion at the instants.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        start: ConsistentStart,
+        dense: DenseOutput,
+        instants: np.ndarray,
+        order: int,
+        ending: tuple[Status, str] = (Status.OK, ""),
+        events: list[list[float]] | None = None,
+        steps_backend: str = "",
+    ):
+        self.dense_output, self._start, self.steps_backend = dense, start, steps_backend
+        self.events = [] if events is None else events
+        self._ending = ending
+        reached, chosen = _steps_of(dense, instants)
+        outputs, highest = start.model.system.outputs, derivatives_of_motion(mechanism, order)
+        (state, self._angles, found), backend = motion_at(start.equations, outputs, dense, instants, chosen, highest)
+        coordinates = pose_coordinates(state)
+        found = zip(outputs, found, strict=True)
+        groups = tuple(self._counted(group, series, instants) for group, series in found)
+        status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
+        faults = {}
+        lost = reached & ~np.isfinite(np.concatenate([p.reshape(-1, len(instants)) for p in state])).all(axis=0)
+        for names, series in zip(start.model.outputs, groups, strict=True):
+            bad = ~np.isfinite(series[: order + 1]).all(axis=(0, 1)) & reached & ~lost  # (outputs, time)
+            undefined = np.flatnonzero(bad.any(axis=0))
+            status[undefined] = int(Status.UNDEFINED)
+            faults |= {int(lane): f"output {names[int(np.argmax(bad[:, lane]))]}" for lane in undefined}
+        if lost.any():  # the state is known there, but not its derivatives
+            status[lost], faults[int(np.argmax(lost))] = int(Status.INADMISSIBLE), ending[1]
+        beyond = np.flatnonzero(~reached & (np.abs(instants - dense.start[0]) > abs(dense.end - dense.start[0])))
+        if ending[0] != Status.OK and beyond.size:
+            status[beyond[0]], faults[int(beyond[0])] = int(ending[0]), ending[1]
+        values = tuple(plain_derivatives(np.asarray(series)) for series in groups)
+        super().__init__(mechanism, start.model, instants, order, (coordinates, values), status, faults)
+        self.backend = joined({backend, *filter(None, steps_backend.split(", "))})
+
+    def __repr__(self) -> str:
+        return f"<Simulation{super().__repr__()[7:-1]}, {self.steps} steps>"
+
+    @property
+    def mobility(self) -> str:
+        """Degrees of freedom and the bodies that have them, in words."""
+        return self._start.mobility
+
+    @property
+    def equations(self) -> Equations:
+        """The equations of motion."""
+        return self._start.equations
+
+    def steps_at(self, instants: np.ndarray) -> np.ndarray:
+        """Return the step in which each instant is, by index."""
+        return _steps_of(self.dense_output, instants)[1]
+
+    def output_values(self, group: int) -> np.ndarray:
+        """Return the derivatives of the outputs of a group, (order + 1, components, instances, time)."""
+        return list(self._groups.values())[group]
+
+    @property
+    def steps(self) -> int:
+        """Number of steps taken."""
+        return len(self.dense_output.start)
+
+    @property
+    def kinks(self) -> list[tuple[float, str]]:
+        """Times at which a force or a motion law had a jump or a kink, s, and its name; derivatives do not exist there.
+
+        A step over such a place is made so short that it costs no digits, and the next may be long again.
+        """
+        kink, length = self.dense_output.kink, np.abs(self.dense_output.length)
+        names = watched_names(self._start.model)
+        before = [length[max(k - APPROACH, 0) : k].max(initial=0.0) for k in range(len(length) - 1)]
+        short = MUCH_LONGER * length[:-1]
+        places = np.flatnonzero((kink[:-1] >= 0) & (length[1:] > short) & (np.array(before) > short))
+        since = {int(k): float(self.dense_output.length[k]) for k in places}
+        # series that do not go on as the next tell when it was; and after a long approach they alone tell that it was
+        since |= {x.step: x.since for x in breaks(self.dense_output, float(self.model.length)) if kink[x.step] >= 0}
+        return [(float(self.dense_output.start[k] + since[k]), names[kink[k]]) for k in sorted(since)]
+
+    @property
+    def ended_at(self) -> float:
+        """Time to which the motion was followed, s."""
+        return self.dense_output.end
+
+    def at(self, time: ArrayLike, order: int | None = None) -> "Simulation":
+        """Return the same simulation at other instants, without integrating again.
+
+        Parameters
+        ----------
+        time : array_like of shape (time,)
+            s; those outside of what was simulated are NaN.
+        order : int, optional
+            Highest derivative; that of this simulation unless given.
+        """
+        instants = np.atleast_1d(seconds("time", time, MechanismError))
+        order = self.order if order is None else order
+        outcome = self._ending, self.events, self.steps_backend
+        return Simulation(self.mechanism, self._start, self.dense_output, instants, order, *outcome)
+
+    @property
+    def energy(self) -> Float[np.ndarray, " time"]:
+        """Kinetic energy, potential energy in gravity, and what springs have stored, J, shape (time,)."""
+        return self._checked[0]
+
+    @property
+    def drift(self) -> Float[np.ndarray, " time"]:
+        """Largest residual of joints and drivers, rad or sizes of the mechanism, shape (time,)."""
+        return self._checked[1]
+
+    @property
+    def kinetic_energy(self) -> Float[np.ndarray, " time"]:
+        """Kinetic energy, J, shape (time,)."""
+        return self._checked[2]
+
+    @cached_property
+    def forces(self) -> tuple[Group, ...]:
+        """The applied forces, in the groups of the model, with the turns of angles about axes at every instant."""
+        return with_turns(self.model.system.forces, self._angles)
+
+    @cached_property
+    def _attitudes(self) -> AttitudeHistory:
+        """The attitudes of all bodies in space along the steps; there are none of states that another solver gave."""
+        dense = self.dense_output
+        if not dense.length.any():
+            return AttitudeHistory(self._attitudes_at(dense.start), dense.start)
+        instants = (dense.start[:, None] + dense.length[:, None] * (np.arange(PLACES) / PLACES)).ravel()
+        instants = np.append(instants, dense.end)
+        along = attitudes_along(dense.polynomial.attitude, dense.length, PLACES)
+        return AttitudeHistory(along, instants, between=self._attitudes_at)
+
+    def _attitudes_at(self, instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, "4 bodies time"]:
+        dense, chosen = self.dense_output, self.steps_at(instants)
+        return attitudes_at(dense.polynomial.attitude[chosen], instants - dense.start[chosen])
+
+    def _coefficients(self, group: Group) -> np.ndarray:
+        pose_type, coordinates = self.poses
+        (series,) = series_of((group,), coordinates, pose_type)
+        return self._counted(group, series, self.time)
+
+    def _counted(
+        self, group: Group, series: Float[np.ndarray, "order component instance time"], instants: np.ndarray
+    ) -> Float[np.ndarray, "order component instance time"]:
+        """Return the series of outputs at instants; angles known up to whole turns go on from step to step."""
+        dense = self.dense_output
+        if not group.element.turning or not dense.length.any():  # no steps: states that another solver gave
+            return continuous(group, series, instants)
+        if measures_angle(group):
+            (counted,) = self._attitudes.counting((group,), instants)
+            series[0, 0] = brought_near(series[0, 0], counted.element.datum.near)
+            return series
+        kind = self._start.model.pose_type
+        pieces = in_pieces(group, dense.polynomial, dense.length, 1, kind, lambda x: x[1:2])
+        nodes, known = pieces.time(dense.start, dense.length), pieces.series[:2]
+        known = known.reshape(*known.shape[:3], -1)
+        counted = counted_by_rates(known[0], known[1], nodes)
+        near = np.abs(nodes[None] - instants[:, None]).argmin(axis=1)
+        expected = counted[..., near] + (instants - nodes[near]) * 0.5 * (known[1][..., near] + series[1])
+        series[0] = brought_near(series[0], expected)
+        return series
+
+    @cached_property
+    def _checked(self) -> list[np.ndarray]:
+        """Energy, drift and kinetic energy."""
+        pose_type, coordinates = self.poses
+        equations = self._start.equations.near(self._angles)
+        found = _checks(equations, cut(coordinates, 1), self.time[None], pose_type)
+        return [np.where(self.status == Status.OK, part, np.nan) for part in found]
+
+
+def _steps_of(dense: DenseOutput, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which instants the steps reach, and the step in which each of them is."""
+    sense = 1.0 if dense.length[0] >= 0 else -1.0
+    rounding = 1e-14 * max(abs(dense.start[0]), abs(dense.end))
+    reached = (sense * (instants - dense.start[0]) >= -rounding) & (sense * (instants - dense.end) <= rounding)
+    chosen = np.searchsorted(sense * dense.start, sense * instants, side="right") - 1
+    return reached, np.clip(chosen, 0, len(dense.start) - 1)
+
+
+def derivatives_of_motion(mechanism: Mechanism, order: int) -> int:
+    """Return the highest derivative of the motion that outputs up to an order need."""
+    return order + max([1, *(output.lost_orders for output in mechanism.outputs.values())])
+
+
+def motion_at(
+    equations: Equations,
+    outputs: tuple[Group, ...],
+    dense: DenseOutput,
+    instants: np.ndarray,
+    chosen: np.ndarray,
+    order: int,
+) -> tuple[Any, str]:
+    """Return what `expanded` does at instants in chosen steps, all of them, and what computes it."""
+    shared = equations, outputs
+
+    def lanes_of(places: np.ndarray) -> Any:
+        steps, now = chosen[places], instants[places]
+        polynomial = dense.polynomial.map(lambda part: part[steps].transpose(1, 2, 3, 0))
+        return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
+
+    example = lanes_of(np.zeros(1, int))
+    program = expanded.program(shared, example, large=LARGE, hasty=is_wanted_soon(), order=order)
+    found = in_chunks(lambda places: program(lanes_of(places)), len(instants), (FEW_INSTANTS, *WIDTHS))
+    return found, program.backend
+
+
+@mapped(widths=(FEW_INSTANTS, *WIDTHS), narrow=True)
+def expanded(
+    shared: tuple[Equations, tuple[Group, ...]], lanes: tuple[AnglesOfForces, State, Lanes, Lanes], order: int
+) -> tuple[State, AnglesOfForces, tuple[Float[Numbers, "_ _ _ batch"], ...]]:
+    """Return the Taylor coefficients of the motion at instants, from the equations there.
+
+    Parameters
+    ----------
+    shared : tuple
+        Equations, and outputs.
+    lanes : tuple
+        Of each instant: angles about axes that forces measure at the beginning of the step it is in, the polynomial of
+        the step, the time since then, s, and the instant itself.
+    order : int
+        Highest coefficient.
+
+    Returns
+    -------
+    state : State
+        Coefficients, (order + 1, components, bodies, instants).
+    angles : tuple of array
+        About axes that forces measure, at the instants.
+    outputs : tuple of array
+        Their series, as `output_series` gives them.
+    """
+    (equations, outputs), (angles, polynomial, step, instants) = shared, lanes
+    equations = equations.near(angles)
+    begun = measured(equations, polynomial.map(lambda part: part[0]))
+    there = equations.near(followed(equations, begun, polynomial, step).at(step))
+    state, _, inverse = projected(there, evaluated(polynomial, step), instants[None])
+    series = expand(there, state, instants[None], order, inverse).state
+    found = output_series(outputs, pose_coordinates(series), equations.pose_type)
+    return series, measured(there, state), found
+
+
+def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:
+    """Take the whole turns out of angles that are known up to them, from one instant to the next by their rates."""
+    if group.element.turning and len(instants) > 1:
+        series[0] = counted_by_rates(series[0], series[1], instants)
+    return series
+
+
+@compiled("pose_type", brief=True)
+def _checks(
+    equations: Equations, coordinates: Coordinates, time: Instants, pose_type: type
+) -> tuple[Lanes, Lanes, Lanes]:
+    """Return the energy, the largest residual and the kinetic energy."""
+    pose, clock = pose_of(coordinates, pose_type), Jet.variable(time, 1)
+    masses = equations.masses
+    translation, rotation = body_energy(pose, *masses, 0)
+    height = dot(pose.point(masses.center), equations.gravity).coefficients[0]
+    kinetic = jnp.sum(translation.coefficients[0] + rotation.coefficients[0], axis=0)
+    stored = energy_of_forces(equations.system.forces, pose, clock)
+    energy = kinetic - jnp.sum(masses.mass * height, axis=0) + stored
+    gaps = equations.system.residual(pose, clock).coefficients[0]
+    return energy, jnp.max(jnp.abs(gaps), axis=0, initial=0.0), kinetic

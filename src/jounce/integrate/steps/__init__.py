@@ -1,0 +1,1 @@
+"""One step: Taylor series, Obreshkov formulas, projection, and what lies within the step."""

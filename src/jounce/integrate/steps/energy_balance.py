@@ -1,0 +1,141 @@
+"""The energy of a motion, kept along its steps: where nothing takes or gives any, it must not change.
+
+Steps end on the constraints whatever those have been in between, so that neither positions nor velocities tell of a
+joint that has jumped, or has a kink at which velocities must jump. The energy does.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.dynamics.energy.energies import body_energy
+from jounce.dynamics.forward.accelerations import Equations, Flags, Instants, Lanes, State
+from jounce.forces.base import AbstractForce
+from jounce.integrate.steps.exact_programs import uses
+from jounce.integrate.steps.lookahead import hiding
+from jounce.jet import Jet, dot
+from jounce.mechanism.system import Group
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+KEPT = 1e-8  # of the largest kinetic energy and the largest change of the other: so much changes by rounding at most
+OFFSET = 1e-12  # of all energies, however little of them is exchanged
+EXCHANGED = 1e-13  # of the power of a force: what differs by more from the rate of what is stored is taken or given
+
+
+class Energies(NamedTuple):
+    """Energies in states, J, of shape (batch,).
+
+    Attributes
+    ----------
+    kinetic, potential : array
+        The latter in gravity and in springs.
+    size : array
+        Sum of the sizes of all of them.
+    exchanging : array of bool
+        Whether a force takes or gives energy there that it does not store.
+    """
+
+    kinetic: Lanes
+    potential: Lanes
+    size: Lanes
+    exchanging: Flags
+
+
+class Balance(NamedTuple):
+    """What is known of the energy of runs up to where they are; arrays of shape (batch,).
+
+    Attributes
+    ----------
+    start : Energies
+        Where they began.
+    exchanged : array
+        Largest kinetic energy so far, and largest change of the other, J.
+    leeway : array
+        By how much it may have changed by the errors that steps are allowed, J.
+    open : array of bool
+        Whether something has taken or given energy.
+    broken : array of bool
+        Whether a step from near here was refused because the energy would have changed.
+    """
+
+    start: Energies
+    exchanged: Lanes
+    leeway: Lanes
+    open: Flags
+    broken: Flags
+
+
+def is_balanced(equations: Equations, state: State, time: Instants) -> bool:
+    """Tell whether the energy of a mechanism is to be kept: nothing moves it, and forces say what energy they store.
+
+    It is looked at where a joint could be overlooked, at less than a tenth of the cost of a step.
+    """
+    still, pose = equations.still(state.position, state.attitude), equations.pose(state)
+    groups, forces = equations.system.groups, equations.system.forces
+    if not hiding(equations, state, time) or any(_is_moved(group, still, time) for group in groups):
+        return False
+
+    def power(group: Group) -> Callable[[Instants], Numbers]:
+        return lambda now: group.power(pose, Jet.variable(now, 1)).coefficients[0]
+
+    told = all(type(group.element).energy is not AbstractForce.energy for group in forces)
+    return told and not any(uses(jax.make_jaxpr(power(group))(time)) for group in forces)
+
+
+def _is_moved(group: Group, still: Pose, time: Instants) -> bool:
+    """Tell whether the residual of joints or drivers depends on time."""
+    return uses(jax.make_jaxpr(lambda now: group.residual(still, Jet([now])).coefficients[0])(time))
+
+
+def energies(equations: Equations, state: State, time: Instants) -> Energies:
+    """Return the energies in states, and whether a force takes or gives any there."""
+    pose, clock, lanes = equations.pose(state), Jet.variable(time, 1), time.shape[-1]
+    masses, gravity = equations.masses, equations.gravity
+    translation, rotation = body_energy(pose, *masses, 0)
+    kinetic = jnp.sum(translation.coefficients[0] + rotation.coefficients[0], axis=0)
+    lifted = -masses.mass * dot(pose.point(masses.center), gravity).coefficients[0]
+    size, potential, exchanging = kinetic + jnp.sum(jnp.abs(lifted), axis=0), jnp.sum(lifted, axis=0), jnp.zeros(lanes)
+    for group in equations.system.forces:
+        stored, power = group.energy(pose, clock).dense(), group.power(pose, clock).coefficients[0]
+        value, rate = (jnp.broadcast_to(c, (group.instances, lanes)) for c in stored.coefficients[:2])
+        gap = jnp.abs(power + rate) - EXCHANGED * (jnp.abs(power) + jnp.abs(rate))
+        potential, size = potential + jnp.sum(value, axis=0), size + jnp.sum(jnp.abs(value), axis=0)
+        exchanging = jnp.maximum(exchanging, jnp.max(jnp.where(jnp.isfinite(gap), gap, 1.0), axis=0))
+    return Energies(kinetic, potential, size, exchanging > 0)
+
+
+def begun(found: Energies) -> Balance:
+    """Return what is known of the energy where runs begin."""
+    nothing = jnp.zeros_like(found.kinetic)
+    return Balance(found, found.kinetic, nothing, found.exchanging, nothing > 0)
+
+
+def unknown(nothing: Lanes) -> Balance:
+    """Return a placeholder, of zeros, for the energy of runs of which the start is not known yet."""
+    none = np.zeros(nothing.shape, bool)
+    return Balance(Energies(nothing, nothing, nothing, none), nothing, nothing, none, none)
+
+
+def followed(balance: Balance, found: Energies, leeway: Lanes) -> tuple[Balance, Flags]:
+    """Return the balance with one more state, and whether it holds.
+
+    Parameters
+    ----------
+    balance : Balance
+        So far.
+    found : Energies
+        At the end of a step.
+    leeway : array of shape (batch,)
+        By how much the error that the step is allowed may change a velocity, times the square root of a mass.
+    """
+    change = found.potential - balance.start.potential
+    exchanged = jnp.maximum(balance.exchanged, jnp.maximum(found.kinetic, jnp.abs(change)))
+    allowed = balance.leeway + leeway * (jnp.sqrt(2.0 * exchanged) + leeway)
+    opened = balance.open | found.exchanging
+    gap = jnp.abs(change + found.kinetic - balance.start.kinetic)
+    kept = gap <= KEPT * exchanged + OFFSET * jnp.maximum(found.size, balance.start.size) + allowed
+    return Balance(balance.start, exchanged, allowed, opened, balance.broken), kept | opened

@@ -1,0 +1,188 @@
+"""Two-point formulas of Obreshkov: derivatives of both ends of a step, up to the same order. Sommer 2024, section 7.
+
+With the Taylor coefficients c of ``y = (position, attitude, velocity, spin)`` at the two ends of a step h,
+``y_1 = y_0 + sum_j p! (2p-j)! / ((2p)! (p-j)!) h^j (c_0[j] - (-1)^j c_1[j])``, j = 1..p, is right to order 2p. The end
+stands on both sides: it is found by iteration. Of the velocities the formula takes accelerations with p = 1, jerk with
+p = 2, jounce with p = 3.
+"""
+
+import math
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.forward.accelerations import Equations, Expansion, Flags, Lanes, State, expand
+from jounce.errors import JounceError
+from jounce.integrate.steps.methods import ROUNDING, AbstractMethod, Number, Sizes, check_step, evaluated, reach
+from jounce.jet.algebra import total
+from jounce.shapes import Numbers
+
+MOST_ITERATIONS = 80
+CONVERGED = 1e-15  # change in an iteration, rad or sizes of the mechanism
+STALLED = 1e-13  # a change below this that no longer shrinks is rounding
+HIGHER_COEFFICIENTS = 4  # beyond the first in the error: some vanish at rest and at turning points
+
+
+class Obreshkov(AbstractMethod):
+    """Implicit two-point formula on accelerations, jerk, jounce and crackle of both ends of a step.
+
+    It is symmetric in time and has no more than its order asks for in derivatives: half of it.
+
+    Parameters
+    ----------
+    order : int, default 6
+        4 (with jerk), 6 (with jounce) or 8; 2 is the trapezoidal rule, with accelerations alone.
+    step : float, optional
+        The length of all steps, s; by a control of the error unless given.
+
+    Raises
+    ------
+    JounceError
+        If there is no formula of this order.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.Obreshkov(4, step=0.01).expansion_order(1e-8)
+    2
+    """
+
+    order: int = eqx.field(static=True, default=6)
+    step: float | int | None = None
+
+    def __check_init__(self):
+        if isinstance(self.order, bool) or self.order not in (2, 4, 6, 8):
+            raise JounceError("there are Obreshkov formulas of order 2, 4, 6 and 8", name="order", value=self.order)
+        check_step(self.step)
+
+    @property
+    def highest(self) -> int:
+        """Highest derivative of positions and velocities in the formula."""
+        return self.order // 2
+
+    def expansion_order(self, tolerance: float) -> int:
+        """Return the order of the expansions: beyond the formula's own, where the step is to be chosen."""
+        return self.highest if self.step is not None else self.order + HIGHER_COEFFICIENTS
+
+    def longest_step(self, sizes: Sizes, tolerance: Number) -> Lanes:
+        """Return the step at which the leading error, or the next where that vanishes, is the tolerance."""
+        if self.step is not None:
+            return jnp.full(sizes.shape[1], self.step, float)
+        first = self.order + 1
+        constant = (self.order + 2) * math.factorial(self.highest) ** 2 / math.factorial(self.order)
+        return reach(sizes, first) * (tolerance / constant) ** (1.0 / first)
+
+    def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
+        """Return the end that fulfils the formula, not finite where the iteration for it does not converge."""
+        measure = _measure(equations.system.column_scale[0], step)
+        later = (time + step)[None]
+        known = _known(expansion, step, self.highest)
+
+        def improved(end: State) -> State:
+            found = expand(equations, end, later, self.highest).state
+            return State(*(a - _terms(c, -step, self.highest) for a, c in zip(known, found, strict=True)))
+
+        def iterate(carry: Any) -> Any:
+            end, before, _, count = carry
+            new = improved(end)
+            change = _size(State(*(a - b for a, b in zip(new, end, strict=True))), measure)
+            return new, change, before, count + 1
+
+        def unfinished(carry: Any) -> Any:
+            _, change, before, count = carry
+            return jnp.any(~_settled(change, before)) & (count < MOST_ITERATIONS)
+
+        start = evaluated(expansion.state, step)
+        infinite = jnp.full(step.shape, jnp.inf)
+        end, change, before, _ = jax.lax.while_loop(unfinished, iterate, (start, infinite, infinite, 0))
+        good = _settled(change, before) & jnp.isfinite(change)
+        return end.map(lambda x: jnp.where(good, x, jnp.nan))
+
+    def polynomial(self, start: Expansion, end: Expansion, step: Lanes) -> State:
+        """Return the polynomial that has the derivatives of the formula at both ends, of degree order + 1."""
+        upper = jnp.asarray(_hermite(self.highest))
+        length = jnp.where(step == 0.0, 1.0, step)  # runs that have arrived stand still
+
+        def joined(c0: Any, c1: Any) -> Any:
+            count = self.highest + 1
+            power = length[None, None, None] ** jnp.arange(2.0 * count)[:, None, None, None]
+            low, high = c0[:count] * power[:count], c1[:count] * power[:count]
+            ends = jnp.concatenate([(high - low)[:1], low[1:], high[1:]])
+            rest = jnp.sum(upper.reshape(*upper.shape, 1, 1, 1) * ends[None], axis=1)
+            return jnp.concatenate([c0[:count], rest / power[count:]])
+
+        return State(*map(joined, start.state, end.state))
+
+    def error(self, start: Expansion, end: Expansion, step: Lanes, length: Number) -> Lanes:
+        """Return how far the end departs from the formula of the next order."""
+        if self.step is not None:
+            return jnp.zeros_like(step)
+        p, measure = self.highest + 1, _measure(length, step)
+        known = _known(start, step, p)
+        parts = zip(end.state, known, start.state, strict=True)
+        departure = State(*(jnp.abs(c[0] + _terms(c, -step, p) - a) - ROUNDING * jnp.abs(c0[0]) for c, a, c0 in parts))
+        return jnp.maximum(_size(departure, measure, signed=True), 0.0)
+
+
+def _known(expansion: Expansion, step: Lanes, highest: int) -> State:
+    """Return what the formula takes from the start of a step."""
+    return State(*(c[0] + _terms(c, step, highest) for c in expansion.state))
+
+
+def _terms(
+    coefficients: Float[Numbers, "order component body batch"], step: Lanes, highest: int
+) -> Float[Numbers, "component body batch"]:
+    """Return what the formula adds for the derivatives of one end; seen from the other end, the step is negative."""
+    weights = _weights(highest)
+    return total(float(w) * step[None, None] ** j * coefficients[j] for j, w in enumerate(weights, 1))
+
+
+@lru_cache(maxsize=8)
+def _weights(p: int) -> tuple[Fraction, ...]:
+    """Return the factors of the Taylor coefficients 1..p times powers of the step."""
+    factorial = math.factorial
+    return tuple(
+        Fraction(factorial(p) * factorial(2 * p - j), factorial(2 * p) * factorial(p - j)) for j in range(1, p + 1)
+    )
+
+
+@lru_cache(maxsize=8)
+def _hermite(p: int) -> np.ndarray:
+    """Return how the upper coefficients follow from the ends, in units of the step.
+
+    Rows: coefficients p + 1 .. 2p + 1. Columns: the difference of the values, the coefficients 1..p of the start, and
+    those of the end. At the end, ``c_1[j] = sum_k binomial(k, j) a[k]``.
+    """
+    lower, upper = np.arange(p + 1), np.arange(p + 1, 2 * p + 2)
+
+    def at_end(orders: np.ndarray) -> np.ndarray:
+        return np.array([[math.comb(k, j) for k in orders] for j in range(p + 1)], float)
+
+    inverse = np.rint(np.linalg.inv(at_end(upper)))  # its determinant is one: whole numbers
+    start = inverse @ at_end(lower)[:, 1:]  # that of the value is in the difference
+    return np.concatenate([inverse[:, :1], -start, inverse[:, 1:]], axis=1)
+
+
+def _measure(length: Number, step: Lanes) -> tuple[Any, ...]:
+    """Return the factors that turn positions, attitudes, velocities and spins into rad or sizes of the mechanism."""
+    lapse = jnp.abs(step)
+    return 1.0 / length, 1.0, lapse[None, None] / length, lapse[None, None]
+
+
+def _size(change: State, measure: tuple[Any, ...], *, signed: bool = False) -> Lanes:
+    """Return the largest component of a change of state."""
+    sizes = [(x if signed else jnp.abs(x)) * m for x, m in zip(change, measure, strict=True)]
+    return jnp.max(jnp.stack([jnp.max(x, axis=(0, 1)) for x in sizes]), axis=0)
+
+
+def _settled(change: Lanes, before: Lanes) -> Flags:
+    """Tell where an iteration has come to its end, or can come to none."""
+    return (
+        (change <= CONVERGED) | ((change <= STALLED) & (change >= before)) | ~jnp.isfinite(change) & (change != jnp.inf)
+    )

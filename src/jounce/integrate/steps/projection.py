@@ -1,0 +1,81 @@
+"""Back onto the constraints: positions and velocities corrected by the least amount, measured by the masses."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jounce.dynamics.forward.accelerations import Attitudes, Equations, Instants, Inverse, Lanes, State, inverted
+from jounce.jet import Jet
+
+MOST_ITERATIONS = 10
+LARGEST_GAP = (
+    1e-9  # rad or sizes of the mechanism, that redundant constraints may leave: then they contradict each other
+)
+CLOSE = 4e-15  # so near to where the matrix was inverted, in the same unit, the inverse is the same but for rounding
+ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, leaves nothing to correct
+
+
+def projected(equations: Equations, state: State, time: Instants) -> tuple[State, Lanes, Inverse]:
+    """Return the nearest state that fulfils the constraints and their rates, and how far positions moved.
+
+    The correction of positions is that of least kinetic energy, were it a velocity; that of velocities likewise.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the mechanism.
+    state : State
+        Near the constraints.
+    time : array of shape (1, batch)
+        Its instant, s.
+
+    Returns
+    -------
+    State
+        With Euler parameters of unit length.
+    distance : array of shape (batch,)
+        Size of the first correction of positions, rad or sizes of the mechanism; not finite where it failed, or
+        redundant constraints contradict each other.
+    inverse : DenseInverse or SaddleInverse
+        Of the equations' matrix at this state, which `expand` takes.
+    """
+    clock, lanes = Jet([time]), time.shape[-1]
+    position, attitude = state.position, normalised(state.attitude)
+
+    def correction(position: Any, attitude: Any) -> tuple[Any, Any]:
+        factor = equations.factored(state._replace(position=position, attitude=attitude), time)
+        gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
+        return factor, gap
+
+    def moved(position: Any, attitude: Any, column: Any) -> tuple[Any, Any]:
+        change = equations.system.coordinates(column, equations.pose_type.shifts)
+        pose = equations.still(position, attitude).displaced(*change)
+        return pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)
+
+    def iterate(carry: Any) -> Any:
+        position, attitude, _, last, first, count, _ = carry
+        near = ~jnp.any((last > 1e-9) & jnp.isfinite(last)) | (count >= MOST_ITERATIONS)
+        inverting = near & (count > 0)  # the matrix alone, once more: a branch of its own would be compiled twice
+        factor, gap = correction(position, attitude)
+        column = equations.least_change(factor, gap)
+        size = jnp.where(inverting, last, jnp.max(jnp.abs(column), axis=0))
+        place = [jnp.where(inverting, x, y) for x, y in zip(carry[:2], moved(position, attitude, column), strict=True)]
+        known = inverting | jnp.all(size <= CLOSE)
+        return *place, factor, size, jnp.where(count == 0, size, first), count + 1, known
+
+    start = (position, attitude, equations.blank_factor(lanes), jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0, False)
+    position, attitude, factor, last, first, *_ = jax.lax.while_loop(lambda carry: ~carry[-1], iterate, start)
+    moving = equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)
+    fulfilled = last <= 1e-9
+    if equations.system.rank is not None:
+        gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
+        fulfilled &= jnp.max(jnp.abs(gap), axis=0) <= LARGEST_GAP
+    return moving, jnp.where(fulfilled, first, jnp.inf), inverted(factor)
+
+
+def normalised(attitude: Attitudes) -> Attitudes:
+    """Return Euler parameters of unit length; angles as they are."""
+    if attitude.shape[0] == 1:
+        return attitude
+    return attitude / jnp.sqrt(jnp.sum(attitude * attitude, axis=0))[None]

@@ -1,0 +1,113 @@
+"""Turns of the angles about axes that forces measure, counted along the steps of a simulation.
+
+An attitude tells such an angle up to whole turns. Each step begins with the angle known, and follows it along the path
+at places so close to each other that no half turn lies between two of them.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.forward.accelerations import Equations, Lanes, State, turns_with_ground
+from jounce.integrate.steps.methods import evaluated
+from jounce.jet import Jet
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.shapes import Numbers
+
+PLACES = 16  # in a step: series carry over about one turn in it at most
+
+
+AnglesOfForces = tuple[Float[Numbers, "_ batch"], ...]
+"""For each group of forces that measures an angle about an axis, those of its instances, rad."""
+
+
+class Angles(NamedTuple):
+    """The angles that forces measure along a step.
+
+    Parameters
+    ----------
+    places : tuple of array of shape (places, instances, batch)
+        For each group of forces that measures an angle about an axis, at even parts of the step, rad.
+    step : array of shape (batch,)
+        s.
+    """
+
+    places: tuple[Float[Numbers, "place _ batch"], ...]
+    step: Lanes
+
+    def at(self, since: Lanes) -> AnglesOfForces:
+        """Return the angles a time after the beginning, (instances, batch) each, to within half a turn."""
+        if not self.places:
+            return ()
+        share = jnp.clip(since / jnp.where(self.step == 0.0, 1.0, self.step), 0.0, 1.0)
+        away = jnp.abs(share[None] * PLACES - jnp.arange(PLACES + 1.0)[:, None])
+        weights = jnp.maximum(1.0 - away, 0.0)[:, None]
+        return tuple(jnp.sum(weights * angles, axis=0) for angles in self.places)
+
+
+def measured(equations: Equations, state: State) -> AnglesOfForces:
+    """Return the angles about axes that forces measure in a state, (instances, batch) each, rad.
+
+    They have the turns of what they are near to in the equations.
+    """
+    groups = [group for group in equations.system.forces if measures_angle(group)]
+    if not groups:
+        return ()
+    pose, clock = equations.still(state.position, state.attitude), Jet([jnp.zeros_like(state.position[:1, 0])])
+    shape = state.position.shape[-1:]
+    found = [group.displacement(pose, clock).coefficients[0][0] for group in groups]
+    return tuple(jnp.broadcast_to(angle, angle.shape[:1] + shape) for angle in found)
+
+
+def followed(equations: Equations, angles: AnglesOfForces, path: State, step: Lanes) -> Angles:
+    """Return the angles along a step.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the mechanism.
+    angles : tuple of array of shape (instances, batch)
+        At the beginning.
+    path : State
+        Coefficients in the time from there, (order + 1, components, bodies, batch).
+    step : array of shape (batch,)
+        s.
+    """
+    if not angles:
+        return Angles((), step)
+
+    def onwards(near: Any, share: Any) -> tuple[Any, Any]:
+        found = measured(equations.near(near), evaluated(path, share * step))
+        return found, found
+
+    _, found = jax.lax.scan(onwards, angles, jnp.arange(1.0, PLACES + 1) / PLACES)
+    return Angles(tuple(jnp.concatenate([a[None], b]) for a, b in zip(angles, found, strict=True)), step)
+
+
+def attitudes_at(
+    series: Float[Numbers, "place order 4 bodies"], since: Float[np.ndarray, " place"]
+) -> Float[np.ndarray, "4 bodies+1 place"]:
+    """Return the Euler parameters of all bodies, the ground first, a time into steps of known Taylor coefficients."""
+    found = np.zeros((len(since), *series.shape[2:]))
+    for k in range(series.shape[1])[::-1]:
+        found = found * since[:, None, None] + np.asarray(series[:, k])
+    return np.asarray(turns_with_ground(np.moveaxis(found, 0, -1)))
+
+
+def attitudes_along(
+    series: Float[Numbers, "step order 4 bodies"], length: Float[np.ndarray, " step"], places: int
+) -> Float[np.ndarray, "4 bodies+1 place"]:
+    """Return the Euler parameters of all bodies, the ground first, at even parts of steps, and at the end of the last.
+
+    Steps are of known Taylor coefficients, and follow one another.
+    """
+    known = np.asarray(series).reshape(*series.shape[:2], -1)
+    with np.errstate(over="ignore"):  # powers of long steps, in which bodies turn evenly
+        powers = length[:, None, None] ** np.arange(series.shape[1])[:, None]
+    terms = np.multiply(known, powers, where=known != 0, out=np.zeros_like(known))
+    shares = (np.arange(places)[:, None] / places) ** np.arange(series.shape[1])
+    found = np.concatenate([(shares @ terms).reshape(-1, known.shape[-1]), terms[-1:].sum(axis=1)])
+    return np.asarray(turns_with_ground(np.moveaxis(found.reshape(-1, *series.shape[2:]), 0, -1)))

@@ -1,0 +1,328 @@
+"""The first assembly: bodies put together from the starting guess, and degrees of freedom counted and explained."""
+
+import dataclasses
+import warnings
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.constraints.facts import facts_of
+from jounce.errors import AssemblyError, AssemblyWarning, MobilityError
+from jounce.execution.device import resident
+from jounce.jet import Jet
+from jounce.kinematics.assembly.axis_directions import drawn_senses, pair_names, senses, senses_to_seek, starts_with
+from jounce.kinematics.assembly.gauss_newton import Displacements, Trial, put_together
+from jounce.kinematics.assembly.initial_revolutions import (
+    Coordinates,
+    DriverLag,
+    driver_lag,
+    nearest_turns,
+    turned_to_laws,
+)
+from jounce.kinematics.assembly.redundancy import Redundancy, redundancy
+from jounce.kinematics.status import Status
+from jounce.mechanism import Model
+from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
+from jounce.mechanism.builder import group_rows, with_reference
+from jounce.modules import with_fields
+from jounce.trajectory import AbstractMotion
+
+MAX_DATUMS = 100
+TIGHT = 1e-12  # rad or sizes of the mechanism: the tolerance of bodies put together to rounding
+SETTLED = 1e-12  # rad, by which the angles of drivers may be counted otherwise
+
+
+def assemble(model: Model, instant: float, tolerance: float, *, free: bool = False) -> tuple[Model, Coordinates]:
+    """Put the bodies together at one instant, from the starting guess, by damped Gauss-Newton.
+
+    Parameters
+    ----------
+    model : Model
+        The mechanism.
+    instant : float
+        s.
+    tolerance : float
+        Of the last correction, rad or sizes of the mechanism.
+    free : bool, default False
+        Whether degrees of freedom may be left: then the position is the nearest to the guess that fulfils all joints.
+
+    Returns
+    -------
+    model : Model
+        With its rows scaled by the size of their derivatives at the assembled position.
+    coordinates : dict of str to array
+        The assembled coordinates of all bodies.
+
+    Raises
+    ------
+    AssemblyError
+        If no position near the guess fulfils all joints; the message names those that stay open.
+    MobilityError
+        If joints and drivers leave degrees of freedom, or the position is singular.
+    """
+    columns = model.system.shape[1]
+    if not model.rows and not free:
+        noun = "degree of freedom" if columns == 1 else "degrees of freedom"
+        raise MobilityError(f"the mechanism has no joints and no drivers: {columns} {noun} are left")
+    if not model.rows:  # bodies that fly freely are together as they are
+        model, _ = with_reference(model, model.guess, instant, model.prescribed)
+        return dataclasses.replace(model, system=resident(model.system)), model.guess
+    model, found = settled(model, instant, tolerance)
+    check_assembled(model, found, instant, free=free)
+    warn_of_parts_turned_over(model, found)
+    model, told = redundancy_of(model, _exact(model, found, instant, tolerance), instant)
+    check_mobility(model, told, free=free)
+    return model, found.coordinates
+
+
+def _exact(model: Model, found: Trial, instant: float, tolerance: float) -> Trial:
+    """Return bodies that were put together loosely, next to a singular position, put together to rounding."""
+    if tolerance <= TIGHT or not found.jacobian.smallest[1].size:
+        return found
+    exact = put_together(model, instant, TIGHT, found.coordinates)
+    return exact if exact.closed else found
+
+
+def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
+    """Put the bodies together with no part turned over in its joint, if that goes, and count angles from there.
+
+    A guess in which directions that joints hold parallel are far from it may lead to a part that lies turned over, or
+    nowhere: then the directions are drawn together first, in some ways until one does not end in a singular position.
+    """
+    best = _nearby(model, instant, tolerance)
+    found = best[1]
+    sought = senses_to_seek(model, found)
+    rank = found.jacobian.rank - 1 if sought and found.closed else -1  # of the best so far
+    for wanted in sought:
+        for start in starts_with(model, wanted, instant, tolerance):
+            drawn, _ = with_reference(dataclasses.replace(model, guess=start), start, instant, model.prescribed)
+            other, trial = _nearby(drawn, instant, tolerance)
+            as_wanted = trial.closed and np.array_equal(senses(model.system, trial.coordinates), wanted)
+            if as_wanted and trial.jacobian.rank > rank:
+                best, rank = (dataclasses.replace(other, guess=model.guess), trial), trial.jacobian.rank
+            if rank == trial.jacobian.shape[1]:
+                return best
+        if best[1] is not found:
+            break
+    return best
+
+
+def _nearby(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
+    """Put the bodies together from the starting guess, and count the angles about axes from the position found.
+
+    Where the axes were tilted against each other in the guess, the angles in the position found are others than those
+    counted from the guess, and it takes another turn to get to those that the drivers prescribe.
+    """
+    moved, told = Displacements(model, instant), model.prescribed
+    residual, found, known = moved.closed(model.guess, tolerance)
+    lag = driver_lag(model, instant, residual)
+    model, start = _turned(model, instant, tolerance, lag)
+    if start is not None:
+        found = put_together(model, instant, tolerance, start)
+    elif found is None:
+        found = put_together(model, instant, tolerance, known=known or moved.at(model.guess))
+    if not found.closed and any(map(measures_angle, model.system.groups)):
+        # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
+        begin = found if lag is None else put_together(model, instant, tolerance, lag=lag)
+        if begin.closed:
+            model, _ = with_reference(model, begin.coordinates, instant, told)
+            found = put_together(model, instant, tolerance, begin.coordinates)
+    if "angle" in found.coordinates and start is None and found.closed:
+        found = nearest_to_guess(model, found, instant)
+    for _ in range(MAX_DATUMS):
+        if not found.closed:
+            return model, found
+        model, away = with_reference(model, found.coordinates, instant, told)
+        if away <= SETTLED:
+            return model, found
+        found = put_together(model, instant, tolerance, found.coordinates)
+    return with_reference(model, found.coordinates, instant, told, keep=True)[0], found
+
+
+def warn_of_parts_turned_over(model: Model, found: Trial) -> None:
+    """Warn of joints whose parts are held the other way round than the starting guess means."""
+    there = senses(model.system, found.coordinates)
+    if there.all() or not (odd := there != drawn_senses(model)).any():
+        return
+    names = [name for name, is_odd in zip(pair_names(model), odd, strict=True) if is_odd]
+    message = (
+        f"{', '.join(dict.fromkeys(names))}: put together only with parts turned over: directions that are held "
+        "parallel point opposite ways, unlike in the starting guess; guess the pose of the bodies more closely, or "
+        "give one of the two directions the other sign"
+    )
+    warnings.warn(AssemblyWarning(message), stacklevel=3)
+
+
+def _turned(model: Model, instant: float, tolerance: float, lag: DriverLag | None) -> tuple[Model, Coordinates | None]:
+    """Return the model and the coordinates to start from where laws begin more than half a turn from the guess.
+
+    The drivers are turned from the guess to their laws then, and all angles count their turns; None where none is so
+    far away, or the way cannot be gone.
+    """
+    if lag is None or not np.pi < lag.angle < np.inf:
+        return model, None
+    begin = put_together(model, instant, tolerance, lag=lag)
+    if not begin.closed:
+        return model, None
+    found = turned_to_laws(model, lag, begin.coordinates, Displacements(model, instant))
+    if found is None:
+        return model, None
+    coordinates, history = found
+    if history is not None:
+        forces, outputs = (
+            with_angles(with_datums(part, coordinates), history.last_angles(part))
+            for part in (model.system.forces, model.system.outputs)
+        )
+        system = with_fields(model.system, forces=forces, outputs=outputs)
+        model = dataclasses.replace(model, system=system, history=history)
+    return model, coordinates
+
+
+def nearest_to_guess(model: Model, found: Trial, instant: float) -> Trial:
+    """Return planar bodies put together, with every angle shifted by whole turns to be nearest to the guess."""
+    moved = Displacements(model, instant)
+
+    def residual_at(angle: np.ndarray) -> np.ndarray:
+        return found.scale * moved.at({**found.coordinates, "angle": angle})[1]
+
+    return found._replace(coordinates=nearest_turns(model.guess, found.coordinates, residual_at))
+
+
+def check_assembled(model: Model, found: Trial, instant: float, *, free: bool = False) -> None:
+    """Raise AssemblyError, with the joints concerned and by how much they stay open, where gaps are not closed.
+
+    What is missing for every motion to be prescribed is told too, unless degrees of freedom may be left (`free`).
+    """
+    gaps = found.gaps
+    if not (known := np.isfinite(gaps)).all():
+        named = ", ".join(dict.fromkeys(name for name, told in zip(model.rows, known, strict=True) if not told))
+        message = f"no finite value at t = {instant:g} s: {named}; check motion laws and the starting guess"
+        raise AssemblyError(message, status=Status.INADMISSIBLE)
+    if found.closed:
+        return
+    gaps = np.abs(gaps)
+    worst = np.argsort(-gaps)
+    open_rows = list(dict.fromkeys(model.rows[k] for k in worst if gaps[k] > 0.1 * gaps[worst[0]]))
+    wide = _widths(model, found, instant)
+    message = (
+        f"the mechanism cannot be assembled at t = {instant:g} s from its starting guess: {', '.join(open_rows[:4])} "
+        f"{'stays' if len(open_rows) == 1 else 'stay'} open, by {', '.join(wide[name] for name in open_rows[:4])}; "
+        "check lengths and positions, or guess the pose of the bodies more closely"
+    )
+    if not free:
+        message += " (`assembly: nearest` looks from random starts)"
+    extra = _structural_excess(model, found, instant)
+    if extra:
+        message += (
+            f"; {_count(extra, 'equation')} more than coordinates are among them, and redundant constraints contradict "
+            "each other by that much: correct lengths and axes, free a direction there, or raise the tolerance if the "
+            "numbers are no more exact"
+        )
+    missing = found.jacobian.shape[1] - len(model.rows)
+    if missing > 0 and not free:
+        message += f"; {_count(missing, 'equation')} too few for all coordinates: a joint may be missing"
+    raise AssemblyError(message, status=Status.NOT_ASSEMBLED)
+
+
+def _structural_excess(model: Model, found: Trial, instant: float) -> int:
+    """Return how many equations are dependent wherever the bodies are, so that they may contradict each other.
+
+    Bodies that do not reach each other come to rest where equations depend on each other too, but only there.
+    """
+    anywhere = 0.1 * np.random.default_rng(1).standard_normal(model.system.shape[1])
+    jacobian = Displacements(model, instant)(found.coordinates, anywhere)[2]
+    return len(model.rows) - jacobian.scaled(jacobian.row_scale).rank if jacobian.finite().all() else 0
+
+
+def _widths(model: Model, found: Trial, instant: float) -> dict[str, str]:
+    """Return by how much each joint and driver is open, as a length or as an angle, whichever it closes."""
+    shifts, entries = model.pose_type.shifts, np.abs(found.jacobian.blocks)
+    by_shift, by_turn = (np.max(part, axis=(1, 2)) for part in (entries[:, :, :shifts], entries[:, :, shifts:]))
+    squares = _squared_lengths(model, instant)  # of two points in one place the slopes are all zero
+    lengthy = (by_shift > 1e-9 * by_turn) | np.isin(model.rows, list(squares))
+    unit = np.where(lengthy, 1e3 * model.length, np.degrees(1.0))
+    open_by = np.abs(found.gaps) * unit / np.maximum(np.where(lengthy, by_shift, by_turn), 1e-300)
+    for row, name in enumerate(model.rows):
+        if name in squares:  # the residual is the square of a distance less this
+            square = max(found.gaps[row] / found.scale[row] + squares[name], 0.0)
+            open_by[row] = 1e3 * abs(np.sqrt(square) - np.sqrt(squares[name]))
+    sizes = {name: {"mm": 0.0, "deg": 0.0} for name in model.rows}
+    for row, name in enumerate(model.rows):
+        unit = "mm" if lengthy[row] else "deg"
+        sizes[name][unit] = max(sizes[name][unit], open_by[row])
+    return {
+        name: " and ".join(f"{size:.3g} {unit}" for unit, size in its.items() if size > 1e-6)
+        for name, its in sizes.items()
+    }
+
+
+def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
+    """Return the squares of the distances that joints and drivers keep between two points, by name, m^2."""
+    found, clock = {}, Jet([np.full((1, 1), instant)])
+    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
+        field = facts_of(type(group.element)).squared_distance
+        if not field:
+            continue
+        lengths = getattr(group.element, field)
+        lengths = lengths(clock).coefficients[0] if isinstance(lengths, AbstractMotion) else lengths
+        lengths = np.broadcast_to(lengths, (group.instances, 1))[:, 0]
+        found |= {name: float(length) ** 2 for name, length in zip(model.rows[rows], lengths, strict=False)}
+    return found
+
+
+def redundancy_of(model: Model, found: Trial, instant: float) -> tuple[Model, Redundancy]:
+    """Return a model that was put together with its rows scaled, and which of them follow from others."""
+    system = resident(with_fields(model.system, row_scale=found.scale[:, None], rank=None))
+    model = dataclasses.replace(model, system=system)
+    told = redundancy(model, found.coordinates, found.jacobian, Displacements(model, instant))
+    if told.count:
+        model = dataclasses.replace(model, system=with_fields(system, rank=told.rank))
+    return model, told
+
+
+def check_mobility(model: Model, found: Redundancy, *, free: bool = False) -> None:
+    """Raise MobilityError, with the bodies concerned, where degrees of freedom are left or the position is singular.
+
+    Redundant constraints are no error: here they agree. Degrees of freedom may be left (`free`).
+    """
+    (rows, columns), rank = found.here.shape, found.rank
+    left_over = columns - rank
+    if (free or not left_over) and not found.is_singular:
+        return
+    bodies = len(model.bodies)
+    parts = [
+        f"{bodies} moving {'body has' if bodies == 1 else 'bodies have'} {columns} coordinates; joints and drivers "
+        f"give {rows} equations, {rank} of them independent"
+    ]
+    if left_over and not free:
+        noun = "degree of freedom is" if left_over == 1 else "degrees of freedom are"
+        moving = freely_moving(model, found.jacobian.free_directions)
+        remedy = f"add {_count(left_over, 'driver')}, or simulate it under its forces"
+        parts.append(f"{left_over} {noun} left, with which {moving} can move: {remedy}")
+    if found.count:
+        parts.append(f"{found}, which is no fault as they agree")
+    if found.is_singular:
+        moving = freely_moving(model, found.here.free_directions)
+        parts.append(
+            "the start is a singular position (a dead point or a change point), where only "
+            f"{found.here.rank} equations are independent and {moving} can move: start at another instant, or with "
+            "another position"
+        )
+    raise MobilityError("; ".join(parts), status=Status.SINGULAR if found.is_singular else None)
+
+
+def freely_moving(model: Model, directions: Float[np.ndarray, "direction column"]) -> str:
+    """Name the bodies that move along directions of the coordinates, shape (directions, columns)."""
+    sizes = np.linalg.norm(directions.reshape(len(directions), len(model.bodies), -1), axis=(0, 2))
+    return _concerned(sizes, model.bodies)
+
+
+def _concerned(weights: Float[np.ndarray, " name"], names: tuple[str, ...]) -> str:
+    order = np.argsort(-weights, kind="stable")
+    chosen = [names[k] for k in order if weights[k] > 0.05 * weights[order[0]]]
+    shown = ", ".join(chosen[:6])
+    return shown + (f" and {len(chosen) - 6} more" if len(chosen) > 6 else "")
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"

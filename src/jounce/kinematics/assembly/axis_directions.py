@@ -1,0 +1,187 @@
+"""Which way parts lie in joints that would hold them turned over as well.
+
+The rows of a hinge or a guide hold a body in two ways: as drawn, and with its axis the other way round. The second is
+no assembly that anybody means, and no motion leads from one to the other.
+"""
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.constraints.angles import perpendiculars
+from jounce.constraints.base import rows
+from jounce.constraints.facts import facts_of
+from jounce.jet import Jet
+from jounce.kinematics.assembly.gauss_newton import Trial, put_together
+from jounce.kinematics.assembly.initial_revolutions import Coordinates
+from jounce.mechanism import Model
+from jounce.mechanism.axis_angles import turned
+from jounce.mechanism.builder import group_rows, model_of
+from jounce.mechanism.system import Group, System
+from jounce.modules import Module
+from jounce.rigid.pose import Pose
+
+DRAWN_OPPOSITE = -0.9  # cosine: directions as far apart in the starting guess are meant to point opposite ways
+DRAWN_NEARLY = 0.8  # where all are within this, the guess leaves no doubt, and nothing is gained by another
+
+Senses = Bool[np.ndarray, " pair"]
+"""Of each pair of directions that joints hold parallel, whether they point the same way."""
+
+
+class SameDirection(Module):
+    """Two unit vectors that point the same way, not opposite ways: rows grow without bound as they come to do so.
+
+    The rows have the size of the tangent of half the angle between the vectors.
+    """
+
+    vector_i: Float[np.ndarray, "component instance 1"]  # in the frame of body i
+    vector_j: Float[np.ndarray, "component instance 1"]
+
+    role: ClassVar[str] = "joint"
+    periodic: ClassVar[bool] = False
+
+    def residual(self, body_i: Pose, body_j: Pose, _time: Jet) -> Jet:
+        """Return the rows, shape (1, ...) in the plane, (2, ...) in space."""
+        if len(self.vector_i) == 2:
+            sides = (jnp.stack([-self.vector_i[1], self.vector_i[0]]),)
+        else:
+            sides = perpendiculars(jnp.asarray(self.vector_i))
+        direction = body_j.direction(self.vector_j)
+        along = body_i.direction(self.vector_i).dot(direction) + 1.0
+        return rows(*(body_i.direction(side).dot(direction) / along for side in sides))
+
+
+def senses(system: System, coordinates: Coordinates) -> Senses:
+    """Tell of each pair of directions that joints hold parallel whether they point the same way.
+
+    Coordinates are those of all bodies, the ground first.
+    """
+    return _cosines(system, coordinates) >= 0
+
+
+def drawn_senses(model: Model) -> Senses:
+    """Return the senses that the starting guess means: the same way, unless it draws a pair as good as opposite."""
+    return _cosines(model.system, model.guess) > DRAWN_OPPOSITE
+
+
+def pair_names(model: Model) -> list[str]:
+    """Return the name of the joint of each pair of directions."""
+    names = {id(group): model.rows[rows] for group, rows in zip(model.system.groups, group_rows(model), strict=True)}
+    return [name for group, _ in _pairs(model.system) for name in names[id(group)][: group.instances]]
+
+
+def senses_to_seek(model: Model, found: Trial) -> list[Senses]:
+    """Return the senses with which parts should be put together anew, the most likely first; none where all is well.
+
+    That is where parts lie turned over, and where they were not put together at all from a guess in which directions
+    are far from parallel. What the guess draws may not exist: then all pairs are meant to point the same way.
+    """
+    there = senses(model.system, found.coordinates) if found.closed else None
+    if there is not None and there.all():
+        return []
+    drawn = _cosines(model.system, model.guess)
+    meant = drawn > DRAWN_OPPOSITE
+    if there is not None:
+        as_meant = np.array_equal(there, meant)
+    else:  # where a law has no finite value, no other start helps
+        as_meant = bool(np.all(np.abs(drawn) > DRAWN_NEARLY)) or not np.isfinite(found.gaps).all()
+    if as_meant:
+        return []
+    return [meant] if meant.all() else [meant, np.ones_like(meant)]
+
+
+def starts_with(model: Model, wanted: Senses, instant: float, tolerance: float) -> Iterator[Coordinates]:
+    """Give coordinates near the starting guess in which the joints hold with these senses, the best tried first.
+
+    Drivers hold in the first as well. The attitudes alone come first in a part of them: what is far away else draws
+    parts round.
+    """
+    turned = put_together(_directed(model, wanted, alone=True), instant, tolerance)
+    for driven in (True, False):
+        directed = _directed(model, wanted, driven=driven)
+        for start in (model.guess, turned.coordinates)[: 1 + turned.closed]:
+            found = put_together(directed, instant, tolerance, start)
+            if found.closed:
+                yield found.coordinates
+
+
+def _directed(model: Model, wanted: Senses, *, alone: bool = False, driven: bool = True) -> Model:
+    """Return the model with rows that hold directions the same way, or the opposite one where not wanted.
+
+    Parameters
+    ----------
+    model : Model
+        The mechanism.
+    wanted : array of bool, shape (pairs,)
+        Senses.
+    alone : bool, default False
+        Whether they are the only rows; then pairs that close a loop are left out.
+    driven : bool, default True
+        Whether drivers stay.
+    """
+    groups = [] if alone else [group for group in model.system.groups if driven or not group.is_driver]
+    leads, first = list(range(model.system.body_count + 1)), 0
+    for group, names in _pairs(model.system):
+        its = np.arange(group.instances)
+        signs = np.where(wanted[first + its], 1.0, -1.0)
+        first += group.instances
+        if alone:
+            its = np.array([k for k in its if _joins(leads, group.bodies[0][k], group.bodies[1][k])], int)
+        if len(its):
+            vector_i, vector_j = (_unit(group, name)[:, its, None] for name in names)
+            slots = tuple(tuple(slot[k] for k in its) for slot in group.bodies[:2])
+            groups.append(Group(SameDirection(vector_i, vector_j * signs[its, None]), slots))
+    unnamed = tuple(("",) * group.instances for group in groups)
+    parts = ((tuple(groups), unnamed), ((), ()), ((), ()))
+    return model_of(model.bodies, parts, model.guess, model.length, None)
+
+
+def _joins(leads: list[int], body: int, other: int) -> bool:
+    """Tell whether two bodies were not joined yet, and join them; each leads to another of its kind, or to itself."""
+    ends = []
+    for start in (body, other):
+        end = start
+        while leads[end] != end:
+            leads[end] = end = leads[leads[end]]
+        ends.append(end)
+    leads[ends[0]] = ends[1]
+    return ends[0] != ends[1]
+
+
+def _pairs(system: System) -> Iterator[tuple[Group, tuple[str, str]]]:
+    """Give the groups of joints that hold two directions parallel, with the names of these."""
+    for group in system.groups:
+        for names in facts_of(type(group.element)).held_parallel:
+            yield group, names
+
+
+def _unit(group: Group, name: str) -> Float[np.ndarray, "component instance"]:
+    """Return unit vectors along a direction that an element has, in the axes of its body."""
+    vectors = np.asarray(getattr(group.element, name))[..., 0]
+    return np.broadcast_to(vectors / np.linalg.norm(vectors, axis=0), (len(vectors), group.instances))
+
+
+def _cosines(system: System, coordinates: Coordinates) -> Float[np.ndarray, " pair"]:
+    """Return the cosine of the angle between the directions of each pair."""
+    found = []
+    for group, names in _pairs(system):
+        first, second = (
+            _globally(_unit(group, name), coordinates, np.array(slot))
+            for name, slot in zip(names, group.bodies[:2], strict=True)
+        )
+        found.append(np.sum(first * second, axis=0))
+    return np.concatenate([*found, np.zeros(0)])
+
+
+def _globally(
+    vectors: Float[np.ndarray, "component instance"], coordinates: Coordinates, bodies: Int[np.ndarray, " instance"]
+) -> Float[np.ndarray, "component instance"]:
+    """Return vectors given in the axes of bodies in global ones."""
+    if "angle" in coordinates:
+        angle = np.asarray(coordinates["angle"])[bodies, 0]
+        c, s = np.cos(angle), np.sin(angle)
+        return np.stack([c * vectors[0] - s * vectors[1], s * vectors[0] + c * vectors[1]])
+    return turned(np.asarray(coordinates["quaternion"])[:, bodies, 0], vectors)

@@ -1,0 +1,153 @@
+"""The constraints of a mechanism at one position as series: how far a motion that begins there can be continued.
+
+At a position with dependent constraints a velocity that they allow may still be blocked by the equations of a higher
+order. With coordinates x = K y + z, the velocities K y that the constraints allow free and the rest z solved for, what
+is left is a few equations g(y) = 0 without linear terms (Lyapunov and Schmidt): as many as constraints are dependent.
+Along any series y(t) the coefficients of g follow order after order from those of the residual, with one matrix, as in
+a solve: no derivative of a constraint is written (Mueller 2016, Higher-order analysis of kinematic singularities of
+lower pair linkages and serial manipulators, does it by differentials).
+"""
+
+import dataclasses
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.execution.compilation import compiled
+from jounce.jet import Jet
+from jounce.kinematics.assembly.initial_revolutions import Coordinates
+from jounce.mechanism import Model
+from jounce.mechanism.builder import pose_at
+from jounce.mechanism.system import System
+from jounce.modules import with_fields
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+LANES = 32  # series that are followed side by side
+FULFILLED = 1e-7  # of what the terms of an order are: less is rounding, and what a position is known to
+SINGULAR = 1e-7  # of the largest singular value: what is less is zero at a position known to some 1e-8
+
+
+@dataclasses.dataclass(frozen=True)
+class ReducedConstraints:
+    """The few equations g(y) = 0 that dependent constraints leave at a position.
+
+    Attributes
+    ----------
+    model : Model
+        Of the joints alone, with rows of one size.
+    coordinates : dict of str to array
+        Of all bodies there, the ground first.
+    free : array of shape (columns, k)
+        Orthonormal velocities that the constraints allow: K.
+    dependent : array of shape (rows, s)
+        Orthonormal combinations of rows that vanish there.
+    inverse : array of shape (columns, rows)
+        Pseudo-inverse of the Jacobian.
+    held : array of bool, shape (rows,)
+        Rows that must hold; others, such as those of drivers, are not looked at.
+    order : int
+        To which series go.
+    """
+
+    model: Model
+    coordinates: Coordinates
+    free: Float[np.ndarray, "column k"]
+    dependent: Float[np.ndarray, "row s"]
+    inverse: Float[np.ndarray, "column row"]
+    held: Bool[np.ndarray, " row"]
+    order: int
+
+    @classmethod
+    def at(
+        cls,
+        model: Model,
+        coordinates: Coordinates,
+        jacobian: Float[np.ndarray, "row column"],
+        order: int,
+        held: Bool[np.ndarray, " row"] | None = None,
+    ) -> "ReducedConstraints":
+        """Reduce the constraints at a position, where they have a scaled Jacobian; of some rows alone where told."""
+        held = np.ones(len(jacobian), bool) if held is None else held
+        left, sizes, right = np.linalg.svd(jacobian[held])
+        rank = int(np.sum(sizes > SINGULAR * sizes.max(initial=0.0)))
+        inverse, dependent = np.zeros(jacobian.shape[::-1]), np.zeros((len(jacobian), left.shape[1] - rank))
+        inverse[:, held] = right[:rank].T @ (left[:, :rank] / sizes[:rank]).T
+        dependent[held] = left[:, rank:]
+        system = with_fields(model.system, outputs=(), forces=(), fronts=None)
+        model = dataclasses.replace(model, system=system)
+        return cls(model, coordinates, right[rank:].T, dependent, inverse, held, order)
+
+    def along(self, series: Float[np.ndarray, "lane order k"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return what g is along series of y, without their coefficients of order 0, which are zero.
+
+        Returns
+        -------
+        equations : array of shape (lanes, order, s)
+            Coefficients of g, from order 1 on, by rows of one size.
+        sizes : array of shape (lanes, order)
+            The largest coefficient of any row that they are left of.
+        coordinates : array of shape (lanes, order, columns)
+            Coefficients of the scaled coordinates.
+        """
+        count = len(series)
+        parts = []
+        for first in range(0, count, LANES):
+            some = series[first : first + LANES]
+            filled = np.zeros((LANES, self.order, series.shape[2]))
+            filled[: len(some), : some.shape[1]] = some
+            found = _along(
+                self.model.system,
+                self.coordinates,
+                (self.free, self.dependent, self.inverse, self.held.astype(float)),
+                np.moveaxis(filled, 0, -1),
+                pose_type=self.model.pose_type,
+            )
+            parts.append([np.moveaxis(np.asarray(x), -1, 0)[: len(some)] for x in found])
+        equations, sizes, moved = (np.concatenate(x) for x in zip(*parts, strict=True))
+        return equations, sizes, moved
+
+    def gap(self, series: Float[np.ndarray, "lane order k"], order: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the coefficients of g up to an order, (lanes, order * s), and what of each counts as zero."""
+        equations, sizes, _ = self.along(series)
+        orders = np.arange(1, order + 1)
+        rate = np.max(np.maximum(sizes[:, :order], 1e-300) ** (1.0 / orders), axis=1)
+        allowed = FULFILLED * rate[:, None] ** orders
+        flat = equations[:, :order].reshape(len(series), -1)
+        return flat, np.repeat(allowed, equations.shape[2], axis=1)
+
+    def placed(self, coefficients: Float[np.ndarray, "order column"], step: float) -> Float[np.ndarray, " column"]:
+        """Return the scaled increment of the coordinates a step along a series, to first order in turns."""
+        powers = step ** np.arange(1, len(coefficients) + 1)
+        return powers @ coefficients
+
+
+@compiled("pose_type", brief=True)
+def _along(
+    system: System,
+    coordinates: dict[str, Numbers],
+    bases: tuple[Numbers, Numbers, Numbers, Numbers],
+    series: Float[Numbers, "order k lane"],
+    *,
+    pose_type: type[Pose],
+) -> tuple[Any, Any, Any]:
+    free, dependent, inverse, held = bases
+    order, lanes = len(series), series.shape[-1]
+    wide = {name: jnp.broadcast_to(x, (*x.shape[:-1], lanes)) for name, x in coordinates.items()}
+    pose: Any = pose_at(wide, pose_type)
+    time = Jet.variable(jnp.zeros((1, lanes)), order)
+    equations, sizes, moved = [], [], []
+    for k in range(1, order + 1):
+        rest = system.residual(pose.extended(None, None), time.truncate(k)).dense().coefficients[k]
+        column = _product(free, series[k - 1]) - _product(inverse, rest)
+        pose = pose.extended(*system.coordinates(column, pose.shifts))
+        equations.append(_product(dependent.T, rest))
+        sizes.append(jnp.max(jnp.abs(rest) * held[:, None], axis=0))
+        moved.append(column)
+    return jnp.stack(equations), jnp.stack(sizes), jnp.stack(moved)
+
+
+def _product(matrix: Float[Numbers, "row column"], columns: Float[Numbers, "column lane"]) -> Any:
+    return jnp.sum(jnp.asarray(matrix)[:, :, None] * columns[None], axis=1)

@@ -1,0 +1,234 @@
+"""Bodies put together at one instant, from a starting guess, by damped Gauss-Newton on the host."""
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.execution.compilation import compiled
+from jounce.jet import Jet
+from jounce.kinematics.assembly.initial_revolutions import Coordinates, DriverLag, Place
+from jounce.linear_algebra.host_jacobian import HostJacobian
+from jounce.linear_algebra.linear import DenseFactor
+from jounce.mechanism import Model
+from jounce.mechanism.builder import pose_at
+from jounce.mechanism.system import System
+from jounce.modules import with_fields
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+MAX_STEPS = 100
+NEXT_STEP = 1e-3  # of the tolerance: a step that would be this short, as residuals fall, is left out
+LONGEST_STEP = 0.5  # rad, or sizes of the mechanism
+REGULAR = 1e-4  # smallest pivot over the largest, from where on a matrix is inverted instead of decomposed
+
+
+class _Going(NamedTuple):
+    """How Newton-Raphson stands between two steps, for one instant."""
+
+    coordinates: dict[str, Numbers]
+    increment: Float[Numbers, " column"]  # to be made next
+    begun: Float[Numbers, " row"]  # residual at the first position
+    residual: Float[Numbers, " row"]
+    entries: Float[Numbers, " entry"]
+    row_scale: Float[Numbers, " row"]
+    size: Float[Numbers, ""]  # of the increment
+    closed: Bool[Numbers, ""]
+    left: Int[Numbers, ""]  # steps that may follow; below zero none does
+
+
+@compiled("pose_type", narrow=True, brief=True, alone=True)
+def _moved(
+    system: System,
+    coordinates: dict[str, Numbers],
+    increment: Float[Numbers, " column"],
+    instant: Float[Numbers, ""],
+    steps: Int[Numbers, ""],
+    tolerance: Float[Numbers, ""],
+    pose_type: type[Pose],
+) -> Any:
+    """Return the coordinates after an increment, with residual and entries of the Jacobian.
+
+    With a pattern, by which a square Jacobian is a dense matrix, some steps may follow, as long as those of
+    Newton-Raphson are those of `put_together`: short, from regular positions, and with residuals that fall. The
+    residual before them is returned too, and whether they closed it.
+    """
+    time = Jet([instant[None, None]])
+
+    def there(coordinates: dict[str, Numbers], increment: Float[Numbers, " column"]) -> Any:
+        pose = pose_at(coordinates, pose_type)
+        pose = pose.displaced(*system.coordinates(increment[:, None], pose.shifts))
+        moved = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
+        return moved, system.residual(pose, time).coefficients[0][:, 0], system.entries(pose, time)[:, 0]
+
+    def stepped(going: _Going) -> _Going:
+        moved, residual, entries = there(going.coordinates, going.increment)
+        before, now = (jnp.sqrt(jnp.sum((going.row_scale * x) ** 2)) for x in (going.residual, residual))
+        first, small = going.left == steps, going.size <= tolerance
+        falls = first | small | (now < before)
+        closed = ~first & falls & (small | (going.size * now <= NEXT_STEP * tolerance * before))
+        matrix = system.pattern.dense(entries[:, None])
+        row_scale = 1 / jnp.max(jnp.abs(matrix), axis=(1, 2))
+        factor = DenseFactor.of(row_scale[:, None, None] * matrix)
+        step = factor.solve(-(row_scale * residual)[:, None])[:, 0]
+        size = jnp.max(jnp.abs(step))
+        goes_on = falls & (size <= LONGEST_STEP) & (factor.pivot_ratio()[0] >= REGULAR)
+        left = jnp.where(goes_on, going.left - 1, -1)
+        begun = jnp.where(first, residual, going.begun)
+        return _Going(moved, step, begun, residual, entries, row_scale, size, closed, left)
+
+    if system.pattern is None:
+        return there(coordinates, increment)
+    rows, entries = np.zeros(system.shape[0]), np.zeros(system.pattern.entry_count)
+    start = _Going(coordinates, increment, rows, rows, entries, rows, np.zeros(()), np.zeros((), bool), steps)
+    end = jax.lax.while_loop(lambda going: ~going.closed & (going.left >= 0), stepped, jax.tree.map(jnp.asarray, start))
+    return end.coordinates, end.residual, end.entries, end.begun, end.closed
+
+
+class Trial(NamedTuple):
+    """How far bodies could be put together.
+
+    Attributes
+    ----------
+    coordinates : dict of str to array
+        Of all bodies, the ground first: assembled, or as near to it as they came.
+    scale : array of shape (rows,)
+        By which the rows are multiplied.
+    gaps : array of shape (rows,)
+        By how much each row is open, rad or sizes of the mechanism.
+    jacobian : HostJacobian
+        Scaled, there.
+    closed : bool
+        Whether all gaps are closed, to the tolerance of the last correction.
+    """
+
+    coordinates: Coordinates
+    scale: Float[np.ndarray, " row"]
+    gaps: Float[np.ndarray, " row"]
+    jacobian: HostJacobian
+    closed: bool
+
+
+class Displacements:
+    """Moves the bodies of a model at an instant, s, in compiled code: from and to the host.
+
+    Called with coordinates and an increment, it returns the place after that.
+    """
+
+    def __init__(self, model: Model, instant: float):
+        self._model, self._instant = model, np.float64(instant)
+        rows, columns = model.system.shape
+        self._dense, self._still = rows == columns and model.system.fronts is None, np.zeros(columns)
+
+    def __call__(self, coordinates: Coordinates, increment: Float[np.ndarray, " column"]) -> Place:
+        """Return the place after an increment."""
+        return self._moved(coordinates, increment, 0, 0.0)[0]
+
+    def closed(
+        self, start: Coordinates, tolerance: float
+    ) -> tuple[Float[np.ndarray, " row"], Trial | None, Place | None]:
+        """Return the residual at some coordinates, and the bodies put together from there if no step needs a check.
+
+        The place with those coordinates comes last, where none of its steps was tried: the one to go on from.
+        """
+        there, begun, closed = self._moved(start, self._still, MAX_STEPS if self._dense else 0, tolerance)
+        found = _trial(*there, there[2].row_scale, tolerance) if closed else None
+        return begun, found, None if self._dense else there
+
+    def at(self, coordinates: Coordinates) -> Place:
+        """Return the place with some coordinates."""
+        return self(coordinates, self._still)
+
+    def _moved(
+        self, coordinates: Coordinates, increment: Float[np.ndarray, " column"], steps: int, tolerance: float
+    ) -> tuple[Place, Float[np.ndarray, " row"], bool]:
+        settings = self._instant, np.int64(steps), np.float64(tolerance)
+        found = _moved(self._system, coordinates, increment, *settings, self._model.pose_type)
+        to, residual, entries, *ending = jax.tree.map(np.asarray, found)
+        begun, closed = ending or (residual, False)
+        system = self._model.system
+        jacobian = HostJacobian.of(system.pattern, entries).scaled(np.asarray(system.row_scale)[:, 0])
+        return (to, residual, jacobian), begun, bool(closed)
+
+    @cached_property
+    def _system(self) -> System:
+        """All that the program needs."""
+        pattern = self._model.system.pattern if self._dense else None
+        return with_fields(self._model.system, outputs=(), forces=(), fronts=None, pattern=pattern)
+
+
+def put_together(
+    model: Model,
+    instant: float,
+    tolerance: float,
+    start: Coordinates | None = None,
+    *,
+    lag: DriverLag | None = None,
+    known: Place | None = None,
+) -> Trial:
+    """Return how far the bodies can be put together at one instant; nothing is refused.
+
+    Parameters
+    ----------
+    model : Model
+        The mechanism, with at least one row.
+    instant : float
+        s.
+    tolerance : float
+        Of the last correction, rad or sizes of the mechanism.
+    start : dict of str to array, optional
+        Coordinates to start from instead of the guess.
+    lag : DriverLag, optional
+        What drivers may still lack.
+    known : Place, optional
+        Where to start from, in the place of coordinates, if it is known whole.
+    """
+    moved = Displacements(model, instant)
+
+    def opened(place: Place) -> Place:
+        return place if lag is None else (place[0], lag.open(place[1], 1.0), place[2])
+
+    if known is None:
+        begin = model.guess if start is None else start
+        if lag is None:
+            _, found, known = moved.closed(begin, tolerance)
+            if found is not None:
+                return found
+        known = moved.at(begin) if known is None else known
+    coordinates, residual, jacobian = opened(known)
+    scale = jacobian.row_scale
+    for _ in range(MAX_STEPS):
+        step = jacobian.step(residual)
+        if step is None:
+            break  # told by name
+        size = np.max(np.abs(step), initial=0.0)
+        step *= min(1.0, LONGEST_STEP / max(size, 1e-300))
+        now = np.linalg.norm(scale * residual)
+        for _halving in range(12):
+            trial = opened(moved(coordinates, step))
+            left = np.linalg.norm(scale * trial[1])
+            if left < now or size <= tolerance:
+                break
+            step *= 0.5
+        else:
+            break
+        coordinates, residual, jacobian = trial
+        scale = jacobian.row_scale
+        if size <= tolerance or size * left <= NEXT_STEP * tolerance * now:
+            break
+    return _trial(coordinates, residual, jacobian, scale, tolerance)
+
+
+def _trial(
+    coordinates: Coordinates,
+    residual: Float[np.ndarray, " row"],
+    jacobian: HostJacobian,
+    scale: Float[np.ndarray, " row"],
+    tolerance: float,
+) -> Trial:
+    gaps = np.where(jacobian.finite(), scale * residual, np.nan)
+    closed = bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
+    return Trial(coordinates, scale, gaps, jacobian.scaled(scale), closed)

@@ -1,0 +1,321 @@
+"""How a mechanism can move from a position: by the count of its equations, by their rank, and in fact.
+
+A velocity that all joints allow may be no motion: equations of a higher order may block it. Which go on, and where they
+branch, follows from the series of the constraints (`mobility_series`, `tangent_cone`).
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import MechanismError, whole_number
+from jounce.kinematics.assembly.assemble import check_assembled, redundancy_of, settled
+from jounce.kinematics.assembly.constraint_series import SINGULAR, ReducedConstraints
+from jounce.kinematics.assembly.gauss_newton import Displacements, Trial, put_together
+from jounce.kinematics.assembly.initial_revolutions import Coordinates, Mover
+from jounce.kinematics.assembly.redundancy import Repetition, closed_nearby
+from jounce.kinematics.assembly.tangent_cone import LocalCurve, curves
+from jounce.linear_algebra.host_jacobian import HostJacobian
+from jounce.mechanism import Mechanism, Model, build, check_mechanism, time_grid
+from jounce.mechanism.builder import with_reference
+from jounce.mechanism.preconditions import concrete
+from jounce.modules import with_fields
+
+Kind = Literal["regular", "rigid", "shaky", "cusp", "singular", "change point"]
+HIGHEST_ORDER = 20
+TOLERANCE = 1e-12
+NEARBY = 0.02  # rad or sizes of the mechanism: how far along a branch its degrees of freedom are counted
+FARTHER = 0.05
+SAME_BRANCH = 0.3  # rad, between tangent spaces
+RANDOM_CURVES = 4
+ADVICE = "no motion is found by series, but one by trial"
+
+
+@dataclasses.dataclass(frozen=True)
+class Branch:
+    """A family of motions through a position.
+
+    Attributes
+    ----------
+    freedom : int
+        Its degrees of freedom: those counted at a position a little way along it.
+    tangents : dict of str to array of shape (freedom, coordinates)
+        How each body begins to move along it: velocity of its origin, m, and angle, or angular velocity in its own
+        axes, rad, up to a common factor.
+    cusp : bool
+        Whether the motion comes to rest here and turns back.
+    """
+
+    freedom: int
+    tangents: dict[str, np.ndarray]
+    cusp: bool = False
+
+    def __str__(self) -> str:
+        turning = {name: _turn(vectors[0]) for name, vectors in self.tangents.items()}
+        most = max(turning.values(), key=abs, default=0.0)
+        if self.freedom == 1 and most:
+            told = [f"{name} {turn / most + 0.0:.3g}" for name, turn in turning.items()]
+            return ", ".join(told[:6]) + (", ..." if len(told) > 6 else "")
+        moving = [name for name, vectors in self.tangents.items() if np.abs(vectors).max(initial=0.0) > 1e-9]
+        return f"{_freedom(self.freedom)} of {', '.join(moving[:6])}{', ...' if len(moving) > 6 else ''}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Mobility:
+    """How a mechanism can move from a position; drivers are released.
+
+    Attributes
+    ----------
+    coordinates, equations : int
+        Of the bodies, and of the joints.
+    instantaneous : int
+        Degrees of freedom by the rank of the equations here: velocities that the joints allow.
+    finite : int
+        Those of the branch that has most of them.
+    order : int, optional
+        To which order motions were continued; None where the equations are independent, so that all go on.
+    kind : str
+        ``"regular"``; ``"rigid"``, with no motion at all; ``"shaky"``, with none that goes on; ``"cusp"``,
+        ``"singular"`` or ``"change point"``, where only some velocities go on, by one branch or by several.
+    blocked : int, optional
+        Order at which the last of the other velocities is blocked.
+    branches : tuple of Branch
+        What goes on.
+    repetitions : tuple of Repetition
+        Which joints repeat equations of which others.
+    """
+
+    coordinates: int
+    equations: int
+    instantaneous: int
+    finite: int
+    order: int | None
+    kind: Kind
+    blocked: int | None = None
+    branches: tuple[Branch, ...] = ()
+    repetitions: tuple[Repetition, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """Degrees of freedom by the count of Gruebler and Kutzbach: coordinates less equations."""
+        return self.coordinates - self.equations
+
+    def __str__(self) -> str:
+        finite = _freedom(self.finite) + (f", finite to order {self.order}" if self.order else "")
+        noun = "infinitesimal motion" + ("" if self.instantaneous == 1 else "s")
+        if self.kind == "rigid":
+            return _freedom(0)
+        if self.kind == "regular":
+            return finite
+        if self.kind == "shaky":
+            return f"shaky: {self.instantaneous} {noun}, blocked at order {self.blocked}"
+        if self.kind == "change point":
+            tangents = "; ".join(map(str, self.branches))
+            return f"change point with {len(self.branches)} branches to order {self.order}, tangents: {tangents}"
+        if not self.branches:
+            return f"singular position with {self.instantaneous} {noun}: {ADVICE}"
+        where = "at a cusp, where the motion comes to rest and turns back" if self.kind == "cusp" else "singular here"
+        return f"{finite}, {where}: of {self.instantaneous} {noun} the others are blocked at order {self.blocked}"
+
+
+def independent(coordinates: int, equations: int) -> Mobility:
+    """Return the mobility of a mechanism whose equations do not depend on each other at a position."""
+    left = coordinates - equations
+    return Mobility(coordinates, equations, left, left, None, "regular" if left else "rigid")
+
+
+@concrete
+def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -> Mobility:
+    """Return how a mechanism can move from where it is put together: by count, by rank, and to a finite extent.
+
+    Drivers and initial conditions hold it at the position, and are released there.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        That can be put together.
+    time : float, optional
+        The instant of the drivers, s; that at which the mechanism's own grid begins, or 0, unless given.
+    order : int, default 10
+        To which motions are continued where equations depend on each other: 2 to 20.
+
+    Raises
+    ------
+    MechanismError
+        If a value is not valid.
+    AssemblyError
+        If the bodies cannot be put together.
+
+    Examples
+    --------
+    Three hinges in a line allow a velocity and no motion; four-bars go on:
+
+    >>> import jounce as jn
+    >>> hinge = jn.planar.Revolute
+    >>> line = jn.Mechanism(
+    ...     space="planar",
+    ...     bodies={"left": jn.Body([0, 0]), "right": jn.Body([1, 0])},
+    ...     joints={
+    ...         "A": hinge(("ground", "left"), [0, 0], [0, 0]),
+    ...         "B": hinge(("left", "right"), [1, 0], [0, 0]),
+    ...         "C": hinge(("right", "ground"), [1, 0], [2, 0]),
+    ...     },
+    ... )
+    >>> print(jn.mobility(line))
+    shaky: 1 infinitesimal motion, blocked at order 2
+    >>> print(jn.mobility(jn.load("examples/four_bar.yaml")))
+    1 degree of freedom
+    """
+    check_mechanism(mechanism)
+    order = whole_number("order", order, 2, HIGHEST_ORDER, error=MechanismError)
+    if time is None:
+        time = 0.0 if mechanism.time is None else float(time_grid(mechanism.time, mechanism.parameter_values)[0])
+    model, coordinates, found = _released(mechanism, time)
+    columns, rows = model.system.shape[1], len(model.rows)
+    if not rows:
+        return independent(columns, 0)
+    matrix = found.jacobian.dense()
+    sizes = np.linalg.svd(matrix, compute_uv=False)
+    if np.sum(sizes > SINGULAR * sizes.max()) == rows:
+        return independent(columns, rows)
+    constraints = ReducedConstraints.at(model, coordinates, matrix, order)
+    told = redundancy_of(model, found, time)[1]
+    return dataclasses.replace(_analysed(constraints, Displacements(model, time)), repetitions=told.repetitions)
+
+
+def _released(mechanism: Mechanism, time: float) -> tuple[Model, Coordinates, Trial]:
+    """Return the model of the joints alone, where drivers hold it, with rows of one size."""
+    held = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={}, outputs={})
+    model = build(held)
+    coordinates = model.guess
+    if model.rows:
+        model, found = settled(model, time, TOLERANCE)
+        check_assembled(model, found, time, free=True)
+        coordinates = found.coordinates
+    model = build(dataclasses.replace(held, drivers={}, forces={}))
+    if not model.rows:
+        nothing = HostJacobian.of(model.system.pattern, np.zeros(model.system.pattern.entry_count))
+        return model, coordinates, Trial(coordinates, np.ones(0), np.zeros(0), nothing, True)
+    model, _ = with_reference(model, coordinates, time)
+    found = put_together(model, time, TOLERANCE, coordinates)
+    system = with_fields(model.system, row_scale=found.scale[:, None])
+    return dataclasses.replace(model, system=system), found.coordinates, found
+
+
+def _analysed(constraints: ReducedConstraints, moved: Mover) -> Mobility:
+    """Return the mobility at a position where equations depend on each other."""
+    columns, rows = constraints.inverse.shape
+    left, order = constraints.free.shape[1], constraints.order
+    if not left:
+        return Mobility(columns, rows, 0, 0, None, "rigid")
+    if _all_go_on(constraints):
+        return Mobility(columns, rows, left, left, order, "regular", None, (_whole(constraints),))
+    found = curves(constraints)
+    going = [curve for curve in found if curve.order == order]
+    branches = _branches(constraints, going, moved)
+    blocked = max((curve.order + 1 for curve in found if curve.order < order), default=2)
+    finite = max((branch.freedom for branch in branches), default=0)
+    if not branches:
+        moves = _moves_by_trial(constraints, moved)
+        kind: Kind = "singular" if moves else "shaky"
+        return Mobility(columns, rows, left, int(moves), order, kind, blocked)
+    only, *others = branches
+    kind = "change point" if others else "cusp" if only.cusp else "regular" if only.freedom == left else "singular"
+    return Mobility(columns, rows, left, finite, order, kind, blocked, branches)
+
+
+def _all_go_on(constraints: ReducedConstraints) -> bool:
+    """Tell whether all velocities can be continued, as far as some of them taken at random tell."""
+    count = constraints.free.shape[1]
+    some = np.random.default_rng(2).standard_normal((RANDOM_CURVES, count))
+    series = np.zeros((RANDOM_CURVES, constraints.order, count))
+    series[:, 0] = some / np.linalg.norm(some, axis=1, keepdims=True)
+    gap, allowed = constraints.gap(series, constraints.order)
+    return bool((np.abs(gap) <= allowed).all())
+
+
+def _whole(constraints: ReducedConstraints) -> Branch:
+    return Branch(constraints.free.shape[1], _by_body(constraints, constraints.free.T))
+
+
+def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], moved: Mover) -> tuple[Branch, ...]:
+    """Return the branches that curves belong to: those whose tangent spaces a little way on are alike are one."""
+    members: list[tuple[np.ndarray, list[LocalCurve]]] = []
+    for curve in going:
+        coefficients = constraints.along(curve.series[None])[2][0]
+        step = NEARBY ** (1.0 / curve.multiplicity)
+        everything = np.ones(len(constraints.dependent), bool)
+        nearby = closed_nearby(constraints.coordinates, constraints.placed(coefficients, step), everything, moved)
+        velocity = constraints.free @ curve.tangent
+        space = velocity[None] if nearby is None else nearby.free_directions
+        for known, its in members:
+            if len(known) == len(space) and np.linalg.svd(known @ space.T, compute_uv=False)[-1] > np.cos(SAME_BRANCH):
+                its.append(curve)
+                break
+        else:
+            members.append((space, [curve]))
+    found = []
+    for space, its in members:
+        velocities = np.stack([constraints.free @ curve.tangent for curve in its])
+        tangents = np.linalg.svd(velocities)[2][: len(space)] if len(its) > 1 else velocities
+        cusp = all(curve.multiplicity > 1 for curve in its)
+        found.append(Branch(len(space), _by_body(constraints, tangents), cusp))
+    return tuple(sorted(found, key=lambda branch: branch.freedom))
+
+
+def _moves_by_trial(constraints: ReducedConstraints, moved: Mover) -> bool:
+    """Tell whether bodies that are displaced along a velocity that is free can be put together where they are."""
+    everything = np.ones(len(constraints.dependent), bool)
+    random = np.random.default_rng(3).standard_normal((2 * RANDOM_CURVES, constraints.free.shape[1]))
+    ways = np.concatenate([np.eye(random.shape[1]), -np.eye(random.shape[1]), random])
+    for way in ways:
+        sway = constraints.free @ way
+        sway *= FARTHER / np.abs(sway).max()
+        if closed_nearby(constraints.coordinates, sway, everything, moved) is not None:
+            return True
+    return False
+
+
+def _by_body(constraints: ReducedConstraints, vectors: Float[np.ndarray, "vector column"]) -> dict[str, np.ndarray]:
+    """Return scaled velocities by body, in SI units, the largest part of each vector one in scaled ones."""
+    model = constraints.model
+    scale = np.asarray(model.system.column_scale)
+    vectors = vectors / np.abs(vectors).max(axis=1, keepdims=True)
+    signs = np.sign([row[np.argmax(np.abs(row))] for row in np.round(vectors, 6)])
+    parts = (vectors * signs[:, None]).reshape(len(vectors), len(model.bodies), -1) * scale
+    return {name: parts[:, k] for k, name in enumerate(model.bodies)}
+
+
+def _turn(vector: Float[np.ndarray, " coordinate"]) -> float:
+    """Return how fast a body turns, with the sign of the largest component."""
+    turns = vector[2:] if len(vector) == 3 else vector[3:]
+    size = float(np.linalg.norm(turns))
+    return 0.0 if size < 1e-9 else size * float(np.sign(turns[np.argmax(np.abs(turns))]))
+
+
+def _freedom(number: int) -> str:
+    return f"{number} degree{'' if number == 1 else 's'} of freedom"
+
+
+def facts_of(found: Mobility) -> dict[str, Any]:
+    """Return a mobility as plain data."""
+    return {
+        "count": found.count,
+        "instantaneous": found.instantaneous,
+        "finite": found.finite,
+        "order": found.order,
+        "kind": found.kind,
+        "blocked": found.blocked,
+        "branches": [
+            {
+                "freedom": branch.freedom,
+                "cusp": branch.cusp,
+                "tangents": {name: vectors.tolist() for name, vectors in branch.tangents.items()},
+            }
+            for branch in found.branches
+        ],
+        "words": str(found),
+    }

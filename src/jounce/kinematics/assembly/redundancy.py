@@ -1,0 +1,237 @@
+"""Redundant constraints: found by the rank of the Jacobian at several positions, and told by which joint repeats which.
+
+The rank may be low at one position only, at a dead point or where bodies happen to be aligned. So it is judged in
+general positions near the one assembled, which the joints allow: on the way there drivers let go.
+"""
+
+import dataclasses
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.kinematics.assembly.constraint_series import ReducedConstraints
+from jounce.kinematics.assembly.initial_revolutions import Coordinates, Mover
+from jounce.kinematics.assembly.tangent_cone import curves
+from jounce.linear_algebra.host_jacobian import HostJacobian
+from jounce.mechanism import Model
+
+SWAYS = (0.1, 0.01)  # rad or sizes of the mechanism: how far a position in general is from the one assembled
+POSITIONS = 3
+MOST_STEPS = 50
+OPEN = 1e-7  # part of a row in combinations that vanish: what is less is none
+KINDS = {"joints": "joint", "drivers": "driver", "initial": "initial condition"}
+CURVE_ORDER = 4  # to which curves are looked for that lead away from a singular position
+CLOSED = 1e-9  # rad or sizes of the mechanism, by which joints may be open at a position in general
+ROUNDING = 1e-14  # of residuals, whose rows have one size: what is less does not tell two positions from each other
+STEP = 1e-3  # rad or sizes of the mechanism, over which the change of the Jacobian is measured
+
+
+class Repetition(NamedTuple):
+    """Equations that a joint or driver repeats.
+
+    Attributes
+    ----------
+    kind : str
+        ``"joint"`` or ``"driver"``.
+    name : str
+        Of it.
+    equations : int
+        How many of its equations follow from those of others.
+    of : tuple of str
+        Names of these others; none where its own equations repeat each other.
+    """
+
+    kind: str
+    name: str
+    equations: int
+    of: tuple[str, ...]
+
+    def __str__(self) -> str:
+        noun = "equation" if self.equations == 1 else "equations"
+        return f"{self.kind} {self.name} repeats {self.equations} {noun} of {', '.join(self.of) or 'its own'}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Redundancy:
+    """Which equations of a mechanism follow from others.
+
+    Attributes
+    ----------
+    rows : tuple of str
+        The joint or driver of each row, as a model has them.
+    rank : int
+        Of the Jacobian, in general.
+    here : HostJacobian
+        Scaled, at the position assembled.
+    jacobian : HostJacobian
+        Scaled, at a position of that rank.
+    """
+
+    rows: tuple[str, ...]
+    rank: int
+    here: HostJacobian
+    jacobian: HostJacobian
+
+    @property
+    def count(self) -> int:
+        """Number of equations that follow from others, in general."""
+        return len(self.rows) - self.rank
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether the position assembled is singular: fewer equations are independent there than in general."""
+        return self.here.rank < self.rank
+
+    @cached_property
+    def repetitions(self) -> tuple[Repetition, ...]:
+        """Which joints and drivers repeat equations of which others."""
+        return repetitions(self.rows, self.jacobian.dependences) if self.count else ()
+
+    @property
+    def among(self) -> tuple[str, ...]:
+        """Joints and drivers whose equations depend on each other, as `rows` has them."""
+        if not self.count:
+            return ()
+        weights = np.linalg.norm(self.jacobian.dependences, axis=1)
+        return tuple(dict.fromkeys(row for row, x in zip(self.rows, weights, strict=True) if x > OPEN))
+
+    def __str__(self) -> str:
+        return "; ".join(map(str, self.repetitions))
+
+
+def redundancy(model: Model, coordinates: Coordinates, jacobian: HostJacobian, moved: Mover) -> Redundancy:
+    """Return which rows of a mechanism that was put together follow from others.
+
+    Parameters
+    ----------
+    model : Model
+        The mechanism.
+    coordinates : dict of str to array
+        Of all bodies, where joints and drivers are fulfilled.
+    jacobian : HostJacobian
+        There, with rows of one size.
+    moved : callable
+        Takes coordinates and an increment to coordinates, residual and Jacobian, with rows of that size.
+    """
+    here = _next_to_singular(coordinates, jacobian, moved)
+    best, rank = jacobian, jacobian.rank
+    if here.rank < min(here.shape) or here.shape[0] > here.shape[1]:
+        for nearby in _nearby(model, coordinates, here, moved):
+            if nearby.rank >= rank:
+                best, rank = nearby, nearby.rank
+    return Redundancy(model.rows, rank, here, best)
+
+
+def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, moved: Mover) -> HostJacobian:
+    """Return the Jacobian with those singular values zero that are so at a position that rounding does not tell apart.
+
+    Along the velocity v of a small singular value s, the residual by the combination u of rows that belongs to it grows
+    as ``s x + c x^2 / 2``, where c is the change of the Jacobian in that direction, seen by u. At ``x = -s / c`` the
+    position is singular, and its residual differs from that of this one by ``s^2 / 2 c``.
+    """
+    rows, sizes, columns = jacobian.smallest
+    zero = 0.0
+    for k in np.flatnonzero(sizes > jacobian.tolerance * jacobian.largest):
+        size, velocity = sizes[k], columns[:, k]
+        there, back = (moved(coordinates, sign * STEP * velocity)[2] for sign in (1.0, -1.0))
+        change = rows.T @ (there.times(columns) - back.times(columns)) / (2 * STEP)
+        if size**2 <= 2 * ROUNDING * np.linalg.norm(change):
+            zero = max(zero, float(size))
+    return dataclasses.replace(jacobian, tolerance=1.01 * zero / jacobian.largest) if zero else jacobian
+
+
+def _nearby(model: Model, coordinates: Coordinates, jacobian: HostJacobian, moved: Mover) -> list[HostJacobian]:
+    """Return the Jacobians at positions in general near one, as many as are found."""
+    joints = np.array([name.startswith("joints.") for name in model.rows], bool)
+    directions = jacobian.take(joints).free_directions
+    if not len(directions):
+        return []
+    random, found = np.random.default_rng(1), []  # any directions do, the same each time
+    for _ in range(POSITIONS):
+        sway = random.normal(size=len(directions)) @ directions
+        for size in SWAYS:
+            there = closed_nearby(coordinates, size * sway / np.abs(sway).max(), joints, moved)
+            if there is not None:
+                found.append(there)
+                break
+    return found or _along_curves(model, coordinates, jacobian, joints, moved)
+
+
+def _along_curves(
+    model: Model, coordinates: Coordinates, jacobian: HostJacobian, joints: Bool[np.ndarray, " row"], moved: Mover
+) -> list[HostJacobian]:
+    """Return the Jacobians a little way along the curves that lead away from a singular position."""
+    if not joints.any() or jacobian.is_large:
+        return []
+    constraints = ReducedConstraints.at(model, coordinates, jacobian.dense(), CURVE_ORDER, joints)
+    going = [curve for curve in curves(constraints) if curve.order == CURVE_ORDER]
+    found = []
+    for curve in going:
+        coefficients = constraints.along(curve.series[None])[2][0]
+        sway = constraints.placed(coefficients, SWAYS[-1] ** (1.0 / curve.multiplicity))
+        there = closed_nearby(coordinates, sway, joints, moved)
+        found += [] if there is None else [there]
+    return found
+
+
+def closed_nearby(
+    coordinates: Coordinates, sway: Float[np.ndarray, " column"], joints: Bool[np.ndarray, " row"], moved: Mover
+) -> HostJacobian | None:
+    """Return the Jacobian at a position near a displaced one that fulfils the joints; None where it is not displaced.
+
+    Parameters
+    ----------
+    coordinates : dict of str to array
+        Of all bodies at a position.
+    sway : array of shape (columns,)
+        By how much they are displaced, rad and sizes of the mechanism.
+    joints : array of bool, shape (rows,)
+        Rows that must hold.
+    moved : callable
+        As `redundancy` takes it.
+    """
+    place, step, gone = moved(coordinates, sway), sway, sway
+    for _ in range(MOST_STEPS):
+        correction = place[2].take(joints).step(place[1][joints])
+        if correction is None or np.abs(correction).max(initial=0.0) > 1.0:
+            return None
+        place, step, gone = moved(place[0], correction), correction, gone + correction
+        if np.abs(step).max(initial=0.0) < 1e-12:
+            break
+    away = np.abs(gone).max(initial=0.0)
+    open_ = np.abs(place[1][joints]).max(initial=0.0)
+    return place[2] if open_ <= CLOSED and away > 0.1 * np.abs(sway).max() else None
+
+
+def repetitions(rows: tuple[str, ...], combinations: Float[np.ndarray, "row combination"]) -> tuple[Repetition, ...]:
+    """Return which joints and drivers repeat equations of which others.
+
+    Parameters
+    ----------
+    rows : tuple of str
+        The joint or driver of each row.
+    combinations : array of shape (rows, combinations)
+        An orthonormal basis of the combinations of rows that vanish.
+    """
+    names = list(dict.fromkeys(rows))
+    parts = {name: combinations[[k for k, row in enumerate(rows) if row == name]] for name in names}
+    found = []
+    while combinations.shape[1]:
+        ranks = {name: _rank(part) for name, part in parts.items()}
+        most = max(ranks.values())
+        # of joints that repeat as many, the last one; a driver prescribes a motion only once
+        name = [name for name in names if ranks[name] == most][-1]
+        _, _, turned = np.linalg.svd(parts[name])
+        its, rest = turned[:most].T, turned[most:].T
+        others = [other for other in names if other != name and np.linalg.norm(parts[other] @ its) > OPEN]
+        kind, _, plain = name.partition(".")
+        found.append(Repetition(KINDS.get(kind, kind), plain, most, tuple(x.partition(".")[2] for x in others)))
+        combinations = combinations @ rest
+        parts = {name: part @ rest for name, part in parts.items()}
+    return tuple(found)
+
+
+def _rank(part: Float[np.ndarray, "row combination"]) -> int:
+    return int(np.linalg.matrix_rank(part, tol=OPEN)) if part.size else 0

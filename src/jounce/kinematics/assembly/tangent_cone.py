@@ -1,0 +1,186 @@
+"""Curves through a position that fulfil the reduced constraints: their tangents, and to which order they go on.
+
+A curve is a series y(t) = y_p t^p + y_(p+1) t^(p+1) + ..., its tangent y_p of length one and all later coefficients
+across it, which fixes how it is run through. The equations of order k are met together by coefficients of all orders
+below (Gauss and Newton, from many starts at order two, from the curve found so far beyond): what they leave open at one
+order is decided by later ones. With p = 1 these are smooth motions; at a cusp p is 2, and the motion turns back.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.kinematics.assembly.constraint_series import FULFILLED, ReducedConstraints
+from jounce.linear_algebra.quadratic_forms import polarised
+
+STARTS = 400  # directions from which tangents are sought
+MOST_CURVES = 16
+SAME = 1e-3  # rad, between two tangents that are one
+STEPS = 40
+RETRIES = 6
+DIFFERENCE = 1e-4  # of coefficients, by which slopes are found: of polynomials, whose error is its square
+
+Series = Float[np.ndarray, "order k"]
+
+
+@dataclasses.dataclass(frozen=True)
+class LocalCurve:
+    """A curve through the position.
+
+    Attributes
+    ----------
+    series : array of shape (order, k)
+        Coefficients of y, from order one on; those below `multiplicity` are zero.
+    multiplicity : int
+        Order of the first that is not zero: one of a smooth motion, two at a cusp.
+    order : int
+        To which it fulfils the constraints; where that is less than the order looked at, it is blocked at the next.
+    """
+
+    series: Series
+    multiplicity: int
+    order: int
+
+    @property
+    def tangent(self) -> Float[np.ndarray, " k"]:
+        """Its direction, of length one."""
+        return self.series[self.multiplicity - 1]
+
+
+def curves(constraints: ReducedConstraints) -> list[LocalCurve]:
+    """Return the curves through a position, one for each tangent that is found: those that go on, and the others.
+
+    Of a continuum of tangents, as where two degrees of freedom are left, a few are told.
+    """
+    tangents = _distinct([*_quadratic_tangents(constraints)])
+    found = []
+    for tangent in tangents:
+        smooth = _continued(constraints, tangent, 1)
+        if smooth.order < constraints.order:
+            found += [smooth] if (turning := _cusp(constraints, tangent)) is None else [turning]
+        else:
+            found.append(smooth)
+    return found
+
+
+def _cusp(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"]) -> LocalCurve | None:
+    for sense in (1.0, -1.0):
+        curve = _continued(constraints, sense * tangent, 2)
+        if curve.order == constraints.order:
+            return curve
+    return None
+
+
+def _quadratic_tangents(constraints: ReducedConstraints) -> Float[np.ndarray, "tangent k"]:
+    """Return unit vectors u with no coefficient of order two along u t, from many starts; any, where there is none."""
+    count = constraints.free.shape[1]
+    if count == 1:
+        return np.ones((1, 1))
+    forms = _quadratic_forms(constraints)
+    scale = np.abs(forms).max(initial=0.0)
+    random = np.random.default_rng(0)
+    u = random.standard_normal((STARTS, count))
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    if not scale > FULFILLED:
+        return u
+    forms = forms / scale
+    for _ in range(STEPS):
+        along = np.einsum("sij,nj->nsi", forms, u)
+        gap = np.einsum("nsi,ni->ns", along, u)
+        slope = np.concatenate([2 * along, u[:, None]], axis=1)
+        right = np.concatenate([gap, np.zeros((len(u), 1))], axis=1)
+        u = u - np.einsum("nij,nj->ni", np.linalg.pinv(slope, rcond=1e-10), right)
+        u /= np.linalg.norm(u, axis=1, keepdims=True)
+    gap = np.abs(np.einsum("sij,ni,nj->ns", forms, u, u)).max(axis=1)
+    # where a root is double the iteration halves its error at each step, and the gap goes with its square
+    return u[gap <= 1e-9]
+
+
+def _quadratic_forms(constraints: ReducedConstraints) -> Float[np.ndarray, "s k k"]:
+    """Return the coefficients of order two of g as forms."""
+
+    def second_order(directions: Float[np.ndarray, "pair k"]) -> Float[np.ndarray, "s pair"]:
+        series = np.zeros((len(directions), constraints.order, directions.shape[1]))
+        series[:, 0] = directions
+        return constraints.along(series)[0][:, 1].T
+
+    return polarised(second_order, constraints.free.shape[1])
+
+
+def _distinct(tangents: Sequence[Float[np.ndarray, " k"]]) -> list[Float[np.ndarray, " k"]]:
+    """Return tangents that are different lines; of very many, those that are farthest from each other."""
+    if not len(tangents):
+        return []
+    whole = np.asarray(tangents)
+    chosen = [int(np.argmax(np.abs(whole).max(axis=1)))]
+    while len(chosen) < MOST_CURVES:
+        along = np.abs(whole @ whole[chosen].T).max(axis=1)
+        farthest = int(np.argmin(along))
+        if np.arccos(min(along[farthest], 1.0)) < SAME:
+            break
+        chosen.append(farthest)
+    return [whole[k] for k in chosen]
+
+
+def _continued(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"], multiplicity: int) -> LocalCurve:
+    """Return the curve along a tangent, as far as it can be continued."""
+    series = np.zeros((constraints.order, len(tangent)))
+    series[multiplicity - 1] = tangent
+    random, reached = np.random.default_rng(0), 2 * multiplicity - 1
+    for order in range(2 * multiplicity, constraints.order + 1):
+        for attempt in range(RETRIES):
+            start = series.copy()
+            if attempt:  # what lower orders left open, elsewhere
+                later = slice(multiplicity, order - multiplicity)
+                start[later] += 0.5 * random.standard_normal(start[later].shape)
+            trial = _fulfilling(constraints, start, multiplicity, order)
+            if trial is not None:
+                series, reached = trial, order
+                break
+        if reached < order:
+            break
+    return LocalCurve(series, multiplicity, reached)
+
+
+def _fulfilling(constraints: ReducedConstraints, series: Series, multiplicity: int, order: int) -> Series | None:
+    """Return a series near one that meets the equations to an order, by the steps of Gauss and Newton; or None."""
+    known = slice(multiplicity - 1, order - multiplicity)  # coefficients on which they depend
+    shape = series[known].shape
+
+    def with_values(values: np.ndarray) -> np.ndarray:
+        whole = np.repeat(series[None], len(values), axis=0)
+        whole[:, known] = values.reshape(-1, *shape)
+        return whole
+
+    values, damping = series[known].ravel(), 0.0
+    gap, allowed = constraints.gap(with_values(values[None]), order)
+    for _ in range(STEPS):
+        if (np.abs(gap[0]) <= allowed[0]).all():
+            found = with_values(values[None])[0]
+            return found if np.linalg.norm(found[multiplicity - 1]) > 0.5 else None
+        nudged = values + DIFFERENCE * np.concatenate([np.eye(values.size), -np.eye(values.size)])
+        ahead, behind = np.split(constraints.gap(with_values(nudged), order)[0], 2)
+        weights = 1.0 / allowed[0]
+        slope = ((ahead - behind) / (2 * DIFFERENCE)).T * weights[:, None]
+        # the tangent stays of length one, later coefficients across it
+        first, later = values[: shape[1]], values.reshape(shape)[1:]
+        fixed = np.zeros((shape[0], values.size))
+        fixed[0, : shape[1]] = first
+        for k, row in enumerate(later, 1):
+            fixed[k, k * shape[1] : (k + 1) * shape[1]], fixed[k, : shape[1]] = first, row
+        across = np.concatenate([[0.5 * (first @ first - 1.0)], later @ first])
+        heavy = np.max(np.abs(slope), initial=1.0)
+        whole = np.concatenate([slope, heavy * fixed])
+        right = np.concatenate([gap[0] * weights, heavy * across])
+        step = -np.linalg.lstsq(whole, right, rcond=1e-9)[0]
+        step *= min(1.0, 1.0 / max(np.abs(step).max(initial=0.0), 1e-300))
+        trials = values + np.array([1.0, 0.5, 0.25, 0.1])[:, None] * step
+        gaps, limits = constraints.gap(with_values(trials), order)
+        best = int(np.argmin(np.abs(gaps / limits).max(axis=1)))
+        if damping > 5 and np.abs(gaps / limits).max(axis=1)[best] > 0.9 * np.abs(gap / allowed).max():
+            return None
+        damping += 1
+        values, gap, allowed = trials[best], gaps[best : best + 1], limits[best : best + 1]
+    return None

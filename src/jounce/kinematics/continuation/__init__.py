@@ -1,0 +1,1 @@
+"""Following a motion in steps: predictor, corrector, singularity distance, change points."""

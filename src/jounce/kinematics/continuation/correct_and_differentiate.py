@@ -1,0 +1,329 @@
+"""One compiled function: from solved neighbours to solved instants, with all their derivatives.
+
+Each lane of the batch is predicted by the Taylor series of a neighbour, corrected by Newton-Raphson, and
+differentiated order after order with the last factorisation of its Jacobian (Sommer 2024, equations 1-8). That it is on
+the branch of its neighbour is not judged by how near the prediction was: the simplified Newton iteration must contract
+(Deuflhard 2011, chapter 5), the determinant of the Jacobian must keep its sign, and where an instant is surveyed, the
+nearest zero of that determinant is told, real or complex, beyond which no step may go.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.jet import Jet
+from jounce.jet.algebra import stacked
+from jounce.jet.turns import brought_near
+from jounce.kinematics.continuation.corrector import newton_raphson
+from jounce.kinematics.continuation.jacobian_factors import Factor, factored
+from jounce.kinematics.continuation.predictor import (
+    hidden_by_laws,
+    laws_predictable,
+    near_prediction,
+    travel_of,
+)
+from jounce.kinematics.continuation.singularity_distance import turnover_of
+from jounce.kinematics.status import Status
+from jounce.linear_algebra.least_squares import LeastSquaresFactor
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.system import Group, System
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers, Real
+
+Lanes = Float[Numbers, " batch"]
+Truths = Bool[Numbers, " batch"]
+SolvedState = tuple[Mapping[str, Numbers], tuple[Numbers, ...], Numbers]
+"""What a solved instant hands on: jets of coordinates, by name, and of outputs, and the sign of the determinant."""
+
+CONVERGED = 1e-9  # a last correction above this is no convergence, however small the tolerance
+SAFE_FRACTION = 0.4  # of the time in which some Taylor term would move a body by a radian, or by the mechanism's size
+SINGULAR_PIVOT = 1e-12  # of the largest; corrections tell before that they no longer converge
+LARGEST_GAP = 1e-9  # of redundant rows that agree, rad or sizes of the mechanism, or this many tolerances:
+GAP_TOLERANCES = 1e3
+LARGEST_CONTRADICTION = 1e-6  # of derivatives in redundant rows, as a part of what the motion's own could be
+
+
+class Arrival(NamedTuple):
+    """What is known of the instants of a batch; every array has the batch last."""
+
+    coordinates: dict[str, Numbers]  # jets of the pose, by name, shape (order + 1, ...)
+    outputs: tuple[Numbers, ...]  # jets of each group of outputs
+    status: Int[Numbers, " batch"]  # see Status
+    body: Int[Numbers, " batch"]  # index of the moving body that is farthest from its prediction
+    safe_step: Lanes  # s, over which the motion from here can be predicted
+    radius: Lanes  # s, the same by the first three Taylor terms only, which rounding spoils least
+    deviation: Lanes  # departure from the prediction, over how far that moves
+    sign: Lanes  # of the determinant of the Jacobian
+    turnover: Lanes  # 1/s, how fast the first lane nears (< 0) or leaves a singular position; 0 unless surveyed; (1,)
+    pivot_ratio: Lanes  # smallest pivot of the Jacobian over the largest
+    admissible: Bool[Numbers, "driver batch"]  # whether each driver has a permitted value
+    finite: Bool[Numbers, "result batch"]  # whether all derivatives wanted are, of the pose and of each output
+    gaps: Float[Numbers, "2 contradicting batch"]  # of redundant rows, see `_gaps`; of none where none are
+
+    def state(self, lanes: slice | np.ndarray) -> SolvedState:
+        """Return what the neighbours of some lanes start from: jets of coordinates and outputs, and the sign."""
+        return jax.tree.map(lambda x: x[..., lanes], (self.coordinates, self.outputs, self.sign))
+
+
+def predicts_turns(group: Group) -> bool:
+    """Tell whether outputs are angles whose turns follow from a prediction.
+
+    Those about axes have theirs counted along the attitudes of the bodies: they turn by half a turn at once where
+    bodies pass near an attitude that tells no angle, and no series of theirs carries past it.
+    """
+    return group.element.turning and not measures_angle(group)
+
+
+def predictor(system: System, pose_type: type[Pose], solved: SolvedState) -> SolvedState:
+    """Return what a prediction needs of solved instants: jets of the pose and of turning angles, and the sign."""
+    coordinates, outputs, sign = solved
+    angles = [output for output, group in zip(outputs, system.outputs, strict=True) if predicts_turns(group)]
+    return {name: coordinates[name] for name in pose_type.predictor}, tuple(angles), sign
+
+
+def _size(increment: Float[Numbers, "component body batch"]) -> Float[Numbers, "body batch"]:
+    return jnp.max(jnp.abs(increment), axis=0)
+
+
+def differentiated(system: System, pose: Pose, factor: Factor, time: Float[Jet, "1 batch"]) -> Pose:
+    """Return the pose with all derivatives that the time jet has: order after order, one solve each.
+
+    The coefficient of order k of the residual is affine in the unknown (r[k], w'[k-1] / k) with the Jacobian as its
+    slope, so that it is found from the coefficient with the unknown set to zero.
+    """
+    for k in range(1, time.order + 1):
+        trial = pose.extended(None, None)
+        right = -system.residual(trial, time.truncate(k)).dense().coefficients[k]
+        pose = pose.extended(*system.coordinates(factor.solve(right), pose.shifts))
+        pose = jax.lax.optimization_barrier(pose)  # or XLA computes it again in everything that uses it
+    return pose
+
+
+def _departures(system: System, pose: Pose, predicted: Any) -> Float[Numbers, "body batch"]:
+    """Return how far each moving body is from its prediction, rad or sizes of the mechanism: (bodies, batch)."""
+    shift, turn = pose.separation(predicted)
+    return jnp.maximum(_size(shift) / system.column_scale[0], _size(turn))[1:]
+
+
+def _terms(system: System, coordinates: dict[str, Jet], predictor: tuple[str, ...]) -> list[Lanes]:
+    """Return the size of each Taylor coefficient but the first, rad or sizes of the mechanism: order x (batch,)."""
+    # a slide that runs away, as towards a dead point of its axes, is measured by where it is
+    scales = {"position": jnp.maximum(system.column_scale[0], _largest(coordinates["position"].coefficients[0]))}
+    sizes = [
+        jnp.stack([_largest(c) / scales.get(name, 1.0) for name, c in zip(predictor, level, strict=True)])
+        for level in zip(*(coordinates[name].coefficients[1:] for name in predictor), strict=True)
+    ]
+    return [jnp.max(jnp.where(jnp.isfinite(size), size, 0.0), axis=0) for size in sizes]
+
+
+def _largest(coefficient: Float[Numbers, "*rest batch"]) -> Lanes:
+    return jnp.max(jnp.abs(coefficient.reshape(-1, coefficient.shape[-1])), axis=0)
+
+
+def _safe_step(terms: list[Lanes]) -> Lanes:
+    """Return the step at which no Taylor term moves a body far.
+
+    All terms count, since those of the highest orders may vanish together (a body at rest, or at a turning point).
+    """
+    steps = [jnp.power(jnp.maximum(term, 1e-300), -1.0 / k) for k, term in enumerate(terms, 1)]
+    return SAFE_FRACTION * jnp.min(jnp.stack(steps), axis=0)
+
+
+def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes) -> tuple[Numbers, ...]:
+    """Return the jets of the outputs, angles with the turns that the jets of a neighbour give them."""
+    results, known = [], iter(angles)
+    for group in system.outputs:
+        result = group.evaluate(pose)
+        if predicts_turns(group):
+            expected = next(known)
+            expected = Jet(tuple(jnp.where(jnp.isfinite(expected), expected, 0.0)))
+            result = brought_near(result, expected.evaluate(step))
+        results.append(stacked(result))
+    return tuple(results)
+
+
+def _finite(jets: Sequence[Numbers], wanted: Int[Numbers, ""]) -> Bool[Numbers, "instance batch"]:
+    """Tell where the coefficients of jets are finite up to the order wanted, for each instance: (instances, batch)."""
+    found = []
+    for jet in jets:
+        above = (np.arange(jet.shape[0]) > wanted).reshape(-1, *[1] * (jet.ndim - 1))
+        found.append(jnp.all(jnp.isfinite(jet) | above, axis=(0, 1)))
+    return jnp.concatenate(found)
+
+
+def _finite_results(
+    coordinates: Sequence[Numbers], outputs: Sequence[Numbers], wanted: Int[Numbers, ""]
+) -> Bool[Numbers, "result batch"]:
+    """Tell where the pose and each output are finite up to the order wanted."""
+    posed = [jnp.max(part, axis=-2, keepdims=True) for part in coordinates]
+    finite = _finite([*(x.reshape(x.shape[0], -1, 1, x.shape[-1]) for x in posed), *outputs], wanted)
+    return jnp.concatenate([jnp.all(finite[: len(posed)], axis=0, keepdims=True), finite[len(posed) :]])
+
+
+def _signs(system: System, factor: Factor, before: Callable[[], tuple[Pose, Jet]], sign: Lanes) -> Lanes:
+    """Return the signs of the determinants of the Jacobians, those of neighbours being known, and where those are.
+
+    With redundant rows there is no determinant: the space of the columns has an orientation as seen from the neighbour.
+    """
+    if isinstance(factor, LeastSquaresFactor):
+        return factor.orientation(factored(system, *before())) * jnp.where(sign == 0, 1.0, sign)
+    return factor.sign() if system.rank is None else jnp.ones_like(sign)  # a large one has no orientation at hand
+
+
+def _gaps(
+    system: System, pose: Pose, time: Jet, terms: list[Lanes], tolerance: Real
+) -> Float[Numbers, "2 contradicting batch"]:
+    """Return how far redundant rows are from agreeing: open, rad or sizes of the mechanism; and over what is allowed.
+
+    In the second, derivatives count as well: those of the rows, over what those of the motion could be.
+    """
+    if system.rank is None:
+        return np.zeros((2, 0, *terms[0].shape))
+    rate = jnp.max(jnp.stack([jnp.power(term, 1.0 / k) for k, term in enumerate(terms, 1)]), axis=0)
+    first, *others = system.residual(pose, time).dense().coefficients
+    allowed = GAP_TOLERANCES * tolerance
+    over, part = [jnp.abs(first) / jnp.maximum(allowed, LARGEST_GAP)], jnp.maximum(allowed, LARGEST_CONTRADICTION)
+    for k, level in enumerate(others, 1):
+        over.append(jnp.abs(level) / jnp.maximum(part * rate**k, 1e-300)[None])
+    return jnp.stack([jnp.abs(first), jnp.max(jnp.nan_to_num(jnp.stack(over)), axis=0)])
+
+
+def _status(
+    correction: Lanes,
+    predictable: Truths,
+    pivot_ratio: Lanes,
+    admissible: Truths,
+    finite: Truths,
+    consistent: Truths,
+    tolerance: Real,
+) -> Int[Numbers, " batch"]:
+    """Return the outcome at each instant, the gravest last."""
+    outcomes = (
+        (~finite, Status.UNDEFINED),
+        (~consistent, Status.INCONSISTENT),
+        (~predictable, Status.BRANCH_JUMP),
+        (~(correction <= jnp.maximum(tolerance, CONVERGED)), Status.NOT_CONVERGED),
+        (pivot_ratio <= SINGULAR_PIVOT, Status.SINGULAR),
+        (~jnp.isfinite(correction), Status.NOT_CONVERGED),
+        (~admissible, Status.INADMISSIBLE),
+    )
+    status = np.full(correction.shape, int(Status.OK))
+    for happened, outcome in outcomes:
+        status = jnp.where(happened, int(outcome), status)
+    return status
+
+
+def advance(
+    system: System,
+    coordinates: dict[str, Numbers],
+    angles: tuple[Numbers, ...],
+    sign: Lanes,
+    step: Lanes,
+    instant: Lanes,
+    tolerance: Float[Numbers, ""],
+    refine: Bool[Numbers, ""],
+    survey: Bool[Numbers, ""],
+    wanted: Int[Numbers, ""],
+    *,
+    pose_type: type[Pose],
+    order: int,
+    with_turnover: bool = True,
+) -> Arrival:
+    """Solve a batch of instants, each from a neighbour solved before.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    coordinates, angles
+        Jets of the neighbours, shape (order + 1, ..., batch): of the pose, by name, and of each group of outputs that
+        are angles known up to whole turns.
+    sign : array of shape (batch,)
+        Of the determinant of the Jacobian at the neighbours; 0 where it does not matter.
+    step, instant : array of shape (batch,)
+        Time from the neighbour, and the time arrived at, s.
+    tolerance : float
+        Largest correction of an accepted pose, rad or sizes of the mechanism.
+    refine : bool
+        Whether to correct accepted poses to rounding.
+    survey : bool
+        Whether to look for the nearest singular position.
+    wanted : int
+        Highest derivative that must be finite.
+    pose_type, order
+        PlanarPose or SpatialPose; derivatives wanted.
+    with_turnover : bool, default True
+        Whether the turnover is looked for here, too; else it is left at zero.
+    """
+    given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
+    arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order)
+    first = arrival.status[:1]
+
+    def surveyed() -> Any:
+        hidden = hidden_by_laws(system, first, instant[:1], step[:1], order)
+        return turnover_of(system, pose_type, reached, factor, instant) if with_turnover else np.zeros(1), hidden
+
+    turnover, first = jax.lax.cond(survey, surveyed, lambda: (np.zeros(1), first))
+    return arrival._replace(turnover=turnover, status=jnp.concatenate([first, arrival.status[1:]]))
+
+
+def solved_batch(
+    system: System,
+    coordinates: dict[str, Numbers],
+    angles: tuple[Numbers, ...],
+    sign: Lanes,
+    step: Lanes,
+    instant: Lanes,
+    tolerance: Float[Numbers, ""],
+    refine: Bool[Numbers, ""],
+    wanted: Int[Numbers, ""],
+    *,
+    pose_type: type[Pose],
+    order: int,
+) -> tuple[Arrival, Factor, dict[str, Jet]]:
+    """Return what `advance` does but for the turnover, with the factored Jacobian and the jets of the pose."""
+    # what a law makes infinite, such as the third derivative of t**2.5 at t = 0, is of no use to a prediction
+    moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in coordinates.items()}
+    predicted = pose_type.predicted_from(moving, step)
+    time = Jet.variable(instant[None], order)
+    pose, factor, correction = newton_raphson(system, predicted, time.truncate(0), tolerance, refine)
+    pose = differentiated(system, pose, factor, time)
+
+    outputs = _outputs(system, pose, angles, step)
+    reached = pose.coordinates()
+    coordinates = {name: stacked(jet) for name, jet in reached.items()}
+    departures = _departures(system, pose, predicted)
+    departure = jnp.max(departures, axis=0)
+    travel = travel_of(_terms(system, moving, pose_type.predictor), step)
+    found = _signs(
+        system, factor, lambda: (pose_type.predicted_from(moving, 0.0 * step), Jet([(instant - step)[None]])), sign
+    )
+    predictable = near_prediction(departure, travel) & laws_predictable(system, instant, step, order)
+    predictable &= correction.contracts() & ((sign == 0) | (found == sign))
+    admissible, pivot_ratio = system.admissible(time), factor.pivot_ratio()
+    finite = _finite_results([coordinates[name] for name in pose_type.predictor], outputs, wanted)
+    admitted, defined = jnp.all(admissible, axis=0), jnp.all(finite, axis=0)
+    terms = _terms(system, reached, pose_type.predictor)
+    gaps = _gaps(system, pose, time, terms, tolerance)
+    consistent = jnp.all(gaps[1] <= 1.0, axis=0)
+    status = _status(correction.last, predictable, pivot_ratio, admitted, defined, consistent, tolerance)
+    arrival = Arrival(
+        coordinates,
+        outputs,
+        status,
+        jnp.argmax(departures, axis=0),
+        _safe_step(terms),
+        _safe_step(terms[:3]) / SAFE_FRACTION,
+        departure / jnp.maximum(travel, 1e-300),
+        found,
+        np.zeros(1),
+        pivot_ratio,
+        admissible,
+        finite,
+        gaps,
+    )
+    return arrival, factor, reached

@@ -1,0 +1,298 @@
+"""Following a motion from anchor to anchor: steps that no singular position hides in, checked one by one.
+
+A leg makes the steps that are in the ordinary (see `legs`). Towards a dead point steps become shorter and shorter, and
+the motion ends there; a near miss is followed through its sharp turn. Where the steps shrink while the motion itself
+stays smooth, two branches cross: a change point. It is passed on the series that leads through it, if that arrives on
+the other side to rounding, and is told.
+"""
+
+import bisect
+import dataclasses
+import itertools
+from functools import partial
+
+import jax
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.execution.backends import backend_of
+from jounce.kinematics.continuation.continuation_steps import Ending, Leg, Way
+from jounce.kinematics.continuation.correct_and_differentiate import Arrival, SolvedState
+from jounce.kinematics.continuation.solver import NO_GRID, Solver
+from jounce.kinematics.status import Status
+from jounce.mechanism.axis_angles import AttitudeHistory
+
+PASSABLE = (Status.OK, Status.UNDEFINED)
+SMALLEST_STEP = 1e-10  # of the span
+PASSAGE_ORDER = 4  # of the series that leads through: rounding spoils higher derivatives near a singular position
+PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches a gap of g apart deviate by (g / way)^2
+NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
+LEAST_PASSAGE = 0.2  # of the way to a change point: how far the motion must go on beyond it
+NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
+PLACES = 8  # in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Anchor:
+    """A solved instant of a motion that is followed, and how far it may be followed from there.
+
+    Parameters
+    ----------
+    instant : float
+        s.
+    state : tuple
+        Jets of the coordinates and of the outputs, and the sign of the determinant of the Jacobian.
+    safe_step, radius : float
+        How far the Taylor series carries, s: with all its terms, and with the first three where its terms grow to one.
+    turnover : float
+        Rate at which the Jacobian nears a singular one (below zero) or leaves it, 1/s.
+    status : Status
+        OK, or UNDEFINED, where an output has no finite value: the motion goes on there.
+    """
+
+    instant: float
+    state: SolvedState
+    safe_step: float
+    radius: float
+    turnover: float
+    status: Status
+
+    @classmethod
+    def of(cls, arrival: Arrival, instant: float) -> "Anchor":
+        """Build the anchor from the first lane of a batch that was surveyed."""
+        safe_step, radius, turnover = (float(x[0]) for x in (arrival.safe_step, arrival.radius, arrival.turnover))
+        return cls(float(instant), arrival.state(slice(1)), safe_step, radius, turnover, Status(int(arrival.status[0])))
+
+    @property
+    def place(self) -> tuple[float, float, float, float]:
+        """Instant, safe step, radius and turnover, as a leg wants them."""
+        return self.instant, self.safe_step, self.radius, self.turnover
+
+    @property
+    def reach(self) -> float:
+        """Time to or from the nearest singular position, to first order, s."""
+        return 1 / abs(self.turnover) if abs(self.turnover) > 0 else np.inf
+
+
+def _instant(anchor: Anchor) -> float:
+    return anchor.instant
+
+
+@dataclasses.dataclass(frozen=True)
+class Passage:
+    """A singular position that a motion passes smoothly: when, s, and the radius of its Taylor series there, s."""
+
+    instant: float
+    radius: float
+
+
+@dataclasses.dataclass
+class FollowedPath:
+    """Anchors in order of time, the change points passed, and where and why following the motion ended, if it did.
+
+    Instants of a grid that were solved on the way are told by their indices, with their states; and what computed, too.
+    """
+
+    anchors: list[Anchor]
+    on_the_way: list[tuple[Int[np.ndarray, " lane"], SolvedState]] = dataclasses.field(default_factory=list)
+    change_points: list[Passage] = dataclasses.field(default_factory=list)
+    status: Status = Status.OK
+    ended_at: float = np.inf
+    fault: str = ""
+    backends: set[str] = dataclasses.field(default_factory=set)
+
+    def add(self, done: Leg, first: int) -> None:
+        """Add the anchors of a leg, and the instants of the grid that it solved, which begin with the first."""
+        self.backends.add(backend_of(done.records.status))
+        count = int(done.count)
+        records = jax.tree.map(lambda x: np.asarray(x)[:count], done.records)
+        leaves, structure = jax.tree.flatten((records.coordinates, records.outputs, records.sign))
+        steps = np.flatnonzero(records.taken)
+        taken = [x[steps, ..., :1] for x in leaves]  # copies: an anchor is kept for long, the other lanes are not
+        places = zip(*(x[steps].tolist() for x in (*records.place, records.status[:, 0])), strict=True)
+        for parts, (instant, safe_step, radius, turnover, status) in zip(zip(*taken, strict=True), places, strict=True):
+            state = jax.tree.unflatten(structure, parts)
+            self.anchors.append(Anchor(instant, state, safe_step, radius, turnover, Status(status)))
+        solved = (records.lane >= 0) & (records.status == Status.OK)
+        if solved.any():
+            found = [np.moveaxis(x, 0, -2)[..., solved] for x in leaves]
+            self.on_the_way.append((first + records.lane[solved], jax.tree.unflatten(structure, found)))
+
+    def anchors_around(self, first: float, last: float) -> list[Anchor]:
+        """Return the anchors between two instants, with one before them and one after, where there are some."""
+        begin = bisect.bisect_right(self.anchors, first, key=_instant) - 1
+        end = bisect.bisect_left(self.anchors, last, key=_instant)
+        return self.anchors[max(min(begin, len(self.anchors) - 1), 0) : end + 1]
+
+    def history(self) -> AttitudeHistory | None:
+        """Return the attitudes of all bodies in space along the motion: at the anchors, and by their series between."""
+        if "quaternion" not in self.anchors[0].state[0]:
+            return None
+        times = np.array([anchor.instant for anchor in self.anchors])
+        series = np.concatenate([anchor.state[0]["quaternion"] for anchor in self.anchors], axis=-1)
+        between = partial(attitudes_between, times, np.where(np.isfinite(series), series, 0.0))
+        since = np.diff(times)[:, None] * (np.arange(PLACES) / PLACES)
+        instants = np.append((times[:-1, None] + since).ravel(), times[-1])
+        return AttitudeHistory(between(instants), instants, between=between)
+
+    def ended(self, status: Status, instant: float, fault: str) -> "FollowedPath":
+        """Return the path, with where and why it could not be followed any further."""
+        self.status, self.ended_at, self.fault = status, instant, fault
+        return self
+
+    def singular_positions_outside(self) -> list[Passage]:
+        """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
+        first = self.anchors[0]
+        found = self._just_ahead() if self.status == Status.OK else []
+        if first.turnover > 0 and first.reach < NEARBY * first.radius:
+            found.append(Passage(first.instant - first.reach, first.radius))
+        return found
+
+    def _just_ahead(self) -> list[Passage]:
+        """Return the singular position that the motion was nearing when it ended.
+
+        Where it ends next to it, or just beyond, rounding spoils what is known there: it is told from farther off.
+        """
+        end, passed = self.anchors[-1].instant, self.change_points[-1].instant if self.change_points else -np.inf
+        since = itertools.takewhile(lambda anchor: anchor.instant > passed, reversed(self.anchors))
+        nearing = [x for x in since if x.turnover < 0 and x.reach < NEARBY * x.radius]
+        ahead = [x for x in nearing if end - (x.instant + x.reach) < LEAST_PASSAGE * x.reach]
+        largest = max((x.radius for x in ahead), default=0.0)
+        return [Passage(x.instant + x.reach, x.radius) for x in ahead if x.radius >= 0.5 * largest][:1]
+
+
+def follow(
+    solver: Solver,
+    start: Anchor | Way,
+    stop: float,
+    span: float,
+    first_step: float = np.inf,
+    grid: Float[np.ndarray, " time"] = NO_GRID,
+) -> FollowedPath:
+    """Follow the motion from an anchor to another instant, in steps checked one by one.
+
+    Parameters
+    ----------
+    solver : Solver
+        What solves an instant from another.
+    start : Anchor or Way
+        Where to begin: a solved instant, or the way that begins with solving one; no anchor is found if that fails.
+    stop : float
+        Instant to arrive at, s.
+    span : float
+        Duration of the whole motion, by which steps are too small, s.
+    first_step : float, optional
+        Longest first step from an anchor, s.
+    grid : array of shape (time,), optional
+        Instants to be solved on the way, s, from where it begins.
+    """
+    if isinstance(start, Anchor):
+        path, way = FollowedPath([start]), solver.way(start.state, start.place, first_step)
+    else:
+        path, way = FollowedPath([]), start
+    first = 0
+    while not path.anchors or path.anchors[-1].instant < stop:
+        done = solver.leg(way, grid[first:], stop, SMALLEST_STEP * span)
+        path.add(done, first)
+        way = jax.tree.map(np.asarray, done.way)
+        if not path.anchors:
+            arrival = jax.tree.map(np.asarray, done.last)
+            return path.ended(Status(int(arrival.status[0])), float(way.instant[0]), solver.fault(arrival, 0))
+        here = path.anchors[-1]
+        ending = int(way.ending)
+        first += int(way.next_up)
+        if ending == Ending.PASSAGE:
+            passed = _passed(solver, here, stop)
+            if passed is None:
+                no = np.zeros((), bool)
+                way = way._replace(planned=no, may_pass=no, ending=np.asarray(int(Ending.UNFINISHED)))
+                continue
+            far_side, change_point = passed
+            path.anchors.append(far_side)
+            path.change_points.append(change_point)
+            way = solver.way(far_side.state, far_side.place, float(way.largest), int(way.crawled))
+            first = int(np.searchsorted(grid, far_side.instant, side="right"))
+        elif ending == Ending.COLLAPSED:
+            beyond = float(np.nextafter(here.instant, np.inf))
+            return path.ended(Status.COLLAPSED, beyond, ", ".join(solver.model.drivers))
+        elif ending == Ending.REFUSED:
+            return _ended(solver, path, done, span)
+    return path
+
+
+def _ended(solver: Solver, path: FollowedPath, done: Leg, span: float) -> FollowedPath:
+    """Return the path that cannot be followed any further: where a law was first refused, if it was."""
+    here, refused = path.anchors[-1], float(done.way.refused)
+    if np.isnan(refused):
+        target, arrival = float(done.way.instant[0]), jax.tree.map(np.asarray, done.last)
+    else:
+        target, instant = refused, np.array([refused])
+        arrival = solver(solver.needed(here.state), instant - here.instant, instant, survey=True)
+    status = Status(int(arrival.status[0]))
+    if status != Status.INADMISSIBLE and here.reach < NEARLY_SINGULAR * span:
+        status = Status.SINGULAR  # the range of the motion ends at a dead point
+    return path.ended(status, target, solver.fault(arrival, 0))
+
+
+def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, Passage] | None:
+    """Return the anchor beyond a change point just ahead, as far from it as this one is, if there is one to pass.
+
+    The far side must lie on the series that leads there, to rounding, and the Jacobian must leave the singular position
+    as fast as it came near: two branches that only come near each other, and a dead point, do neither.
+    """
+    middle = here.instant + here.reach
+    target = min(middle + here.reach, stop)
+    if target - middle < LEAST_PASSAGE * here.reach:
+        return None  # the motion stops before
+    coordinates, outputs, sign = here.state
+    shortened = jax.tree.map(_shortened, (coordinates, outputs))
+    known = (*shortened, np.zeros_like(sign))  # the sign may change
+    arrival = solver(solver.needed(known), np.array([target - here.instant]), np.array([target]), survey=True)
+    beyond = Anchor.of(arrival, target)
+    if arrival.status[0] not in PASSABLE or not arrival.deviation[0] <= PASSAGE_DEVIATION:
+        return None
+    if not (beyond.turnover > 0 and abs(beyond.reach - (target - middle)) <= 0.5 * (target - middle)):
+        return None
+    located = 0.5 * (middle + target - beyond.reach)  # what each side errs by cancels to the second order
+    return beyond, Passage(located, min(here.radius, beyond.radius))
+
+
+def attitudes_between(
+    times: Float[np.ndarray, " anchor"],
+    series: Float[np.ndarray, "order 4 bodies anchor"],
+    instants: Float[np.ndarray, " time"],
+) -> Float[np.ndarray, "4 bodies time"]:
+    """Return attitudes at instants between anchors in order of time, by their series."""
+    after = np.clip(np.searchsorted(times, instants, side="right"), 1, max(len(times) - 1, 1))
+    return blended_attitudes(times, series, (after - 1, np.minimum(after, len(times) - 1)), instants)
+
+
+def blended_attitudes(
+    times: Float[np.ndarray, " anchor"],
+    series: Float[np.ndarray, "order 4 bodies anchor"],
+    neighbours: tuple[Int[np.ndarray, " time"], Int[np.ndarray, " time"]],
+    instants: Float[np.ndarray, " time"],
+) -> Float[np.ndarray, "4 bodies time"]:
+    """Return attitudes at instants by the series of the anchors before and after each, by index.
+
+    A share s of the way from one to the other, their errors are as s^n and (1 - s)^n, and so are the weights of the
+    other one.
+    """
+    before, after = neighbours
+    whole = times[after] - times[before]
+    share = np.clip((instants - times[before]) / np.where(whole > 0, whole, 1.0), 0.0, 1.0)
+    late, early = share ** len(series), (1.0 - share) ** len(series)
+    found = np.zeros((*series.shape[1:-1], len(instants)))
+    for anchor, weight in ((before, early / (early + late)), (after, late / (early + late))):
+        part = np.zeros_like(found)
+        for coefficient in series[::-1]:
+            part = part * (instants - times[anchor]) + coefficient[..., anchor]
+        found += weight * part
+    return found
+
+
+def _shortened(jet: Float[np.ndarray, "order *rest"]) -> Float[np.ndarray, "order *rest"]:
+    """Return Taylor coefficients with those above a low order set to zero."""
+    low = jet.copy()
+    low[PASSAGE_ORDER + 1 :] = 0
+    return low

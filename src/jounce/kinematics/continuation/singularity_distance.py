@@ -1,0 +1,138 @@
+"""How fast a motion nears a singular position: the largest eigenvalue of ``J^-1 J'``.
+
+To first order in a step s the determinant is ``det(J) det(1 + s J^-1 J')``: minus the inverse of that eigenvalue is the
+distance in time to its nearest zero, which may be complex. All zeros count, also those that leave the sign of the
+determinant as it is, as two loops do that pass their dead points together.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.jet import Jet
+from jounce.kinematics.continuation.jacobian_factors import Factor, factored
+from jounce.linear_algebra.frontal import FrontalFactor
+from jounce.mechanism.system import System
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers, Real
+
+SQUARINGS = 4  # of the matrix of which the largest eigenvalue is sought
+PROBES = 8  # vectors by which the norm of a power of a large matrix is estimated
+
+
+def turnover_of(
+    system: System,
+    pose_type: type[Pose],
+    coordinates: dict[str, Jet],
+    factor: Factor,
+    time: Float[Numbers, " batch"],
+) -> Float[Numbers, " 1"]:
+    """Return the eigenvalue of ``J^-1 J'`` of largest size with the sign of its real part, 1/s, for the first lane."""
+    first = {name: jet.truncate(1).map(lambda c: c[..., :1]) for name, jet in coordinates.items()}
+    instant = time[:1]
+
+    def entries(step: Any) -> Any:
+        return system.entries(pose_type.predicted_from(first, step), Jet([(instant + step)[None]]))
+
+    _, slope = jax.jvp(entries, (np.zeros(1),), (np.ones(1),))
+    if isinstance(factor, FrontalFactor):
+
+        def product(vectors: Any) -> Any:
+            return factor.applied_inverse(system.pattern.product(slope, vectors) * system.row_scale)
+
+        return _of_products(product, system.shape[1])
+    return _of_matrix(factor.applied_inverse(system.pattern.dense(slope)[..., 0] * system.row_scale))
+
+
+def turnover_at(
+    system: System, pose_type: type[Pose], coordinates: dict[str, Numbers], time: Float[Numbers, " batch"]
+) -> Float[Numbers, " 1"]:
+    """Return what `turnover_of` does, from the jets of the coordinates alone."""
+    first = {name: Jet(tuple(x[:2, ..., :1])) for name, x in coordinates.items()}
+    pose = pose_type.predicted_from(first, np.zeros(1))
+    return turnover_of(system, pose_type, first, factored(system, pose, Jet([time[None, :1]])), time)
+
+
+def turnovers_of(
+    system: System,
+    pose_type: type[Pose],
+    coordinates: dict[str, Jet],
+    factor: Factor,
+    time: Float[Numbers, " batch"],
+) -> Float[Numbers, " batch"]:
+    """Return what `turnover_of` does, for all lanes."""
+    first = {name: jet.truncate(1) for name, jet in coordinates.items()}
+
+    def entries(step: Any) -> Any:
+        return system.entries(pose_type.predicted_from(first, step), Jet([(time + step)[None]]))
+
+    _, slope = jax.jvp(entries, (jnp.zeros_like(time),), (jnp.ones_like(time),))
+    relative = system.pattern.dense(slope) * system.row_scale[:, :, None]
+    relative = jax.vmap(partial(factor.solve, refined=False), in_axes=1, out_axes=1)(relative)
+
+    def product(a: Any, b: Any) -> Any:
+        return jnp.sum(a[:, :, None] * b[None], axis=1)
+
+    def norm(x: Any) -> Any:
+        return jnp.maximum(jnp.sqrt(jnp.sum(x * x, axis=(0, 1))), 1e-300)
+
+    power, grown = relative, jnp.zeros_like(time)
+    for k in range(1, SQUARINGS + 1):
+        size = norm(power)
+        scaled = power / size[None, None]
+        power, grown = product(scaled, scaled), grown + jnp.log(size) / 2 ** (k - 1)
+    size = jnp.exp(grown + jnp.log(norm(power)) / 2**SQUARINGS)
+    along, trace = jnp.sum(power * jnp.swapaxes(relative, 0, 1), axis=(0, 1)), jnp.trace(power)
+    return _leading(along / jnp.where(trace == 0, 1.0, trace), size, along, size)
+
+
+def _of_matrix(relative: Float[Numbers, "column column"]) -> Float[Numbers, " 1"]:
+    """Return it for a matrix, from a power of it: the root of its norm is never too small, and tends to the size."""
+
+    def squared(k: Any, carry: Any) -> Any:
+        power, grown = carry
+        size = jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)
+        scaled = power / size
+        return jax.lax.map(lambda row: row @ scaled, scaled), grown + jnp.log(size) * 0.5**k
+
+    power, grown = jax.lax.fori_loop(0, SQUARINGS, squared, (relative, np.zeros(())))
+    size = jnp.exp(grown + jnp.log(jnp.maximum(jnp.sqrt(jnp.sum(power * power)), 1e-300)) / 2**SQUARINGS)
+    along, trace = jnp.sum(power * relative.T), jnp.trace(power)
+    return _leading(along / jnp.where(trace == 0, 1.0, trace), size, along, size)[None]
+
+
+def _of_products(
+    product: Callable[[Float[Numbers, "column probe"]], Float[Numbers, "column probe"]], columns: int
+) -> Float[Numbers, " 1"]:
+    """Return it for a matrix of which only products are to be had.
+
+    The same power is applied to random vectors, whose mean square then is that of its norm (Hutchinson 1990). To come
+    out too small, all of them would have to miss the direction that the power makes longest: with eight, the chance is
+    below 1e-11 that the root of the norm is less than 0.8 of that of this direction, and it is divided by that. Random
+    vectors know nothing of the mechanism, and a sixteenth root forgives much.
+    """
+
+    def multiplied(_: Any, carry: Any) -> Any:
+        vectors, grown = carry
+        size = jnp.maximum(jnp.sqrt(jnp.mean(jnp.sum(vectors * vectors, axis=0))), 1e-300)
+        return product(vectors / size), grown + jnp.log(size)
+
+    start = np.random.default_rng(0).standard_normal((columns, PROBES))
+    power = 2**SQUARINGS
+    vectors, grown = jax.lax.fori_loop(0, power, multiplied, (start / np.sqrt(columns), np.zeros(())))
+    square = jnp.sum(vectors * vectors)
+    norm = jnp.log(jnp.maximum(jnp.sqrt(square / PROBES * columns), 1e-300))
+    size = jnp.exp((grown + norm) / power)
+    along = jnp.sum(vectors * product(vectors))
+    return _leading(along / jnp.where(square == 0, 1.0, square), size, along, size / 0.8)[None]
+
+
+def _leading(eigenvalue: Real, size: Real, along: Real, bound: Real) -> Any:
+    """Return an eigenvalue where it is real and leads, as near a singular position, else a bound with its sign."""
+    leads = (jnp.abs(eigenvalue) > 0.7 * size) & (jnp.abs(eigenvalue) <= bound)
+    return jnp.where(leads, eigenvalue, jnp.where(along < 0, -bound, bound))

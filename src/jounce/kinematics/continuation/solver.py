@@ -1,0 +1,245 @@
+"""A mechanism with the settings under which it is solved: what turns known neighbours into solved instants."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float, Int, Shaped
+
+from jounce.execution.mapped import OnLlvm, OnXla, Rounds
+from jounce.kinematics.continuation.continuation_steps import Leg, LegLimits, Place, Settings, Way, leg
+from jounce.kinematics.continuation.correct_and_differentiate import LARGEST_GAP, Arrival, SolvedState, predictor
+from jounce.kinematics.continuation.instant_program import advance_instant, round_width
+from jounce.kinematics.status import Status
+from jounce.mechanism import Model
+
+SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
+LONGEST_LEG = 32  # batches
+LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
+SPAN_ENTRIES = 2**19  # of the coordinates of what a thread solves at once: the cache holds them
+XLA_SPAN_ENTRIES = 2**21  # the same by XLA, whose rounds have more instants, and whose calls take longer
+FEWEST_FROM_ANCHORS = 64  # instants of a long grid that machine code starts from anchors
+MOST_SIDE_BY_SIDE, CALL_ENTRIES = 1024, 2**21  # instants in a call of machine code, and numbers of their coordinates
+FEW_COLUMNS = 36  # of a Jacobian: of more, machine code of single values alone is too long to be fast
+FEW_OF_REDUNDANT_ROWS = 18  # the same in least squares, whose bases take more code than reflections
+LARGE = 64  # numbers of an array that stays in memory there
+LARGE_BESIDE_TABLES = 128  # the same in small mechanisms, of which laws through many samples are no single values
+NO_GRID = np.empty(0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Solver:
+    """A model with the settings under which it is solved."""
+
+    model: Model
+    order: int
+    tolerance: float
+    refine: bool = True
+    wanted: int = 0  # highest derivative that must be finite
+    hasty: bool = False  # whether machine code is to be there soon rather than fast
+
+    def __call__(
+        self,
+        needed: SolvedState,
+        step: Float[np.ndarray, " batch"],
+        instant: Float[np.ndarray, " batch"],
+        *,
+        survey: bool = False,
+    ) -> Arrival:
+        """Solve instants from what is `needed` of solved ones.
+
+        Of a few instants, `survey` looks for singular positions.
+        """
+        lanes = len(instant)
+        if lanes <= SMALL_BATCH:
+            known, step, instant = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), (needed, step, instant))
+            way = _way(known, (0.0,) * 4, away=step, instant=instant, planned=True)
+            arrival = self._leg(way, NO_GRID, _limits(0.0, 0.0, 1), survey=survey).last
+        else:
+            arrival = self.program((needed, step, instant, np.zeros(step.shape, bool)))
+        return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
+
+    def needed(self, known: SolvedState) -> SolvedState:
+        """Return what predictions need of solved instants, see `predictor`."""
+        return predictor(self.model.system, self.model.pose_type, known)
+
+    def rounds(
+        self,
+        store: SolvedState,
+        step: Float[np.ndarray, " time"],
+        instant: Float[np.ndarray, " time"],
+        status: Int[np.ndarray, " time"],
+        sources: Int[np.ndarray, " time"],
+    ) -> Rounds:
+        """Return what solves instants of a grid in rounds.
+
+        Parameters
+        ----------
+        store : tuple
+            Jets of all instants, solved or to be solved, as an `Arrival` has them.
+        step, instant : array of shape (time,)
+            Time from the source, and the time arrived at, s.
+        status : array of int, shape (time,)
+            What comes of each.
+        sources : array of int, shape (time,)
+            From which of the store each instant is predicted.
+        """
+        coordinates, outputs, sign = store
+        nothing: dict[str, Any] = dict.fromkeys(Arrival._fields)
+        wanted = {"coordinates": coordinates, "outputs": outputs, "status": status, "sign": sign}
+        lanes = self.needed(store), (step, instant), np.zeros(1, bool)
+        return self.program.rounds(lanes, Arrival(**(nothing | wanted)), sources)
+
+    def leg(self, way: Way, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> Leg:
+        """Go on along a way with the next instants of a grid, as far as they fit; see `legs.leg`."""
+        way = way._replace(next_up=np.zeros((), int))
+        return self._leg(way, grid, _limits(stop, smallest, self._batches), survey=True)
+
+    def prepare(self, guess: SolvedState, instant: float) -> None:
+        """Have the program of legs compiled; nothing is solved."""
+        self._leg(self.beginning(guess, instant), NO_GRID, _limits(instant, 0.0, 0), survey=True)
+
+    def way(self, solved: SolvedState, place: Sequence[float], largest: float, crawled: int = 0) -> Way:
+        """Return the way that begins at a solved instant, the place of an anchor, with a largest first step, s."""
+        known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(solved))
+        return _way(known, place, largest=largest, crawled=crawled)
+
+    def beginning(self, guess: SolvedState, instant: float) -> Way:
+        """Return the way that begins with solving an instant, from a position put together there."""
+        known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(guess))
+        return _way(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant), planned=True)
+
+    @property
+    def backend(self) -> str:
+        """What solves the instants of a long grid."""
+        return self.program.backend
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether that is there before the first of them, as machine code is."""
+        return isinstance(self.program, OnLlvm)
+
+    @cached_property
+    def from_anchors(self) -> int:
+        """How many instants of a long grid start from anchors at least, unless the cache holds no span of so many."""
+        return FEWEST_FROM_ANCHORS if self.is_compiled else self.program.width
+
+    @cached_property
+    def longest_stride(self) -> int:
+        """How far apart instants of a long grid that start from anchors are at most, so that the cache holds a span."""
+        entries = SPAN_ENTRIES if self.is_compiled else XLA_SPAN_ENTRIES
+        return 2 ** int(math.log2(max(1, entries // (self._entries * self.program.width))))
+
+    @cached_property
+    def together(self) -> int:
+        """How many instants are solved in one call at most, where they are not solved in rounds."""
+        if not self.is_compiled:
+            return SMALL_BATCH  # by the program of legs, which is there
+        return max(FEWEST_FROM_ANCHORS, min(MOST_SIDE_BY_SIDE, CALL_ENTRIES // self._entries))
+
+    @cached_property
+    def program(self) -> OnLlvm | OnXla:
+        """What solves many instants."""
+        system, (tolerance, refine, _, wanted) = self.model.system, self._settings
+        nothing = np.zeros(1)
+        still = {name: np.zeros((self.order + 1, *x.shape)) for name, x in self.model.guess.items()}
+        outputs = tuple(np.zeros((self.order + 1, 1, group.instances, 1)) for group in system.outputs)
+        instants = self.needed((still, outputs, nothing)), nothing, nothing, np.zeros(1, bool)
+        kind = self.model.pose_type
+        few = FEW_COLUMNS if system.rank is None else FEW_OF_REDUNDANT_ROWS
+        small = system.shape[1] <= few and not self.hasty
+        laws = [getattr(group.element, "motion", ()) for group in system.groups]
+        tables = max(map(np.size, jax.tree.leaves(laws)), default=0) > LARGE
+        how = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE, "hasty": self.hasty}
+        shared = system, tolerance, refine, wanted
+        width = round_width(system)
+        return advance_instant.program(shared, instants, **how, width=width, pose_type=kind, order=self.order)
+
+    @cached_property
+    def _batches(self) -> int:
+        """How many batches a leg may have; static, so that each mechanism compiles one program."""
+        return min(LONGEST_LEG, max(1, LEG_ENTRIES // (SMALL_BATCH * self._entries)))
+
+    @cached_property
+    def _entries(self) -> int:
+        """How many numbers the motion of all bodies has at an instant."""
+        return (self.order + 1) * sum(x.size for x in self.model.guess.values())
+
+    @cached_property
+    def _settings(self) -> Settings:
+        return Settings(*map(np.asarray, (self.tolerance, self.refine, True, self.wanted)))
+
+    def _leg(self, way: Way, grid: Float[np.ndarray, " time"], limits: LegLimits, *, survey: bool) -> Leg:
+        room = (self._batches + 1) * (SMALL_BATCH - 1)
+        window = np.full(room, np.inf)
+        window[: len(grid)] = grid[:room]
+        settings, kind = self._settings._replace(survey=np.asarray(survey)), self.model.pose_type
+        return leg(
+            self.model.system,
+            way,
+            window,
+            limits,
+            settings,
+            pose_type=kind,
+            order=self.order,
+            batches=self._batches,
+            native=self.program.name if isinstance(self.program, OnLlvm) else None,
+        )
+
+    def fault(self, arrival: Arrival, lane: int) -> str:
+        """Return where to look for the fault: a driver without a permitted value, an output, the farthest body."""
+        refused = np.flatnonzero(~arrival.admissible[:, lane])
+        if refused.size:
+            return ", ".join(self.model.drivers[k] for k in refused)
+        if arrival.status[lane] == Status.INCONSISTENT:
+            return self._contradicting(np.asarray(arrival.gaps[..., lane]))
+        if arrival.status[lane] == Status.UNDEFINED and arrival.finite[0, lane]:
+            names = [name for group in self.model.outputs for name in group]
+            return f"output {names[int(np.argmin(arrival.finite[1:, lane]))]}"
+        return f"body {self.model.bodies[int(arrival.body[lane])]}"
+
+    def _contradicting(self, gaps: Float[np.ndarray, "2 row"]) -> str:
+        """Name the joints and drivers that contradict each other, and by how much they are open."""
+        size, over = gaps
+        names = dict.fromkeys(self.model.rows[k] for k in np.argsort(-over) if over[k] > 0.1 * over.max())
+        wide = size.max()
+        told = f"open by {wide:.2g} rad, or sizes of the mechanism" if wide > LARGEST_GAP else "in their rates"
+        return f"{', '.join(list(names)[:4])} ({told})"
+
+
+def _way(known: SolvedState, place: Sequence[float], **given: Any) -> Way:
+    """Return a way that begins; of one type whatever is given, so that it is compiled once."""
+    lanes, nothing, no = np.zeros(SMALL_BATCH), np.zeros(()), np.zeros((), bool)
+    way = Way(
+        known,
+        Place(*map(np.asarray, place)),
+        step=nothing,
+        away=lanes,
+        instant=lanes,
+        planned=no,
+        may_pass=~no,
+        next_up=np.zeros((), int),
+        largest=np.asarray(np.inf),
+        crawled=np.zeros((), int),
+        refused=np.asarray(np.nan),
+        ending=np.zeros((), int),
+    )
+    return way._replace(**{name: np.asarray(value) for name, value in given.items()})
+
+
+def _limits(stop: float, smallest: float, batches: int) -> LegLimits:
+    return LegLimits(*map(np.asarray, (stop, smallest, batches)))
+
+
+def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int, room: int = 0) -> Shaped[np.ndarray, "*rest room"]:
+    """Repeat the last lane up to a width; what lies beyond it, where there is more room, is not looked at."""
+    lanes, room = x.shape[-1], max(width, room)
+    if lanes == room:
+        return x
+    filled = np.empty((*x.shape[:-1], room), x.dtype)
+    filled[..., :lanes], filled[..., lanes:width] = x, x[..., -1:]
+    return filled

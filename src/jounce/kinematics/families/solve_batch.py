@@ -1,0 +1,407 @@
+"""Families: many designs of one mechanism solved in one program, each with an outcome of its own at every instant."""
+
+import itertools
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import jax
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float, Int
+
+from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError, SolveError, check_name
+from jounce.execution.threads import thread_count
+from jounce.kinematics.assembly.assemble import assemble
+from jounce.kinematics.continuation.solver import Solver
+from jounce.kinematics.families.design_paths import DesignPaths
+from jounce.kinematics.families.design_sides import Sides, sides_of_designs
+from jounce.kinematics.families.design_values import Designs, put_together
+from jounce.kinematics.position_analysis.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
+from jounce.kinematics.results.motion import Motion
+from jounce.kinematics.status import Status
+from jounce.mechanism import (
+    AbstractMotionOutput,
+    Mechanism,
+    Model,
+    build,
+    check_mechanism,
+    time_grid,
+    with_outputs_held,
+)
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.law_breaks import laws_may_break, laws_of
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.time import TimeLike
+from jounce.settings import under_own_settings
+from jounce.shapes import ArrayLike, real_numbers
+from jounce.trajectory.motion import SplineMotion
+from jounce.units.shown_units import derivatives_of, time_axes
+
+if TYPE_CHECKING:
+    import xarray
+
+SPOILED = (AssemblyError, MobilityError, SolveError)  # a design, not the family
+
+
+def checked_values(mechanism: Mechanism, parameters: Mapping[str, Any], each: str) -> dict[str, np.ndarray]:
+    """Return values of parameters that many designs, or runs, have, one for each.
+
+    Raises
+    ------
+    MechanismError
+        If a parameter does not exist, or values are not finite or of unequal number.
+    """
+    if not parameters:
+        raise MechanismError("a batch differs in at least one parameter", name="parameters", value=dict(parameters))
+    values, count = {}, None
+    for name, given in parameters.items():
+        check_name("parameter", name, mechanism.parameters, MechanismError, name="parameters")
+        wanted = f"a list of finite numbers, one for each {each}"
+        array = real_numbers(f"parameters.{name}", given, MechanismError, wanted)
+        if array.ndim != 1 or not array.size or not np.isfinite(array).all():
+            raise MechanismError(f"must be {wanted}", name=f"parameters.{name}", value=given)
+        if count is not None and len(array) != count:
+            message = f"must have one value for each {each}, {count} as those before"
+            raise MechanismError(message, name=f"parameters.{name}", value=len(array))
+        values[name], count = array, len(array)
+    return values
+
+
+@concrete
+def solve_batch(
+    mechanism: Mechanism,
+    parameters: Mapping[str, ArrayLike],
+    time: TimeLike | None = None,
+    order: int = 4,
+    *,
+    tolerance: float = 1e-12,
+    progress: Callable[[int, int], None] | None = None,
+    threads: int | None = None,
+    alone: bool = True,
+) -> "xarray.Dataset":
+    """Return the motions of many designs of a mechanism that differ in its parameters, solved side by side.
+
+    Each design is followed in steps of its own, as `jounce.solve` does it alone. One that locks, or that comes to a
+    singular position, is solved alone; so are all of them where outputs are forces, energies or Euler angles, where
+    constraints are redundant, where laws of pieces depend on what varies, and where the mechanism asks for one of its
+    assemblies.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        As for `jounce.solve`.
+    parameters : dict of str to array_like of shape (designs,)
+        Values of some parameters in each design, SI.
+    time : array_like of shape (time,), optional
+        Strictly increasing instants, s, the same for all; those of the mechanism unless given.
+    order, tolerance
+        As for `jounce.solve`.
+    progress : callable, optional
+        Called with the number of designs done and their total.
+    threads : int, optional
+        As for `jounce.solve`; results do not depend on it.
+    alone : bool, default True
+        Whether designs that lock, or are out of the ordinary otherwise, are solved alone, which takes long where they
+        are many. Without, they are not reached.
+
+    Returns
+    -------
+    xarray.Dataset
+        Outputs with the dimensions design, time, derivative, and component where there are some, SI; the values of the
+        parameters are coordinates of the designs, ``parameter_NAME`` where something else has the NAME. ``status``
+        (design, time) tells the outcome, see `Status`: where it is not 0, outputs are NaN. An output that no design has
+        is left out.
+
+    Raises
+    ------
+    MechanismError
+        If a parameter does not exist, values are not finite or of unequal number, or no mechanism may have them; and as
+        `jounce.solve`.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> family = jn.solve_batch(jn.load("examples/four_bar.yaml"), {"BC": [0.13, 0.14, 0.15]}, [0.0, 0.5], order=1)
+    >>> dict(family["psi"].sizes), family["BC"].values.tolist()
+    ({'design': 3, 'time': 2, 'derivative': 2}, [0.13, 0.14, 0.15])
+    >>> int(family["status"].max())
+    0
+    """
+    family, values = _family(mechanism, parameters, time, order, tolerance, progress)
+    family.solve(thread_count(threads), alone=alone)
+    return family.dataset(values)
+
+
+def _family(
+    mechanism: Mechanism,
+    parameters: Mapping[str, ArrayLike],
+    time: TimeLike | None,
+    order: int,
+    tolerance: float,
+    progress: Callable[[int, int], None] | None = None,
+) -> tuple["_Family", dict[str, np.ndarray]]:
+    """Return designs that are to be solved, and the values of their parameters, checked."""
+    check_mechanism(mechanism)
+    values = checked_values(mechanism, parameters, "design")
+    for name in ("design", "status"):
+        if name in mechanism.outputs:
+            message = f"the name {name!r} is that of an array of a family; give the output another name"
+            raise MechanismError(message, name=f"outputs.{name}")
+    names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
+    order = checked_settings(mechanism, order, tolerance)
+    instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
+    return _Family(mechanism, names, rows, instants, order, float(tolerance), progress), values
+
+
+@under_own_settings
+def solve_with_sides(
+    mechanism: Mechanism,
+    parameters: Mapping[str, ArrayLike],
+    instants: Float[np.ndarray, " time"],
+    order: int,
+    *,
+    tolerance: float = 1e-12,
+    threads: int | None = None,
+) -> tuple["xarray.Dataset", "Sides"]:
+    """Return what `solve_batch` does, and the same on both sides of where the laws of each design jump or bend.
+
+    Parameters
+    ----------
+    mechanism, parameters, order, tolerance, threads
+        As for `solve_batch`.
+    instants : array of shape (time,)
+        Strictly increasing, s.
+    """
+    family, values = _family(mechanism, parameters, instants, order, tolerance)
+    family.look_beside_breaks()
+    family.solve(thread_count(threads))
+    return family.dataset(values), family.sides()
+
+
+class _Family:
+    """Designs that are being solved, and what is known of them."""
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        names: tuple[str, ...],
+        rows: Float[np.ndarray, "design parameter"],
+        instants: Float[np.ndarray, " time"],
+        order: int,
+        tolerance: float,
+        progress: Callable[[int, int], None] | None,
+    ):
+        self.mechanism, self.names, self.rows, self.instants = mechanism, names, rows, instants
+        self.held = with_outputs_held(mechanism)  # what is solved side by side
+        self.order, self.tolerance, self.progress = order, tolerance, progress
+        self.outputs: dict[str, np.ndarray] = {}
+        self._take(np.zeros((len(rows), 0)), np.zeros((len(rows), 0)))
+
+    def _take(self, beside: Float[np.ndarray, "design side"], breaks: Float[np.ndarray, "design side"]) -> None:
+        """Solve at more instants, those of each design its own, which come after those of all."""
+        self.breaks, common = breaks, np.broadcast_to(self.instants, (len(self.rows), len(self.instants)))
+        self.all_instants = np.concatenate([common, beside], axis=1)
+        self.status: Int[np.ndarray, "design time"] = np.full(self.all_instants.shape, int(Status.NOT_REACHED))
+
+    def look_beside_breaks(self) -> None:
+        """Solve at both sides of where the laws of each design jump or bend, too."""
+        first, last = float(self.instants[0]), float(self.instants[-1])
+        level = self.order + lost_orders(self.mechanism)
+        designs = dict(zip(self.names, self.rows.T, strict=True))
+        breaks, beside = sides_of_designs(self.mechanism, designs, first, last, level)
+        self._take(beside, breaks)
+
+    def sides(self) -> Sides:
+        """Return what was found beside the breaks."""
+        count = len(self.instants)
+        return Sides(self.breaks, {name: found[:, count:] for name, found in self.outputs.items()})
+
+    def design(self, k: int) -> Mechanism:
+        """Return one of the designs."""
+        return self.mechanism.with_parameters(**self._values(k))
+
+    def held_design(self, k: int) -> Mechanism:
+        """Return one of the designs, its outputs held to their laws."""
+        return self.held.with_parameters(**self._values(k))
+
+    def _values(self, k: int) -> dict[str, float]:
+        return dict(zip(self.names, self.rows[k].tolist(), strict=True))
+
+    def solve(self, threads: int, *, alone: bool = True) -> None:
+        """Solve all designs: most side by side, the others alone, if they are wanted."""
+        count = len(self.rows)
+        apart = self.mechanism.assembly is not None or self._of_whole_motions() or self._pieces_vary()
+        left = np.arange(count) if apart else self._side_by_side(threads)
+        if not (alone or apart):
+            return
+        for done, k in enumerate(left.tolist()):
+            self._alone(k)
+            if self.progress is not None:
+                self.progress(count - len(left) + done + 1, count)
+
+    def dataset(self, values: Mapping[str, np.ndarray]) -> Any:
+        """Return the results, labelled."""
+        import xarray
+
+        coordinates: dict[str, Any] = {"design": np.arange(len(self.rows)), **time_axes(self.instants, self.order + 1)}
+        variables = {}
+        for name, output in self.mechanism.outputs.items():
+            found = self.outputs.get(name)
+            if found is None:
+                continue
+            found = found[:, : len(self.instants)]
+            dims = ["design", "time", "derivative"]
+            if found.ndim == 4:
+                axes = output.axes or (("component", output.labels[: found.shape[3]]),)
+                coordinates |= {axis: list(labels) for axis, labels in axes}
+                found = found.reshape(*found.shape[:3], *(len(labels) for _, labels in axes))
+                dims += [axis for axis, _ in axes]
+            variables[name] = (dims, found, {"units": output.unit, "long_name": derivatives_of(name)})
+        words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": _flags()}
+        variables["status"] = (("design", "time"), self.status[:, : len(self.instants)], words)
+        taken = {*variables, *coordinates}
+        named = {name: name if name not in taken else f"parameter_{name}" for name in values}
+        coordinates |= {named[name]: ("design", value, {"long_name": name}) for name, value in values.items()}
+        attributes = {"title": self.mechanism.title or "designs of a mechanism", "source": "jounce"}
+        return xarray.Dataset(variables, coordinates, attributes)
+
+    def _of_whole_motions(self) -> bool:
+        """Tell whether outputs are asked for that follow from whole motions, not from one instant."""
+        outputs = self.mechanism.outputs.values()
+        return any(isinstance(output, AbstractMotionOutput) or getattr(output, "wraps", ()) for output in outputs)
+
+    def _pieces_vary(self) -> bool:
+        """Tell whether laws of pieces depend on the parameters that vary: their tables have no lane for each design."""
+        tables: list[Any] = []
+
+        def pieces(values: Any) -> Any:
+            design = self.held.with_parameters(**dict(zip(self.names, values, strict=True)))
+            for law in laws_of(design):
+                tables.extend(x for x in jax.tree.leaves(law, is_leaf=_is_of_pieces) if _is_of_pieces(x))
+            return values
+
+        if laws_may_break(self.mechanism):
+            jax.eval_shape(pieces, self.rows[0])
+        return any(isinstance(leaf, Tracer) for table in tables for leaf in jax.tree.leaves(table))
+
+    def _side_by_side(self, threads: int) -> Int[np.ndarray, " design"]:
+        """Solve designs side by side; return which are left to be solved alone."""
+        count = len(self.rows)
+        first, last = float(self.instants[0]), float(self.instants[-1])
+        model, known = self._first_assembled(first)
+        if model is None or model.system.rank is not None:
+            return np.arange(count)
+        lost = lost_orders(self.mechanism)
+        check_laws(self.design(known), np.array([first, last]), self.order + lost, forces=False)
+        levels = max(self.order + lost, LOWEST_ORDER)
+        solver = Solver(model, levels, self.tolerance, refine=True, wanted=self.order)
+        system = model.system
+        if any(map(measures_angle, (*system.groups, *system.outputs))) or system.shape[0] != system.shape[1]:
+            return self._assembled_alone(solver, threads)
+        designs = Designs(self.held, model, self.names, self.rows)
+        driven = np.array([[name.startswith("drivers.")] for name in model.rows])
+        every = np.arange(count)
+        found = put_together(
+            designs.system(every),
+            designs.guess,
+            np.full(count, first),
+            np.asarray(self.tolerance),
+            driven,
+            pose_type=model.pose_type,
+        )
+        coordinates = {name: np.asarray(x) for name, x in found.coordinates.items()}
+        return self._followed(solver, designs, coordinates, np.asarray(found.plain) & ~designs.unfit(), every, threads)
+
+    def _first_assembled(self, instant: float) -> tuple[Model | None, int]:
+        """Return the model of the first design that can be put together, and which it is."""
+        for k in range(len(self.rows)):
+            try:
+                return assemble(build(self.held_design(k)), instant, self.tolerance)[0], k
+            except SPOILED:
+                continue
+            except JounceError as error:
+                raise self._located(error, k) from None
+        return None, 0
+
+    def _assembled_alone(self, solver: Solver, threads: int) -> Int[np.ndarray, " design"]:
+        """Put designs together one by one, as those with angles about axes are, and follow them side by side."""
+        found, which = [], []
+        for k in range(len(self.rows)):
+            try:
+                found.append(assemble(build(self.held_design(k)), float(self.instants[0]), self.tolerance))
+                which.append(k)
+            except SPOILED:
+                continue
+            except JounceError as error:
+                raise self._located(error, k) from None
+        chosen = np.array(which)
+        models = [model for model, _ in found]
+        designs = Designs.of_models(self.held, models, self.names, self.rows[chosen])
+        coordinates = {
+            name: np.concatenate([np.asarray(place[name]) for _, place in found], axis=-1) for name in found[0][1]
+        }
+        return self._followed(solver, designs, coordinates, np.ones(len(which), bool), chosen, threads)
+
+    def _followed(
+        self,
+        solver: Solver,
+        designs: Designs,
+        coordinates: dict[str, Any],
+        plain: np.ndarray,
+        chosen: np.ndarray,
+        threads: int,
+    ) -> Int[np.ndarray, " design"]:
+        """Follow designs side by side and keep what comes of them; return which are left to be solved alone."""
+        paths = DesignPaths(solver, designs, self.all_instants[chosen], float(self.instants[-1]))
+        paths.follow(coordinates, plain)
+        outputs, status = paths.solved(threads)
+        whole = ~paths.apart
+        self.status[chosen[whole]] = status[whole]
+        names = itertools.chain(*solver.model.outputs)
+        for name, found in zip(names, itertools.chain(*outputs), strict=bool(outputs)):
+            found[paths.apart] = np.nan
+            self._put(name, chosen, found)
+        if self.progress is not None:
+            self.progress(int(whole.sum()), len(self.rows))
+        return np.setdiff1d(np.arange(len(self.rows)), chosen[whole])
+
+    def _alone(self, k: int) -> None:
+        """Solve one design alone."""
+        try:
+            grid, places = np.unique(self.all_instants[k], return_inverse=True)
+            motion: Motion = solve(self.design(k), grid, self.order, tolerance=self.tolerance, strict=False)
+        except SPOILED as error:
+            status = getattr(error, "status", None)
+            self.status[k] = int(Status.NOT_ASSEMBLED if status is None else status)
+            return
+        except JounceError as error:
+            raise self._located(error, k) from None
+        self.status[k] = motion.status[places]
+        for name, values in motion.outputs.items():
+            values = values[places]
+            self._put(name, np.array([k]), values[None] if values.ndim == 3 else values[None, ..., None])
+
+    def _put(self, name: str, designs: np.ndarray, values: np.ndarray) -> None:
+        """Keep the values of an output, (designs, time, derivative, component), of some designs in their order."""
+        values = values[..., 0] if values.shape[-1] == 1 else values
+        if name not in self.outputs:
+            if len(designs) == len(self.rows):
+                self.outputs[name] = values
+                return
+            self.outputs[name] = np.full((len(self.rows), *values.shape[1:]), np.nan)
+        self.outputs[name][designs] = values
+
+    def _located(self, error: JounceError, k: int) -> JounceError:
+        """Return an error that says of which design it is."""
+        told = ", ".join(f"{name} = {value:g}" for name, value in zip(self.names, self.rows[k], strict=True))
+        error.message = f"{error.message} (design {k}: {told})"
+        return error
+
+
+def _is_of_pieces(part: Any) -> bool:
+    return isinstance(part, SplineMotion)
+
+
+def _flags() -> str:
+    return " ".join(status.name.lower() for status in Status)

@@ -1,0 +1,229 @@
+"""All instants of a time grid, solved from the anchors of a motion that was followed.
+
+A long grid is not solved one instant after another. Instants start from their nearest anchor, or from a neighbour
+solved before, so that most are predicted to rounding, and many are solved side by side (see `spans`). What fails there,
+and what starts from it, is solved once more, each after what it starts from; so are the few instants of a short grid
+that were not solved on the way. Between two anchors lies no singular position, so that the sign of the determinant
+tells an instant on another branch.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.execution.threads import Threads
+from jounce.jet.derivatives import plain_derivatives
+from jounce.kinematics.continuation.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
+from jounce.kinematics.continuation.correct_and_differentiate import Arrival, SolvedState
+from jounce.kinematics.continuation.path_following import (
+    PASSABLE,
+    FollowedPath,
+    Passage,
+    follow,
+)
+from jounce.kinematics.continuation.solver import SMALL_BATCH, Solver
+from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, neighbours, solve_spans, spans_for, stride_of
+from jounce.kinematics.status import Status
+from jounce.mechanism.time import nearest_instants
+
+Indices = Int[np.ndarray, " lane"]
+
+
+class GridSolver:
+    """The instants of a time grid, or of a stretch of one, solved from the anchors of a path that lasts for a span, s.
+
+    Attributes
+    ----------
+    status : array of int, shape (time,)
+    faults : dict of int to str
+        For instants that failed, the body farthest from its prediction, or the driver without a permitted value.
+    """
+
+    def __init__(
+        self,
+        solver: Solver,
+        path: FollowedPath,
+        time: Float[np.ndarray, " time"],
+        span: float,
+    ):
+        self.solver, self.path, self.time, self.span = solver, path, time, span
+        self.status = np.full(len(time), int(Status.NOT_REACHED))
+        self.faults: dict[int, str] = {}
+        self._anchors = path.anchors_around(time[0], time[-1])
+        self._instants = np.concatenate([time, [anchor.instant for anchor in self._anchors]])
+        self._reached = time < path.ended_at
+        self._store = room_for(self._anchors[0].state, len(self._instants))
+        for lanes, _ in path.on_the_way:
+            self.status[lanes] = Status.OK
+
+    @property
+    def state(self) -> tuple[dict[str, Any], tuple[Any, ...]]:
+        """Jets of the coordinates, and derivatives of the outputs, time last."""
+        coordinates, outputs, _ = jax.tree.map(lambda x: x[..., : len(self.time)], self._store)
+        return coordinates, tuple(map(plain_derivatives, outputs))
+
+    def solve(self, progress: Callable[[int, int], None] | None, threads: int, *, explain: bool) -> None:
+        """Solve the instants; one that its neighbour cannot predict is followed to from an anchor.
+
+        They are solved in several threads; what comes of it does not depend on how many. To `explain` is to say at the
+        first instant that was not reached why.
+        """
+        count = len(self.time)
+        left = self._reached & (self.status != Status.OK)
+        stride = stride_of(self.solver, int(np.count_nonzero(left)), count, len(self._anchors))
+        done = count - int(np.count_nonzero(left))
+
+        def tell(solved: int) -> None:
+            nonlocal done
+            done = min(done + solved, count)
+            if progress is not None:
+                progress(done, count)
+
+        with Threads(threads, compiled=self.solver.is_compiled) as pool:
+            if count > LONG_GRID:
+                left = self._in_spans(left, stride, pool, tell)
+            if self.path.on_the_way or left.any() or not self._reached.all():
+                self._place_known()
+            size = self.solver.together if count > LONG_GRID else SMALL_BATCH
+            for lanes in _in_turn(left, stride):
+                source = self._sources(lanes, stride)
+                batches = [(lanes[k : k + size], source[k : k + size]) for k in range(0, len(lanes), size)]
+                for (batch, _), arrival in zip(batches, pool.map(self._solved, batches), strict=True):
+                    self._take(batch, arrival)
+                    tell(len(batch))
+        for point in self.path.change_points:
+            self._bridge(point)
+        for point in self.path.singular_positions_outside():
+            self._refuse(np.abs(self.time - point.instant) < spoiled_width(point, self.solver.order))
+        if explain and not self._reached.all():
+            self._explain_end(int(np.argmin(self._reached)))
+        if progress is not None and done < count:
+            progress(count, count)
+
+    def _in_spans(
+        self, left: Bool[np.ndarray, " time"], stride: int, pool: Threads, tell: Callable[[int], None]
+    ) -> Bool[np.ndarray, " time"]:
+        """Solve instants in rounds; return what is left: those that failed, and what starts from them.
+
+        Nothing is known of a failure but that there is one, so that these are solved once more.
+        """
+        count = int(np.count_nonzero(left))  # a long grid is reached up to some instant, and nothing is solved yet
+
+        def put(place: slice, state: SolvedState, status: Indices) -> None:
+            self._keep(place, state)
+            self.status[place] = status
+
+        spans = spans_for(self.solver, 0, count, stride)
+        for solved in solve_spans(self.solver, self.path, self.time, spans, put, pool.map):
+            tell(solved)
+        failed = left & (self.status != Status.OK)
+        if failed.any():
+            for lanes in _in_turn(left, stride):
+                neighbour, known = neighbours(lanes, stride)
+                failed[lanes] |= failed[neighbour] & known
+        return failed
+
+    def _sources(self, lanes: Indices, stride: int) -> Indices:
+        """Return from where each instant is predicted: its neighbour, where that is known, or its nearest anchor."""
+        neighbour, known = neighbours(lanes, stride)
+        known &= self.status[neighbour] == Status.OK
+        time = self.time[lanes]
+        nearest = len(self.time) + nearest_instants(self._instants[len(self.time) :], time)
+        nearer = np.abs(time - self._instants[neighbour]) <= np.abs(time - self._instants[nearest])
+        return np.where(nearer & known, neighbour, nearest)
+
+    def _solved(self, batch: tuple[Indices, Indices]) -> Arrival:
+        """Return what comes of a batch of instants, with their sources; nothing is kept but the state at its lanes."""
+        lanes, source = batch
+        known = jax.tree.map(lambda x: x[..., source], self.solver.needed(self._store))
+        arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
+        self._keep(lanes, arrival.state(slice(None)))
+        return arrival
+
+    def _take(self, lanes: Indices, arrival: Arrival) -> None:
+        """Keep the outcome of a batch, and follow the motion to the instants that failed."""
+        self.status[lanes] = arrival.status
+        for k in np.flatnonzero(arrival.status != Status.OK).tolist():
+            self.faults[int(lanes[k])] = self.solver.fault(arrival, k)
+            if arrival.status[k] not in PASSABLE:
+                self._rescue(int(lanes[k]))
+
+    def _place_known(self) -> None:
+        """Put the anchors behind the instants, those solved on the way among them, and zeros where none is reached."""
+        count, reached = len(self.time), int(np.count_nonzero(self._reached))
+
+        def place(whole: np.ndarray, *parts: np.ndarray) -> None:
+            whole[..., reached:count] = 0
+            whole[..., count : len(self._instants)] = np.concatenate(parts, axis=-1)
+
+        jax.tree.map(place, self._store, *(anchor.state for anchor in self._anchors))
+        for lanes, state in self.path.on_the_way:
+            self._keep(lanes, state)
+
+    def _keep(self, lanes: slice | Indices, state: SolvedState) -> None:
+        def put(whole: np.ndarray, part: np.ndarray) -> None:
+            whole[..., lanes] = part
+
+        jax.tree.map(put, self._store, state)
+
+    def _rescue(self, lane: int) -> None:
+        """Follow the motion to one instant from the anchor before it."""
+        anchors, instant = self._anchors, float(self.time[lane])
+        before = int(np.searchsorted([a.instant for a in anchors], instant, side="right")) - 1
+        start = anchors[before]
+        local = follow(self.solver, start, instant, self.span, (instant - start.instant) / 2)
+        if local.status != Status.OK:
+            self.status[lane], self.faults[lane] = local.status, local.fault
+        elif len(local.anchors) > 1:
+            self.status[lane] = local.anchors[-1].status
+            self.faults.pop(lane)
+            self._keep(slice(lane, lane + 1), local.anchors[-1].state)
+
+    def _bridge(self, point: Passage) -> None:
+        """Replace the instants next to a change point, and the one at it, by what the motion on both sides gives."""
+        away = np.abs(self.time - point.instant)
+        lanes = np.flatnonzero((away < half_width(point, self.solver.order)) & (self.time < self.path.ended_at))
+        if not lanes.size:
+            return
+        state = bridged(self.solver, self.path, point, self.time[lanes])
+        if state is None:
+            self._refuse(away < spoiled_width(point, self.solver.order))
+            return
+        solved = self.status[lanes] == Status.OK
+        names = self.solver.model.pose_type.predictor
+        apart = [np.abs(state[0][name][0] - self._store[0][name][0][..., lanes])[..., solved] for name in names]
+        if max(np.max(x, initial=0.0) for x in apart) > LARGEST_DISAGREEMENT:
+            self._refuse(away < spoiled_width(point, self.solver.order))
+            return
+        self.status[lanes] = Status.OK
+        for lane in lanes.tolist():
+            self.faults.pop(lane, None)
+        self._keep(lanes, (*state, self._store[2][lanes]))
+
+    def _refuse(self, lanes: Bool[np.ndarray, " time"]) -> None:
+        self.status[lanes & (self.status == Status.OK)] = Status.SINGULAR
+
+    def _explain_end(self, lost: int) -> None:
+        """Say at the first instant that was not reached why the motion could not be followed to it."""
+        path, instant = self.path, self.time[lost : lost + 1]
+        self.status[lost], self.faults[lost] = path.status, path.fault
+        last = path.anchors[-1]
+        arrival = self.solver(self.solver.needed(last.state), instant - last.instant, instant)
+        if arrival.status[0] == Status.INADMISSIBLE:  # the fault is the law's, not that of the position before
+            self.status[lost], self.faults[lost] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
+
+
+def room_for(state: Any, lanes: int) -> Any:
+    """Return arrays for the states of so many instants and anchors; whoever solves an instant is first to touch it."""
+    return jax.tree.map(lambda x: np.empty((*x.shape[:-1], lanes)), state)
+
+
+def _in_turn(left: Bool[np.ndarray, " time"], stride: int) -> Iterator[Indices]:
+    """Yield instants in groups, each after what it starts from: the number of ones in an index says how far down."""
+    lanes = np.flatnonzero(left)
+    depth = np.bitwise_count(lanes & (stride - 1))
+    for level in np.unique(depth).tolist():
+        yield lanes[depth == level]

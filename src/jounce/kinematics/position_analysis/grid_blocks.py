@@ -1,0 +1,236 @@
+"""Spans of a long grid, each solved from the anchors of a motion alone: in any order, in any thread.
+
+An instant is predicted from the one whose index is its own with the last binary one set to zero, unless it is a
+multiple of a stride, a power of two, and starts from an anchor; or from the anchor, where that is nearer. So the
+instants from a multiple of the stride up to the next one start from nothing beyond it. A span is as many of these as a
+round has instants: a vector of machine code, or what XLA solves side by side. They are solved round after round, in the
+memory of a thread, which stays in the cache; what is wanted of them is copied out of it.
+"""
+
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.execution.kept_memory import arrays_in, borrow, give_back, room_of
+from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
+from jounce.kinematics.continuation.path_following import Anchor, FollowedPath
+from jounce.kinematics.continuation.solver import SMALL_BATCH, Solver
+from jounce.mechanism.time import nearest_instants
+
+Indices = Int[np.ndarray, " lane"]
+LONG_GRID = 1024  # instants: from here on in spans
+FEW_BATCHES = 4  # of instants: they all start from anchors
+GROUP = 64  # instants that a lane takes up one after another, once all multiples of so many are solved
+
+
+class Span(NamedTuple):
+    """Instants of a grid that start from nothing but anchors and one another.
+
+    Attributes
+    ----------
+    first, count : int
+        The index of the first one, and how many there are.
+    stride : int
+        How far apart those are that start from anchors.
+    """
+
+    first: int
+    count: int
+    stride: int
+
+    @property
+    def place(self) -> slice:
+        """Where they are in arrays of all instants."""
+        return slice(self.first, self.first + self.count)
+
+
+def stride_of(solver: Solver, left: int, count: int, anchors: int) -> int:
+    """Return how far apart the instants that start from anchors are, a power of two.
+
+    Parameters
+    ----------
+    solver : Solver
+        What solves them.
+    left, count : int
+        How many of a grid are to be solved, and how many there are.
+    anchors : int
+        From how many. Where few instants are left, they all start from anchors.
+    """
+    width, stride = solver.from_anchors if count > LONG_GRID else SMALL_BATCH, 1
+    if left > FEW_BATCHES * width:
+        while count // (2 * stride) >= max(2 * anchors, width) and 2 * stride <= solver.longest_stride:
+            stride *= 2
+    return stride
+
+
+def spans_of(first: int, count: int, stride: int, width: int, *, full: bool = False) -> list[Span]:
+    """Return the spans of so many instants of a grid from an index on, for rounds of a width.
+
+    To have `full` rounds, the last span has a stride of its own, so short that its instants fill them.
+    """
+    size = stride * width
+    spans = [Span(first + k, min(size, count - k), stride) for k in range(0, count, size)]
+    if full and spans:
+        while stride > 1 and stride * width >= 2 * spans[-1].count:
+            stride //= 2
+        spans[-1] = spans[-1]._replace(stride=stride)
+    return spans
+
+
+def spans_for(solver: Solver, first: int, count: int, stride: int) -> list[Span]:
+    """Return the spans of so many instants for what solves them; a round of XLA is too wide to be left half empty."""
+    return spans_of(first, count, stride, solver.program.width, full=not solver.is_compiled)
+
+
+@lru_cache(maxsize=16)
+def rounds(count: int, stride: int, width: int) -> Int[np.ndarray, "round lane"]:
+    """Return the instants of a span in the order in which they are solved, by their indices in it.
+
+    Multiples of `GROUP` come first, as what the others start from. Where lanes lie beyond the span, the first of their
+    round is solved again.
+    """
+    group = min(GROUP, stride)
+    found = [np.empty((0, width), np.int64)]
+    for turns, members, apart in ((range(stride // group), stride // group, group), (range(1, group), group, 1)):
+        lanes = np.arange(width) * (members * apart)
+        block = np.array(turns, np.int64)[:, None] * apart + lanes
+        starts = np.arange(0, count, members * apart * width)
+        found.append((starts[:, None, None] + block).reshape(-1, width))
+    whole = np.concatenate(found)
+    whole = whole[whole[:, 0] < count]
+    return np.where(whole < count, whole, whole[:, :1])
+
+
+def neighbours(lanes: Indices, stride: int) -> tuple[Indices, Bool[np.ndarray, " lane"]]:
+    """Return the neighbour of each of some instants, by index, and whether it is solved before."""
+    return lanes & (lanes - 1), lanes & (stride - 1) > 0
+
+
+@lru_cache(maxsize=16)
+def _neighbours(count: int, stride: int) -> tuple[Indices, Bool[np.ndarray, " lane"]]:
+    """Return the neighbour of each instant of a span, and whether it is solved before."""
+    return neighbours(np.arange(count), stride)
+
+
+class _Room:
+    """The memory of a thread, for one span after another, with the anchors that they start from behind them.
+
+    Parameters
+    ----------
+    solver : Solver
+        What solves the instants.
+    like : tuple
+        The state of an anchor.
+    size, anchors : int
+        The most instants and anchors that it is for.
+    """
+
+    def __init__(self, solver: Solver, like: Any, size: int, anchors: int):
+        leaves, form = jax.tree.flatten(like)
+        shapes = [*((*leaf.shape[:-1], size + anchors) for leaf in leaves), *[(size,)] * 4]
+        self.block, self._size = borrow(room_of(shapes)), size
+        kinds = [*[float] * (len(leaves) + 2), *[int] * 2]
+        *state, self._time, self._step, self.status, self._source = arrays_in(self.block, shapes, kinds)
+        self.state = jax.tree.unflatten(form, state)
+        self._source[:] = 0
+        self._width = solver.program.width
+        self._run = solver.rounds(self.state, self._step, self._time, self.status, self._source)
+        self._rounds = rounds(0, 1, self._width)
+
+    def begin(self, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
+        """Take up the instants of a span, s, with the anchors around it."""
+        count = len(time)
+        parts = zip(*(jax.tree.leaves(anchor.state) for anchor in anchors), strict=True)
+        for whole, columns in zip(jax.tree.leaves(self.state), parts, strict=True):
+            np.concatenate(columns, axis=-1, out=whole[..., self._size : self._size + len(anchors)])
+        neighbour, known = _neighbours(count, stride)
+        instants = np.array([anchor.instant for anchor in anchors])
+        nearest = nearest_instants(instants, time)
+        to_neighbour, to_anchor = time - time[neighbour], time - instants[nearest]
+        near = known & (np.abs(to_neighbour) <= np.abs(to_anchor))
+        self._time[:count] = time
+        self._source[:count] = np.where(near, neighbour, self._size + nearest)
+        self._step[:count] = np.where(near, to_neighbour, to_anchor)
+        self._rounds = rounds(count, stride, self._width)
+
+    def rest(self, like: Any, count: int, stride: int) -> None:
+        """Take up so many instants, all at the same time, s, as that of a state."""
+        for whole, part in zip(jax.tree.leaves(self.state), jax.tree.leaves(like), strict=True):
+            whole[..., self._size :] = part
+        self._time[:], self._step[:], self._source[:] = 0.0, 0.0, self._size
+        self._rounds = rounds(count, stride, self._width)
+
+    def solve(self) -> None:
+        """Solve the instants that were taken up last."""
+        self._run(self._rounds)
+
+    def found(self, count: int) -> tuple[Any, Int[np.ndarray, " lane"]]:
+        """Return the states and the outcome of so many of them."""
+        return jax.tree.map(lambda x: x[..., :count], self.state), self.status[:count]
+
+
+def prepare_spans(solver: Solver, like: SolvedState, count: int) -> None:
+    """Compile what solves a grid of so many instants, unless it is there already, and solve one again and again."""
+    if solver.is_compiled:
+        return
+    stride = stride_of(solver, count, count, SMALL_BATCH)  # anchors, which are not known yet
+    size = min(count, stride * solver.program.width)
+    room = _Room(solver, like, size, 1)
+    room.rest(like, size, stride)
+    room.solve()
+    give_back(room.block)
+
+
+def solve_spans(
+    solver: Solver,
+    path: FollowedPath,
+    time: Float[np.ndarray, " time"],
+    spans: Sequence[Span],
+    put: Callable[[slice, Any, Int[np.ndarray, " lane"]], None],
+    each: Callable[[Callable[[Span], int], Iterable[Span]], Iterator[int]],
+) -> Iterator[int]:
+    """Solve spans of a grid, and yield how many instants each of them has.
+
+    Nothing is known of an instant that failed but that it did.
+
+    Parameters
+    ----------
+    solver : Solver
+        What solved the path.
+    path : FollowedPath
+        The motion, followed to all these instants.
+    time : array of shape (time,)
+        All instants, s.
+    spans : sequence of Span
+        Those to solve.
+    put : callable
+        Takes over the instants of a span by where they are among all: their states, as an anchor's, time last, and the
+        outcome of each. It may be called from several threads at once; the arrays are used again after it.
+    each : callable
+        In the manner of `map`; it may call from several threads at once.
+    """
+    size = max(span.count for span in spans) if spans else 0
+    around = {span: path.anchors_around(time[span.first], time[span.first + span.count - 1]) for span in spans}
+    most = max(map(len, around.values()), default=0)
+    rooms: list[_Room] = []  # those of threads that are between two spans
+    lock = threading.Lock()  # many short operations go faster one thread after another than in turns for Python's lock
+
+    def solve(span: Span) -> int:
+        with lock:
+            room = rooms.pop() if rooms else _Room(solver, path.anchors[0].state, size, most)
+            room.begin(time[span.place], around[span], span.stride)
+        room.solve()
+        put(span.place, *room.found(span.count))
+        rooms.append(room)
+        return span.count
+
+    try:
+        yield from each(solve, spans)
+    finally:
+        while rooms:  # one that a thread still uses is not among them
+            give_back(rooms.pop().block)

@@ -1,0 +1,194 @@
+"""Time grids of any length, solved stretch by stretch, so that no more is kept of each than what is asked for."""
+
+import itertools
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.execution.threads import Threads
+from jounce.jet.derivatives import plain_derivatives
+from jounce.kinematics.continuation.change_points import half_width, spoiled_width
+from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
+from jounce.kinematics.continuation.path_following import FollowedPath
+from jounce.kinematics.continuation.solver import Solver
+from jounce.kinematics.position_analysis.grid import GridSolver, room_for
+from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, solve_spans, spans_for, stride_of
+from jounce.kinematics.status import Status
+from jounce.mechanism.time import Instants
+
+STRETCH = 2**16  # instants
+
+
+class Solved(NamedTuple):
+    """What is known of all instants of a grid.
+
+    Attributes
+    ----------
+    coordinates : dict of str to array, or callable
+        Jets of the coordinates of all bodies, time last, or what computes them again.
+    outputs : tuple of array
+        Derivatives of the outputs, time last.
+    status : array of int, shape (time,)
+    faults : dict of int to str
+    """
+
+    coordinates: dict[str, Any] | Callable[[], dict[str, Any]]
+    outputs: tuple[Any, ...]
+    status: Int[np.ndarray, " time"]
+    faults: dict[int, str]
+
+
+def solve_grid(
+    solver: Solver,
+    path: FollowedPath,
+    time: Float[np.ndarray, " time"],
+    progress: Callable[[int, int], None] | None,
+    threads: int,
+    *,
+    keep: bool | None,
+) -> Solved:
+    """Return all instants of a grid, solved from the anchors of a path.
+
+    Parameters
+    ----------
+    solver : Solver
+        What solved the path.
+    path : FollowedPath
+        The motion followed.
+    time : array of shape (time,)
+        Instants, s.
+    progress : callable, optional
+        Called with the number of instants done and their total.
+    threads : int
+        That solve batches.
+    keep : bool, optional
+        Whether the jets of all bodies are kept; where they fit into one stretch, unless given. They are computed again
+        when they are asked for.
+    """
+    kept = len(time) <= STRETCH if keep is None else keep
+    status, faults = np.empty(len(time), int), {}
+    store = None if len(time) <= STRETCH else _Store(path.anchors[0].state, len(time), kept=kept)
+    tell = None if progress is None else _rising(progress)
+    solved = frozenset() if store is None else _solved_at_once(solver, path, time, tell, threads, (store, status))
+    state: Any = None
+    for first, part in stretches(solver, path, time, tell, threads, solved):
+        status[first : first + len(part.time)] = part.status
+        faults |= {first + lane: fault for lane, fault in part.faults.items()}
+        if store is None:
+            state = part.state
+        else:
+            store.put(slice(first, first + len(part.time)), *part.state)
+    coordinates, outputs = state if store is None else store.state
+    if kept:
+        return Solved(coordinates, outputs, status, faults)
+    return Solved(lambda: _coordinates(solver, path, time, threads), outputs, status, faults)
+
+
+def _rising(progress: Callable[[int, int], None]) -> Callable[[int, int], None]:
+    """Return what tells the progress, where some instants may be solved twice: it never goes back."""
+    furthest = 0
+
+    def tell(done: int, total: int) -> None:
+        nonlocal furthest
+        furthest = max(furthest, done)
+        progress(furthest, total)
+
+    return tell
+
+
+def _solved_at_once(
+    solver: Solver,
+    path: FollowedPath,
+    time: Float[np.ndarray, " time"],
+    progress: Callable[[int, int], None] | None,
+    threads: int,
+    results: "tuple[_Store, Int[np.ndarray, ' time']]",
+) -> frozenset[int]:
+    """Solve all stretches in which nothing out of the ordinary is known, so that no thread waits at the end of one.
+
+    Returns the first instants of those in which all are OK; the others are still to be solved, one after another.
+    """
+    (store, status), spans = results, {}
+    if path.on_the_way:
+        return frozenset()
+    points = [(point, half_width(point, solver.order)) for point in path.change_points]
+    points += [(point, spoiled_width(point, solver.order)) for point in path.singular_positions_outside()]
+    for first in range(0, len(time), STRETCH):
+        here = time[first : first + STRETCH]
+        begin, end, count = here[0], here[-1], len(here)
+        near = any(begin - width < point.instant < end + width for point, width in points)
+        if count > LONG_GRID and end < path.ended_at and not near:
+            stride = stride_of(solver, count, count, len(path.anchors_around(begin, end)))
+            spans[first] = spans_for(solver, first, count, stride)
+    done, wanted = 0, [*itertools.chain(*spans.values())]
+
+    def put(place: slice, state: SolvedState, outcome: Int[np.ndarray, " lane"]) -> None:
+        store.put(place, *state[:2], series=True)
+        status[place] = outcome
+
+    with Threads(threads, compiled=solver.is_compiled) as pool:
+        for solved in solve_spans(solver, path, time, wanted, put, pool.map):
+            done += solved
+            if progress is not None:
+                progress(done, len(time))
+    return frozenset(first for first in spans if np.all(status[first : first + STRETCH] == Status.OK))
+
+
+class _Store:
+    """Arrays for the states of all instants of a grid of several stretches: of outputs and, if kept, of coordinates."""
+
+    def __init__(self, like: SolvedState, count: int, *, kept: bool):
+        self.state: Any = room_for((like[0] if kept else {}, like[1]), count)
+
+    def put(
+        self, place: slice, coordinates: Mapping[str, Any], outputs: Sequence[Any], *, series: bool = False
+    ) -> None:
+        """Take over some instants: jets of the coordinates, and derivatives of the outputs, or their series.
+
+        Series are of any size where an instant failed, which is solved again.
+        """
+        kept, shown = self.state
+        for name, whole in kept.items():
+            whole[..., place] = coordinates[name]
+        for whole, part in zip(shown, outputs, strict=True):
+            if series:
+                with np.errstate(over="ignore"):
+                    plain_derivatives(part, out=whole[..., place])
+            else:
+                whole[..., place] = part
+
+
+def _coordinates(
+    solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"], threads: int
+) -> dict[str, np.ndarray]:
+    """Return the jets of the coordinates of all bodies, solved once more."""
+    found: Any = solve_grid(solver, path, time, None, threads, keep=True).coordinates
+    return found
+
+
+def stretches(
+    solver: Solver,
+    path: FollowedPath,
+    time: Instants,
+    progress: Callable[[int, int], None] | None,
+    threads: int,
+    without: Collection[int] = (),
+) -> Iterator[tuple[int, GridSolver]]:
+    """Yield the stretches of a grid one after another, solved, with the index of their first instant.
+
+    Those that are solved already are left out, by their first instants.
+    """
+    for first in range(0, len(time), STRETCH):
+        if first in without:
+            continue
+
+        def told(done: int, _: int, first: int = first) -> None:
+            if progress is not None:
+                progress(first + done, len(time))
+
+        before = time[first - 1] if first else -np.inf
+        part = GridSolver(solver, path, time[first : first + STRETCH], time[-1] - time[0])
+        part.solve(None if progress is None else told, threads, explain=bool(before < path.ended_at))
+        yield first, part

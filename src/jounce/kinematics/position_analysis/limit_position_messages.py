@@ -1,0 +1,76 @@
+"""What is told of a motion in time that runs into a dead point: where its driver turns back, and what lies beyond."""
+
+import math
+
+import numpy as np
+
+from jounce.errors import JounceError
+from jounce.kinematics.curves import Curve, trace
+from jounce.kinematics.curves.curve import posed
+from jounce.kinematics.curves.start import TIME, law_values
+from jounce.kinematics.results.motion import Motion
+from jounce.kinematics.status import Status
+from jounce.mechanism import with_outputs_held
+from jounce.mechanism.held_outputs import led_outputs
+
+ENDS = (Status.SINGULAR, Status.NOT_CONVERGED, Status.COLLAPSED)
+LENGTH = 40.0  # of the curve, looked at for where the other branch leads
+NEAR = 1e-9  # of the value, by which an instant may be short of a dead point that it is at
+
+
+def dead_end_words(motion: Motion, index: int) -> str:
+    """Word where the dead point is that ends a motion before an instant, and where the other branch leads; or nothing.
+
+    The curve of configurations is traced from the last instant that was solved.
+    """
+    mechanism = with_outputs_held(motion.mechanism)
+    drivers = mechanism.drivers
+    if not drivers or index == 0 or motion.status[index] not in ENDS or motion.status[index - 1] != Status.OK:
+        return ""
+    before, here = float(motion.time[index - 1]), float(motion.time[index])
+    _, coordinates = motion.poses
+    last = posed(mechanism, {name: np.asarray(c)[0, ..., index - 1] for name, c in coordinates.items()})
+    name = next(iter(drivers)) if len(drivers) == 1 else TIME
+    try:
+        wanted = here if name == TIME else law_values(mechanism, here)[name]
+        curve = trace(last, before, driver=name, order=0, count=2, length=LENGTH)
+    except JounceError:
+        return ""  # what failed is told already
+    found = _end_before(curve, wanted)
+    if found is None:
+        return ""
+    value, other = found
+    if name == TIME:
+        values = law_values(mechanism, value)
+        told = ", ".join(f"{driver} = {x:.9g}" for driver, x in values.items())
+        return (
+            f"its drivers lead it to a dead point at t = {value:.9g} s, where {told}: from there they can only go back"
+        )
+    far = "" if other is None else f", on another branch, which leads to {_words(other, curve.unit)}"
+    led = led_outputs(motion.mechanism)
+    if name in led:
+        return (
+            f"{led[name].output} can go no further than {_words(value, curve.unit)}: there it says nothing of the "
+            f"driver {name}, which goes on past this dead point while it turns back"
+        )
+    return f"{name} can go no further than {_words(value, curve.unit)}: past this dead point it turns back{far}"
+
+
+def _end_before(curve: Curve, wanted: float) -> tuple[float, float | None] | None:
+    """Return the end of the range of a driver that keeps it from a value, and the far end of the branch beyond."""
+    low, high = curve.range
+    slack = NEAR * max(abs(low), abs(high), 1e-300)
+    upwards = wanted >= high - slack
+    if not np.isfinite(low) or not (upwards or wanted <= low + slack) or not curve.turning_points:
+        return None
+    value = high if upwards else low
+    limits = [x.value for x in curve.turning_points]
+    if not any(abs(x - value) <= slack for x in limits):
+        return None  # as far as the curve was followed
+    beyond = [b for b in curve.branches[1:] if abs((b.high if upwards else b.low) - value) <= slack]
+    ends = [b.low if upwards else b.high for b in beyond]
+    return value, next((x for x in ends if any(abs(x - y) <= slack for y in limits)), None)
+
+
+def _words(value: float, unit: str) -> str:
+    return f"{math.degrees(value):.9g} deg" if unit == "rad" else f"{value:.9g} {unit}".rstrip()

@@ -1,0 +1,320 @@
+"""From a mechanism and a time grid to its motion."""
+
+import dataclasses
+import numbers
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+from jax.errors import ConcretizationTypeError
+
+from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
+from jounce.execution.backends import joined
+from jounce.execution.device import resident
+from jounce.execution.rehearsal import first_time, rehearsed, tried
+from jounce.execution.store import expect, is_wanted_soon
+from jounce.execution.threads import thread_count
+from jounce.kinematics.assembly.assemble import assemble
+from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
+from jounce.kinematics.continuation.path_following import FollowedPath, follow
+from jounce.kinematics.continuation.solver import NO_GRID, Solver
+from jounce.kinematics.curves.choice import chosen
+from jounce.kinematics.position_analysis.chunked_motion import Stretches
+from jounce.kinematics.position_analysis.forces_at_rest import ask_forces_at_rest
+from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, prepare_spans
+from jounce.kinematics.position_analysis.grid_storage import solve_grid
+from jounce.kinematics.position_analysis.limit_position_messages import dead_end_words
+from jounce.kinematics.results.actuation import actuated
+from jounce.kinematics.results.motion import Motion
+from jounce.kinematics.sensitivity.sensitivities import differentiable_motion
+from jounce.kinematics.sensitivity.traced_motion import TracedMotion
+from jounce.kinematics.status import Status
+from jounce.mechanism import (
+    Mechanism,
+    Model,
+    build,
+    check_mechanism,
+    time_grid,
+    with_outputs_held,
+)
+from jounce.mechanism.held_outputs import led_outputs
+from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.preconditions import concrete, concrete_or
+from jounce.mechanism.time import Instants, TimeLike, instants_of
+
+LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
+HIGHEST_ORDER = 30  # of derivatives of outputs
+HIGHEST_OF_MOTION = HIGHEST_ORDER + 2  # forces are two derivatives shorter than the motion
+LARGEST_TOLERANCE = 1e-2
+
+
+def _differentiated(solve: Callable[..., Motion], given: Mapping[str, Any]) -> Motion:
+    """Solve a mechanism of which JAX traces some values."""
+    mechanism = given["mechanism"]
+    check_mechanism(mechanism)
+    options = {name: value for name, value in given.items() if name not in ("mechanism", "time", "order", "strict")}
+    order = checked_settings(mechanism, given.get("order", 4), options.get("tolerance", 1e-12))
+    time = mechanism.time if given.get("time") is None else given["time"]
+    try:
+        instants = time_grid(time, mechanism.parameter_values)
+    except ConcretizationTypeError:
+        message = (
+            "the instants depend on values that JAX traces, and are held when a motion is differentiated; give them"
+        )
+        raise UnsupportedError(message, name="time") from None
+    levels = max(order + lost_orders(mechanism), LOWEST_ORDER) + 1
+
+    def solved(mechanism: Mechanism, known: bool) -> Motion:
+        return solve(mechanism, instants, order, **options, strict=known and given.get("strict", True))
+
+    found, models = differentiable_motion(mechanism, instants, levels, solved)
+    return TracedMotion(mechanism, models, instants, order, found)
+
+
+def lost_orders(mechanism: Mechanism) -> int:
+    """Return by how many derivatives the outputs are shorter than the motion, at most."""
+    return max((output.lost_orders for output in mechanism.outputs.values()), default=0)
+
+
+@concrete_or(_differentiated)
+def solve(
+    mechanism: Mechanism,
+    time: TimeLike | None = None,
+    order: int = 4,
+    *,
+    tolerance: float = 1e-12,
+    refine: bool = True,
+    strict: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+    threads: int | None = None,
+    keep: bool | None = None,
+) -> Motion:
+    """Return the motion of a driven mechanism and its time derivatives up to any order, exact to rounding.
+
+    Positions are found by Newton-Raphson; all derivatives of an instant follow from one factorisation of the
+    Jacobian there (Sommer 2024, equations 1-8 and all orders beyond).
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Drivers and joints must leave no degree of freedom; redundant ones must agree.
+    time : array_like of shape (time,), optional
+        Strictly increasing instants, s; those of the mechanism unless given.
+    order : int, default 4
+        Highest derivative of the outputs: 0 position, 3 jerk, 4 jounce, up to 30.
+    tolerance : float, default 1e-12
+        Largest Newton correction of an accepted position, in rad, or in sizes of the mechanism.
+    refine : bool, default True
+        Correct accepted positions once more, to rounding. Without, they stay as far off as the tolerance lets them.
+    strict : bool, default True
+        Raise if an instant fails. Otherwise it is NaN and `Motion.status` says why.
+    progress : callable, optional
+        Called with the number of instants done and their total.
+    threads : int, optional
+        That solve a grid of more than a thousand instants: as many as the process has cores, or as the environment
+        variable ``JOUNCE_THREADS`` says, unless given. Results do not depend on it.
+    keep : bool, optional
+        Whether to keep the motion of all bodies beside the outputs, for points, energies or reactions asked for later;
+        unless given, up to 65,536 instants. What is not kept is computed again when it is asked for.
+
+    Returns
+    -------
+    Motion
+        Outputs, their derivatives and the status of every instant.
+
+    Raises
+    ------
+    MechanismError
+        If the mechanism, the time grid or the order is not valid.
+    AssemblyError
+        If the bodies cannot be put together at the first instant.
+    MobilityError
+        If degrees of freedom are left, or the start is a singular position.
+    SolveError
+        If the motion cannot be followed to an instant (with `strict`); it holds the motion up to there.
+    UnsupportedError
+        If JAX traces anything but values of the mechanism; by those, outputs are differentiated.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), order=6)
+    >>> motion.dataset["psi"].dims
+    ('time', 'derivative')
+    """
+    order = checked_settings(mechanism, order, tolerance)
+    count = thread_count(threads)
+    instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
+    solver, path = _followed(mechanism, instants, order, tolerance, refine=refine)
+    found = solve_grid(solver, path, instants, progress, count, keep=keep)
+    state, outcome = (found.coordinates, found.outputs), (found.status, found.faults, path.change_points)
+    told = path.history(), _backend(solver, path, instants)
+    motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, *told))
+    if strict:
+        raise_for_status(motion)
+    return motion
+
+
+@concrete
+def solve_in_stretches(
+    mechanism: Mechanism,
+    time: TimeLike | None = None,
+    order: int = 4,
+    *,
+    tolerance: float = 1e-12,
+    refine: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+    threads: int | None = None,
+) -> Stretches:
+    """Follow a motion as `jounce.solve` does, and solve its instants stretch by stretch, as many as are asked for.
+
+    What is in memory at a time is one stretch, of 65,536 instants, and what following the motion takes, which grows
+    with how far the mechanism moves, not with the number of instants.
+
+    Parameters
+    ----------
+    mechanism, time, order, tolerance, refine, progress, threads
+        As those of `jounce.solve`.
+
+    Returns
+    -------
+    Stretches
+        An iterable of motions; an instant that fails is NaN in its stretch, and nothing is raised for it.
+
+    Raises
+    ------
+    MechanismError, AssemblyError, MobilityError, SolveError
+        As `jounce.solve`, of what is known before the first stretch.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.kinematics import solve_in_stretches
+    >>> fine = jn.TimeGrid(start=0, stop=2, count=100_001)
+    >>> motion = solve_in_stretches(jn.load("examples/four_bar.yaml"), fine, order=1)
+    >>> [(len(part.time), round(float(part.outputs["psi"][:, 0].max()), 4)) for part in motion]
+    [(65536, 2.6022), (34465, 2.6436)]
+    """
+    order = checked_settings(mechanism, order, tolerance)
+    count = thread_count(threads)
+    instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
+    found = _followed(mechanism, instants, order, tolerance, refine=refine)
+    return Stretches(mechanism, found, instants, order, progress, count, _backend(*found, instants))
+
+
+def checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
+    """Return the order of derivatives, or raise MechanismError unless mechanism, order and tolerance are valid."""
+    check_mechanism(mechanism)
+    order = checked_order(order)
+    for name, output in mechanism.outputs.items():
+        if order + output.lost_orders > HIGHEST_OF_MOTION:
+            message = f"needs the motion to order {order + output.lost_orders}, and {HIGHEST_OF_MOTION} is the highest"
+            raise MechanismError(
+                f"{message}: ask for derivatives of a lower order", name=f"outputs.{name}", value=order
+            )
+    if not (isinstance(tolerance, numbers.Real) and 0 < tolerance <= LARGEST_TOLERANCE):
+        message = f"the tolerance must be a number above zero and at most {LARGEST_TOLERANCE:g}"
+        raise MechanismError(message, name="tolerance", value=tolerance)
+    return order
+
+
+def _followed(
+    mechanism: Mechanism, instants: Instants, order: int, tolerance: float, *, refine: bool
+) -> tuple[Solver, FollowedPath]:
+    """Return what solves the instants of a grid: a solver, and the motion followed from the first to the last."""
+    first, last = float(instants[0]), float(instants[-1])
+    lost = lost_orders(mechanism)
+    of_forces = any(output.of_forces for output in mechanism.outputs.values())
+    check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
+    guessed = build(chosen(with_outputs_held(mechanism), first))
+    expect(len(instants))
+    solver = Solver(guessed, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order, is_wanted_soon())
+    new = first_time("leg", guessed.system, solver.order, len(instants) > LONG_GRID)
+    beside = new and thread_count() > 1
+    with rehearsed(partial(_prepare, solver, first), wanted=beside):
+        try:
+            model, coordinates = assemble(guessed, first, tolerance)
+        except (AssemblyError, MobilityError) as error:
+            for name, motion in led_outputs(mechanism).items():
+                error.message += f"; the driver {name} follows from the output {motion.output}, which must determine it"
+            raise
+        solver = dataclasses.replace(solver, model=model)
+        still = _still(solver, coordinates)
+        with rehearsed(partial(_prepare, solver, first), wanted=beside and _rank_is_open(guessed)):
+            if beside:
+                with tried():
+                    _rehearse(mechanism, solver, still, instants)
+    start = solver.beginning(still, first)
+    on_the_way = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
+    path = follow(solver, start, last, last - first, grid=on_the_way)
+    if not path.anchors:
+        where = f"t = {first:g} s, {path.fault}"
+        raise SolveError(f"{where}: {_words(path.status)}: {path.status.advice}", status=path.status)
+    return solver, path
+
+
+def _backend(solver: Solver, path: FollowedPath, instants: Instants) -> str:
+    """Return what has computed a motion: what followed it, and what solves the instants of a long grid."""
+    return joined({*path.backends, *([solver.backend] if len(instants) > LONG_GRID else [])})
+
+
+def _rank_is_open(model: Model) -> bool:
+    """Tell whether constraints are redundant by a number that only the assembled bodies show; programs depend on it."""
+    rows, columns = model.system.shape
+    return rows > columns and model.system.rank is None
+
+
+def _prepare(solver: Solver, instant: float) -> None:
+    """Compile the program that follows a motion, if all that it depends on is known already."""
+    if _rank_is_open(solver.model):
+        return
+    model = dataclasses.replace(solver.model, system=resident(solver.model.system))
+    solver = dataclasses.replace(solver, model=model)
+    solver.prepare(_still(solver, model.guess), instant)
+
+
+def _rehearse(mechanism: Mechanism, solver: Solver, still: SolvedState, instants: Instants) -> None:
+    """Use the programs of long grids, and those of outputs that are forces, with the bodies at rest."""
+    if len(instants) > LONG_GRID:
+        prepare_spans(solver, still, len(instants))
+    pose = {name: part[0] for name, part in still[0].items()}
+    order = solver.order - lost_orders(mechanism)
+    ask_forces_at_rest(mechanism, solver.model, pose, instants, order, solver.order + 1)
+
+
+def raise_for_status(motion: Any) -> None:
+    """Raise SolveError, with the first instant that failed and what to do, unless all were solved."""
+    failed = np.flatnonzero(motion.status != Status.OK)
+    if not failed.size:
+        return
+    first = int(failed[0])
+    status = Status(int(motion.status[first]))
+    fault = motion.faults.get(first, "")
+    where = f"t = {motion.time[first]:g} s" + (f", {fault}" if fault else "")
+    total = len(motion.time)
+    message = f"{where}: {_words(status)}: {status.advice}"
+    if isinstance(motion, Motion) and (ahead := dead_end_words(motion, first)):
+        message += f"; {ahead}"
+    solved = f"{total - failed.size} of {total} instants were solved"
+    raise SolveError(f"{message} ({solved})", motion=motion, status=status)
+
+
+def checked_order(order: Any) -> int:
+    """Return the order of derivatives, or raise MechanismError."""
+    whole = isinstance(order, numbers.Integral) and not isinstance(order, bool)
+    if not whole or not 0 <= int(order) <= HIGHEST_ORDER:
+        message = f"the order of derivatives must be a whole number from 0 to {HIGHEST_ORDER}"
+        raise MechanismError(message, name="order", value=order)
+    return int(order)
+
+
+def _still(solver: Solver, coordinates: dict[str, np.ndarray]) -> SolvedState:
+    """Return what is known of the first instant before it is solved: its position."""
+    levels = solver.order + 1
+    still = {name: np.stack([x, *[np.zeros_like(x)] * (levels - 1)]) for name, x in coordinates.items()}
+    return still, tuple(np.zeros((levels, 1, g.instances, 1)) for g in solver.model.system.outputs), np.zeros(1)
+
+
+def _words(status: Status) -> str:
+    return status.name.lower().replace("_", " ")

@@ -1,0 +1,1 @@
+"""What a solution is handed out as."""

@@ -1,0 +1,64 @@
+"""From a motion of which outputs were held to laws to that of the drivers that move them."""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.jet.derivatives import plain_derivatives
+from jounce.kinematics.assembly.gauss_newton import Displacements
+from jounce.kinematics.results.motion import Motion
+from jounce.kinematics.status import Status
+from jounce.mechanism import Mechanism, Model, build
+from jounce.mechanism.builder import counted_as_in
+from jounce.mechanism.held_outputs import led_outputs, with_laws_left_out
+from jounce.modules import with_fields
+from jounce.trajectory import HermiteMotion
+
+
+def actuated(motion: Motion) -> Motion:
+    """Return a motion for which outputs were held to their laws as that of the drivers that move them.
+
+    The bodies move as they did; drivers have the laws found, so that forces are theirs. Any other motion is returned as
+    it is.
+    """
+    mechanism = motion.mechanism
+    led = led_outputs(mechanism)
+    if not led or not np.any(motion.status == Status.OK):
+        return motion
+    laws = {name: _law(motion, name) for name in led}
+    drivers = {name: dataclasses.replace(mechanism.drivers[name], motion=law) for name, law in laws.items()}
+    driven = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **drivers})
+    model = _counted(build(driven), motion.model, _row_scale(mechanism, motion.model, float(motion.time[0])))
+    return motion.moved_by(model, driven)
+
+
+def _law(motion: Motion, name: str) -> HermiteMotion:
+    """Return the law of a driver through all derivatives that there are, those beyond the order of the motion too."""
+    derivatives = np.asarray(plain_derivatives(np.asarray(motion.driver_coefficients(name))[:, 0]))
+    solved = motion.status == Status.OK
+    return HermiteMotion(motion.time[solved], derivatives.T[solved])
+
+
+def _row_scale(mechanism: Mechanism, held: Model, instant: float) -> Float[np.ndarray, "row 1"]:
+    """Return the scales of the rows of drivers and joints, where the outputs were held first.
+
+    Laws do not matter to them, and those found have as many pieces as there were instants: a program for each number.
+    """
+    _, _, jacobian = Displacements(build(with_laws_left_out(mechanism)), instant).at(held.reference)
+    return jacobian.row_scale[:, None]
+
+
+def _counted(model: Model, held: Model, row_scale: Float[np.ndarray, "row 1"]) -> Model:
+    """Return the model of the drivers with all that was found when the outputs were held."""
+    system = with_fields(
+        model.system,
+        groups=counted_as_in(model.system.groups, held),
+        forces=held.system.forces,
+        outputs=held.system.outputs,
+        row_scale=row_scale,
+        rank=held.system.rank,
+    )
+    return dataclasses.replace(
+        model, system=system, reference=held.reference, prescribed=held.prescribed, history=held.history
+    )

@@ -1,0 +1,399 @@
+"""The result of a solve: outputs and any point of any body, with their derivatives, at every instant."""
+
+import dataclasses
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.constraints import AbstractConstraint
+from jounce.display import Displayed
+from jounce.errors import MechanismError, check_name
+from jounce.execution.backends import xla_backend
+from jounce.execution.chunks import in_chunks
+from jounce.execution.on_demand import OnDemand
+from jounce.jet.derivatives import plain_derivatives
+from jounce.jet.turns import brought_near
+from jounce.kinematics.continuation.path_following import Passage
+from jounce.kinematics.results.pose_outputs import output_series
+from jounce.kinematics.status import Status
+from jounce.mechanism import (
+    AbstractMotionOutput,
+    AbstractOutput,
+    AbstractQuantity,
+    AngleOutput,
+    AngularVelocityOutput,
+    DriverAngleOutput,
+    DriverDisplacementOutput,
+    Mechanism,
+    Model,
+    PointOutput,
+)
+from jounce.mechanism.attitude_outputs import continued, euler_angles_of
+from jounce.mechanism.axis_angles import AttitudeHistory, at_lanes, attitudes_of, measures_angle
+from jounce.mechanism.builder import counted_as_in
+from jounce.mechanism.driver_outputs import is_turning
+from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
+from jounce.modules import with_fields
+from jounce.shapes import ArrayLike, Numbers
+from jounce.trajectory import HermiteMotion
+from jounce.units.shown_units import derivatives_of, time_axes
+
+if TYPE_CHECKING:
+    import xarray
+
+TOGETHER = 1024  # instants at which an output that was not solved for is evaluated: one program for few and for many
+_UNDEFINED = Status.UNDEFINED.advice.partition(": ")[2]
+
+
+def check_output(output: AbstractQuantity, mechanism: Mechanism, name: str = "output") -> None:
+    """Raise MechanismError unless an output names what the mechanism has, and exists in its space."""
+    mechanism.check_fit(output, name)
+    output.check(mechanism)
+
+
+def output_group(
+    output: AbstractOutput | AbstractConstraint,
+    mechanism: Mechanism,
+    model: Model | None = None,
+    name: str = "output",
+) -> Group:
+    """Return an output of poses, or a driver for its coordinate, as a group of one, on the pose of all bodies.
+
+    With a model, angles about axes are counted as those of the outputs that it was put together with.
+    """
+    index = {body: k for k, body in enumerate((GROUND, *mechanism.bodies))}
+    components = POSITION_COMPONENTS[mechanism.space]
+    groups, _ = group_elements({name: output}, mechanism.parameter_values, index, components)
+    (group,) = groups if model is None else counted_as_in(groups, model)
+    return group
+
+
+class Motion(Displayed):
+    """The motion of a mechanism at the instants of a time grid.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        What was solved.
+    model : Model
+        The numeric model, with the drivers of the mechanism.
+    solved_model : Model
+        The one that was solved: the same, unless drivers follow from outputs, which are held there in their place.
+    time : numpy.ndarray of shape (time,)
+        Instants, s.
+    order : int
+        Highest derivative of the outputs.
+    status : numpy.ndarray of int, shape (time,)
+        Outcome at each instant, see `Status`; where it is not 0, all results are NaN.
+    faults : dict of int to str
+        For the instants that failed, by index: the body farthest from its prediction, or the driver at fault.
+    history : AttitudeHistory, optional
+        Attitudes that all bodies in space went through, by which turns are counted; None where none are kept.
+    change_points : numpy.ndarray of shape (points,)
+        When the motion passed a singular position smoothly, where assembly branches cross, s: there another motion
+        could have branched off, and forces are not determined: they are NaN there, and so are their rates where
+        rounding decides them.
+    passages : tuple of Passage
+        The same, each with the radius of the Taylor series of the motion there.
+    derived : dict
+        What was computed of the motion and may be wanted again, by name: the forces, for one.
+    backend : str
+        Which arithmetic gave the numbers: "llvm", machine code, or "xla", with the device unless that is the processor;
+        both where each computed a part.
+
+    It is put together from the Taylor coefficients of the coordinates of all bodies, or what computes them, and the
+    derivatives of the outputs, (order + 1, components, instances, time) for each group.
+    """
+
+    traced = False  # by JAX
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        model: Model,
+        time: np.ndarray,
+        order: int,
+        state: tuple[dict[str, Any] | Callable[[], dict[str, Any]], tuple[Any, ...]],
+        status: Numbers,
+        faults: dict[int, str],
+        passages: Sequence[Passage] = (),
+        history: AttitudeHistory | None = None,
+        backend: str = "",
+    ):
+        self.backend = backend or xla_backend()
+        self.mechanism, self.time, self.order, self.status = mechanism, time, order, status
+        self.faults = faults
+        self.passages = tuple(passages)
+        self.change_points = np.array([point.instant for point in self.passages])
+        self.derived: dict[str, Any] = {}
+        self.model, self.solved_model, self.history = model, model, history
+        self._bodies, groups = state
+        self._groups = dict(zip(model.outputs, groups, strict=True))
+        self._known_outputs: dict[str, Any] = {}
+        self._actuated: Mechanism | None = None  # with laws, where those of drivers follow from outputs
+
+    @cached_property
+    def _coordinates(self) -> dict[str, Any]:
+        """Taylor coefficients of the coordinates of all bodies, computed again where they were not kept."""
+        return self._bodies() if callable(self._bodies) else self._bodies
+
+    @property
+    def poses(self) -> tuple[type, dict[str, Any]]:
+        """Type of the poses of all bodies, the ground first, and Taylor coefficients of their coordinates by name."""
+        return self.model.pose_type, self._coordinates
+
+    @cached_property
+    def forces(self) -> tuple[Group, ...]:
+        """The applied forces, in the groups of the model, with the turns of angles about axes at every instant."""
+        return self._counting(self.model.system.forces)
+
+    @property
+    def counted_outputs(self) -> tuple[Group, ...]:
+        """The outputs of poses, in the groups of the model, with the turns of angles about axes at every instant."""
+        return self._counting(self.model.system.outputs)
+
+    @property
+    def continued_outputs(self) -> tuple[Float[np.ndarray, "component instance time"], ...]:
+        """Values of the outputs of poses that are angles in a range, made continuous, for each group of such."""
+        pairs = zip(self._groups.values(), self.model.system.outputs, strict=True)
+        found: Any = tuple(self._continued(g, c)[0] for c, g in pairs if getattr(g.element, "wraps", ()))
+        return found
+
+    def moved_by(self, model: Model, actuated: Mechanism) -> "Motion":
+        """Return the same motion of the same bodies, with a model of the drivers that move them, and their laws."""
+        state = self._bodies, tuple(self._groups.values())
+        outcome = self.status, self.faults, self.passages, self.history, self.backend
+        motion = Motion(self.mechanism, model, self.time, self.order, state, *outcome)
+        motion._actuated, motion.solved_model = actuated, self.model
+        return motion
+
+    @property
+    def actuated(self) -> Mechanism:
+        """The mechanism with laws of all drivers: those that follow from outputs are the ones found by this motion.
+
+        They go through the instants of the motion with all derivatives, and say nothing beyond its first and last.
+        """
+        return self.mechanism if self._actuated is None else self._actuated
+
+    def driver(self, name: str) -> "xarray.DataArray":
+        """Return the coordinate of a driver and its derivatives, as the bodies have it: what its law must be.
+
+        Parameters
+        ----------
+        name : str
+            Of the driver.
+
+        Returns
+        -------
+        xarray.DataArray
+            Dimensions time and derivative; rad or m.
+
+        Raises
+        ------
+        MechanismError
+            If there is no such driver, or its class does not say what its coordinate is.
+
+        Examples
+        --------
+        >>> import jounce as jn
+        >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), [0.0, 0.5], order=2)
+        >>> motion.driver("theta").values.round(6).tolist()[1]
+        [1.570796, 0.0, -10.335426]
+        """
+        check_name("driver", name, self.mechanism.drivers, MechanismError, name="driver")
+        turning = is_turning(self.mechanism.drivers[name])
+        return self.evaluate((DriverAngleOutput if turning else DriverDisplacementOutput)(name), name)
+
+    def driver_law(self, name: str) -> HermiteMotion:
+        """Return the law of a driver: through the instants that were solved, with the derivatives of the motion.
+
+        Raises
+        ------
+        MechanismError
+            As `driver`.
+        """
+        values, solved = self.driver(name).values, self.status == Status.OK
+        return HermiteMotion(self.time[solved], values[solved])
+
+    def driver_coefficients(self, name: str) -> Float[Numbers, "order 1 time"]:
+        """Return the Taylor coefficients of the coordinate of a driver, as the bodies have it."""
+        bare: Any = dataclasses.replace(self.mechanism.drivers[name], motion=0.0)
+        return self._coefficients(output_group(bare, self.mechanism, self.model, f"drivers.{name}"))[:, :, 0]
+
+    def __repr__(self) -> str:
+        solved = int(np.sum(self.status == Status.OK))
+        title = f"{self.mechanism.title}: " if self.mechanism.title else ""
+        return f"<Motion {title}{solved} of {len(self.time)} instants solved, order {self.order}>"
+
+    @property
+    def outputs(self) -> Mapping[str, Any]:
+        """Outputs by name: arrays of shape (time, order + 1) or (time, order + 1, component), SI.
+
+        The nine components of a rotation matrix stand row by row. An output is computed when it is first asked for.
+        """
+        # not kept, as it refers to the motion: its arrays are to go with the last reference, not with the next search
+        found = OnDemand(self.mechanism.outputs, self._outputs_with, self._known_outputs)
+        return dict(found) if self.traced else found  # what JAX traces is a plain tree
+
+    def _outputs_with(self, name: str) -> dict[str, Any]:
+        """Return an output, and those that are found with it."""
+        output = self.mechanism.outputs[name]
+        if isinstance(output, AbstractMotionOutput):
+            return {name: self._derivatives(output.coefficients(self))}
+        groups = zip(self._groups.items(), self.model.system.outputs, strict=True)
+        ((names, values), group) = next(found for found in groups if name in found[0][0])
+        return dict(zip(names, self._each_shown(self._continued(group, values)), strict=True))
+
+    def _each_shown(self, values: Float[Numbers, "order component instance time"]) -> Sequence[Any]:
+        """Return each output of a group as `outputs` has it."""
+        return [self._shown(values[:, :, k]) for k in range(values.shape[2])]
+
+    @cached_property
+    def dataset(self) -> "xarray.Dataset":
+        """Outputs as an `xarray.Dataset` with dimensions time, derivative and component; units in the attributes.
+
+        Euler parameters have the dimension euler_parameter instead of component, Euler angles euler_angle, and rotation
+        matrices row_axis and column_axis.
+
+        The unit of a variable is that of its derivative 0; each derivative adds ``/s``.
+        """
+        import xarray
+
+        variables = {
+            name: self._labelled(name, values, self.mechanism.outputs[name]) for name, values in self.outputs.items()
+        }
+        attributes: dict[str, Any] = {"title": self.mechanism.title or "motion of a mechanism", "source": "jounce"}
+        if self.change_points.size:
+            attributes["change_points"] = self.change_points
+        return xarray.Dataset(variables, coords=time_axes(self.time, self.order + 1), attrs=attributes)
+
+    def point(self, body: str, point: ArrayLike) -> "xarray.DataArray":
+        """Return the position of any point of a body in the global frame and its derivatives.
+
+        Parameters
+        ----------
+        body : str
+            Name of the body.
+        point : sequence
+            Point in the frame of the body, (2,) or (3,), m.
+
+        Returns
+        -------
+        xarray.DataArray
+            Dimensions time, derivative, component; m and its derivatives by s.
+        """
+        return self.evaluate(PointOutput(body, point), name="position")
+
+    def angle(self, body: str) -> "xarray.DataArray":
+        """Return the angle of a planar body and its derivatives, rad, with dimensions time and derivative."""
+        return self.evaluate(AngleOutput(body), name="angle")
+
+    def angular_velocity(self, body: str, frame: str = "global") -> "xarray.DataArray":
+        """Return the angular velocity of a body and its derivatives, rad/s, in the frame ``global`` or ``body``.
+
+        The highest derivative of the motion is used up: the result has one order less.
+        """
+        return self.evaluate(AngularVelocityOutput(body, frame), name="angular_velocity")
+
+    def evaluate(self, output: AbstractOutput | AbstractMotionOutput, name: str = "output") -> "xarray.DataArray":
+        """Return any output, as an `xarray.DataArray`, without solving again.
+
+        Raises
+        ------
+        MechanismError
+            If the output names a body, joint, driver or force that does not exist, or does not fit the mechanism.
+        """
+        check_output(output, self.mechanism, name)
+        if isinstance(output, AbstractMotionOutput):
+            return self._labelled(name, self._derivatives(output.coefficients(self)), output)
+        group = output_group(output, self.mechanism, self.model, name)
+        values = self._derivatives(self._continued(group, self._coefficients(group))[:, :, 0])
+        self._check_finite(values, name)
+        return self._labelled(name, values, output)
+
+    def _check_finite(self, values: Float[np.ndarray, "time derivative *component"], name: str) -> None:
+        """Raise MechanismError for the first instant that was solved and at which an output is not finite."""
+        finite = np.isfinite(values).all(axis=tuple(range(2, values.ndim)))
+        bad = ~finite & (self.status == Status.OK)[:, None]
+        if bad.any():
+            lane, level = (int(k) for k in np.argwhere(bad)[0])
+            what = f"its derivative {level}" if level else "it"
+            at = f"{what} has no finite value at t = {self.time[lane]:g} s"
+            raise MechanismError(f"{at}; {_UNDEFINED}", name=name)
+
+    def _continued(
+        self, group: Group, coefficients: Float[Numbers, "order component instance time"]
+    ) -> Float[Numbers, "order component instance time"]:
+        """Return Taylor coefficients of outputs, or derivatives, of which angles have the turns made on the way."""
+        element = group.element
+        if not (measures_angle(group) or getattr(element, "wraps", ())) or (history := self._attitudes) is None:
+            return coefficients
+        coefficients = np.array(coefficients)
+        if measures_angle(group):
+            (counted,) = history.counting((group,), self.time)
+            coefficients[0, 0] = brought_near(coefficients[0, 0], counted.element.datum.near)
+            return coefficients
+        for k, bodies in enumerate(zip(*group.bodies, strict=True)):
+            angles = np.where(self.status == Status.OK, coefficients[0, :, k], np.nan)
+            passed = history.looked_at(lambda q, b=bodies: euler_angles_of(element.sequence, attitudes_of(b, q)))
+            coefficients[0, :, k] = continued(element, angles, self.time, passed)
+        return coefficients
+
+    @property
+    def _attitudes(self) -> AttitudeHistory | None:
+        """The attitudes of all bodies along the motion, where they are known."""
+        return self.history
+
+    def _coefficients(self, group: Group) -> Float[np.ndarray, "order component instance time"]:
+        """Return the Taylor coefficients of outputs, (order + 1, components, instances, time).
+
+        The program is given the ground, which never moves, and the bodies of the group alone: it serves any others.
+        """
+        moving, index = [body for slot in group.bodies for body in slot if body], itertools.count(1)
+        places = tuple(tuple(next(index) if body else 0 for body in slot) for slot in group.bodies)
+        coordinates = {name: part[..., [0, *moving], :] for name, part in self._coordinates.items()}
+        groups = tuple(with_fields(counted, bodies=places) for counted in self._counting((group,)))
+
+        def chunk(lanes: np.ndarray) -> Any:
+            known = {name: part[..., lanes] for name, part in coordinates.items()}
+            return output_series(at_lanes(groups, lanes), known, self.model.pose_type)
+
+        (series,) = in_chunks(chunk, len(self.time), (TOGETHER,))
+        return series
+
+    def _counting(self, groups: tuple[Group, ...]) -> tuple[Group, ...]:
+        return groups if self.history is None else self.history.counting(groups, self.time)
+
+    def _derivatives(
+        self, coefficients: Float[Numbers, "order component time"]
+    ) -> Float[np.ndarray, "time derivative *component"]:
+        """Turn Taylor coefficients (order, component, time) into derivatives (time, derivative[, component])."""
+        return self._shown(plain_derivatives(np.asarray(coefficients[: self.order + 1])))
+
+    def _shown(self, values: Float[Numbers, "order component time"]) -> Float[np.ndarray, "time derivative *component"]:
+        """Turn derivatives (order, component, time) into those shown (time, derivative[, component]), NaN if failed."""
+        values = np.moveaxis(np.asarray(values[: self.order + 1]), -1, 0)
+        if (failed := self.status != Status.OK).any():
+            values = np.where(failed[:, None, None], np.nan, values)
+        return values[..., 0] if values.shape[-1] == 1 else values
+
+    def _labelled(
+        self, name: str, values: Float[Numbers, "time derivative *component"], output: AbstractQuantity
+    ) -> "xarray.DataArray":
+        import xarray
+
+        coordinates = time_axes(self.time, values.shape[1])
+        if values.ndim == 3:
+            axes = output.axes or (("component", output.labels[: values.shape[2]]),)
+            coordinates |= {axis: list(labels) for axis, labels in axes}
+            values = values.reshape(*values.shape[:2], *(len(labels) for _, labels in axes))
+        dims = tuple(coordinates)
+        attributes = {"units": output.unit, "long_name": derivatives_of(name)}
+        if isinstance(output, AbstractMotionOutput) and not self.traced and (remark := output.remark(self, values)):
+            attributes["comment"] = remark
+        return xarray.DataArray(values, dims=dims, coords=coordinates, name=name, attrs=attributes)

@@ -1,0 +1,365 @@
+"""The motion of a mechanism of which JAX traces some values, as a function of them: derivatives of any order by design.
+
+Along a motion the residuals vanish with all their time derivatives. So a change of a value of the design moves the
+bodies by a series d with ``J d = -r``, where J is the series of the Jacobian and r that of how the residuals change
+while the bodies stay: linear equations, triangular in the orders, with the one matrix on their diagonal that gives the
+time derivatives too. Their transpose gives gradients: a single solution, however many values there are.
+
+What is not a function of the design is decided outside of what is traced, by the solver as it always is: the path from
+the starting guess, steps, branches, whole turns.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
+
+from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError
+from jounce.execution.compilation import Compiled, compiled
+from jounce.jet import Jet
+from jounce.jet.algebra import stacked
+from jounce.kinematics.results.motion import Motion
+from jounce.kinematics.sensitivity.jacobian_series import jacobian_series, solved_series
+from jounce.kinematics.status import Status
+from jounce.mechanism import Mechanism, Model, with_outputs_held
+from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.builder import grouped_elements
+from jounce.mechanism.held_outputs import led_outputs, with_laws_left_out
+from jounce.mechanism.system import System, movable
+from jounce.mechanism.traced import Angles, Part, angles_of, template, traced_model, traced_values
+from jounce.mechanism.user_code import holds_users_code, users_code
+from jounce.modules import with_fields
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.pose import Pose
+from jounce.settings import called_back
+from jounce.shapes import Numbers
+from jounce.trajectory import Expression
+
+Solve = Callable[[Mechanism, bool], Motion]
+Values = tuple[Any, ...]
+"""What JAX traces in a mechanism, in the order of `traced_values`."""
+
+
+class Solved(NamedTuple):
+    """A motion, as its solver gives it.
+
+    Attributes
+    ----------
+    coordinates : dict of str to array
+        Taylor coefficients of the coordinates of all bodies, the ground first, time last.
+    status : array of shape (time,)
+        As numbers that may be traced.
+    length : array of shape ()
+        Size of the mechanism, m.
+    angles : Angles
+        About axes, of the model that was solved.
+    driven : tuple of array of shape (instances, 1)
+        Angles about axes of joints and drivers of the model of the drivers: others where outputs are held to laws.
+    continued : tuple of array of shape (components, instances, time)
+        Values of the outputs that are angles in a range, made continuous, for each group of such.
+    """
+
+    coordinates: dict[str, Any]
+    status: Any
+    length: Any
+    angles: Angles
+    driven: Part
+    continued: tuple[Any, ...]
+
+
+def differentiable_motion(
+    mechanism: Mechanism, instants: Float[np.ndarray, " time"], levels: int, solve: Solve
+) -> tuple[Solved, tuple[Model, Model]]:
+    """Return the motion of a mechanism, and its models, as functions of the values that JAX traces in it.
+
+    The first model is the one that is solved, in which outputs are held to laws where drivers follow from them; the
+    second has the drivers, for their forces. They are one where no driver does.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Some of its values are traced.
+    instants : array of shape (time,)
+        s.
+    levels : int
+        How many Taylor coefficients a solution has.
+    solve : callable
+        Solves a mechanism of plain numbers at the instants, strictly or not. What it raises where JAX knows the numbers
+        is raised; elsewhere a motion that cannot be begun is NaN.
+    """
+    made, held = template(mechanism), _builder(mechanism, with_outputs_held)
+    driven = _builder(mechanism, with_laws_left_out) if led_outputs(mechanism) else held
+    values = tuple(x if x.dtype == np.float64 else x.astype(float) for x in traced_values(mechanism))
+    shapes = solved_shapes(mechanism, len(instants), levels)
+
+    def on_the_host(strict: bool, values: Values) -> Solved:
+        try:
+            motion = solve(made(values), strict)
+        except (AssemblyError, MobilityError, SolveError) as error:
+            if strict:
+                raise
+            status = np.full(len(instants), float(getattr(error, "status", None) or Status.NOT_REACHED))
+        else:
+            if np.any(motion.status == Status.OK):  # else nothing is known of drivers that follow from outputs
+                return _solved(motion)
+            status = motion.status.astype(float)
+        return failed(shapes, status)
+
+    @jax.custom_jvp
+    def solution(values: Values) -> Solved:
+        if not any(isinstance(value, Tracer) for value in values):
+            return jax.tree.map(jnp.asarray, on_the_host(True, values))
+        each = partial(_one_by_one, partial(on_the_host, False), shapes, [np.ndim(value) for value in values])
+        return called_back(each, shapes, values, vmap_method="broadcast_all")
+
+    @solution.defjvp
+    def along(primals: tuple[Values], tangents: tuple[Values]) -> tuple[Solved, Solved]:
+        (values,), (changes,) = primals, tangents
+        solved = solution(values)
+        still = jax.tree.map(jnp.zeros_like, solved)
+        return solved, still._replace(coordinates=held.change(values, changes, solved, instants))
+
+    solved = solution(values)
+    first = first_of(solved.coordinates)
+    model = held(values, solved.length, solved.angles, first)
+    if driven is held:
+        return solved, (model, model)
+    angles = solved.angles._replace(angle=(solved.driven, *solved.angles.angle[1:]))
+    return solved, (model, driven(values, solved.length, angles, first))
+
+
+def solved_shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
+    """Return the shapes of a solution."""
+
+    def of(*shape: int) -> jax.ShapeDtypeStruct:
+        return jax.ShapeDtypeStruct(shape, np.float64)
+
+    bodies = len(mechanism.bodies) + 1
+    if mechanism.space == "planar":
+        coordinates = {"position": of(levels, 2, bodies, count), "angle": of(levels, bodies, count)}
+        return Solved(coordinates, of(count), of(), Angles(((), (), ()), ((), ())), (), ())
+    coordinates = {
+        "position": of(levels, 3, bodies, count),
+        "quaternion": of(levels, 4, bodies, count),
+        "angular_velocity": of(levels - 1, 3, bodies, count),
+    }
+    parts = [groups for groups, _ in grouped_elements(with_outputs_held(mechanism))]
+    (driven, _), *_ = grouped_elements(with_laws_left_out(mechanism))
+    measuring = [[group.instances for group in groups if measures_angle(group)] for groups in (*parts, driven)]
+    angle: Any = tuple(tuple(of(n, 1) for n in part) for part in measuring)
+    near: Any = tuple(tuple(of(n, count) for n in part) for part in measuring[1:3])
+    wrapping = [group for group in parts[2] if getattr(group.element, "wraps", ())]
+    continued = tuple(of(len(group.element.wraps), group.instances, count) for group in wrapping)
+    return Solved(coordinates, of(count), of(), Angles(angle[:3], near), angle[3], continued)
+
+
+def failed(shapes: Solved, status: Float[Numbers, " time"]) -> Solved:
+    """Return a solution of which only the status is known."""
+    return jax.tree.map(lambda x: np.full(x.shape, np.nan), shapes)._replace(status=status)
+
+
+def _solved(motion: Motion) -> Solved:
+    """Return what is kept of a motion, as arrays of NumPy."""
+    coordinates = jax.tree.map(np.asarray, dict(motion.poses[1]))
+    counted = motion.forces, motion.counted_outputs
+    angles, driven = angles_of(motion.solved_model, counted), angles_of(motion.model, counted).angle[0]
+    near = jax.tree.map(lambda x: np.broadcast_to(x, (x.shape[0], len(motion.time))), angles.near)
+    length, angles = np.float64(motion.model.length), angles._replace(near=near)
+    return Solved(coordinates, motion.status.astype(float), length, angles, driven, motion.continued_outputs)
+
+
+def _one_by_one(solve: Callable[[Values], Solved], shapes: Solved, sizes: Sequence[int], values: Values) -> Solved:
+    """Solve one design, or many, with the designs on the first axes; called from within what JAX runs.
+
+    `sizes` are the numbers of axes that the values of one design have.
+    """
+    batch = np.shape(values[0])[: np.ndim(values[0]) - sizes[0]]
+    if not batch:
+        return solve(values)
+    found = [solve(tuple(np.asarray(value)[index] for value in values)) for index in np.ndindex(*batch)]
+    return jax.tree.map(lambda shape, *xs: np.stack(xs).reshape(*batch, *shape.shape), shapes, *found)
+
+
+def first_of(coordinates: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the coordinates at the first instant, (..., bodies, 1)."""
+    return {name: coordinates[name][0, ..., :1] for name in coordinates if name != "angular_velocity"}
+
+
+def check_not_redundant(model: Model) -> None:
+    """Raise MechanismError if constraints are redundant: known by the rank, or more equations than unknowns."""
+    rows, columns = model.system.shape
+    if rows > columns or model.system.rank is not None:
+        raise MechanismError(
+            "gradients of mechanisms with redundant constraints are not supported yet; use joints without "
+            "the equations that follow from others, which jn.mobility lists",
+            name="joints",
+        )
+
+
+class _Builder:
+    """Makes the model of a mechanism from what JAX traces in it: operation by operation, or compiled once.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Some of its values are traced.
+    made_of : callable
+        What the model is made of, for the mechanism.
+    again : bool
+        Whether it is used again, so that compiling is worth while.
+
+    Attributes
+    ----------
+    change : callable
+        Returns how the coordinates of a motion change as values of the design do.
+    """
+
+    def __init__(self, mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism], *, again: bool):
+        self._made, self._made_of, self._kept = template(mechanism), made_of, {}
+        self._make, self.change = self._numbers, self._change
+        if again:
+            self._make = jax.jit(self._numbers, static_argnames="counted")
+            self.change = Compiled(self._change, ())
+
+    def __call__(self, values: Values, length: Any, angles: Angles | None, first: Any) -> Model:
+        """Return the model; see `traced_model`."""
+        numbers, which = self.numbers(values, length, angles, first)
+        return self.model(numbers, which, angles is not None)
+
+    def numbers(self, values: Values, length: Any, angles: Angles | None, first: Any) -> tuple[list[Any], Any]:
+        """Return those numbers of a system that depend on what is traced, and which of its leaves they are."""
+        found = self._make(values, length, angles, first, counted=angles is not None)
+        return found, self._kept[angles is not None][2]
+
+    def model(self, numbers: Sequence[Any], which: tuple[int, ...], counted: bool) -> Model:
+        """Return the model that has these numbers."""
+        model, leaves, _, structure = self._kept[counted]
+        whole = list(leaves)
+        for k, number in zip(which, numbers, strict=True):
+            whole[k] = number
+        return dataclasses.replace(model, system=jax.tree.unflatten(structure, whole))
+
+    def _numbers(self, values: Values, length: Any, angles: Any, first: Any, *, counted: bool) -> list[Any]:
+        model = traced_model(self._made_of(self._made(values)), length, angles, first)
+        check_not_redundant(model)
+        leaves, structure = jax.tree.flatten(model.system)
+        which = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
+        fixed = [None if k in which else leaf for k, leaf in enumerate(leaves)]
+        bare = with_fields(model.system, groups=(), forces=(), outputs=(), column_scale=np.ones(1))  # nothing traced
+        kept = dataclasses.replace(model, system=bare, guess={}, reference={})
+        self._kept[counted] = kept, fixed, which, structure
+        return [leaves[k] for k in which]
+
+    def _change(self, values: Values, changes: Values, solved: Solved, instants: Any) -> dict[str, Any]:
+        """Return how the coordinates of a motion change, as Taylor coefficients, as values of the design do."""
+        regular = solved.status == int(Status.OK)
+        coordinates = {name: _where(regular, c, c[..., :1]) for name, c in solved.coordinates.items()}
+        instants = jnp.where(regular, instants, instants[0])
+        first = first_of(coordinates)
+        moved = {name: jnp.zeros_like(x) for name, x in first.items()}
+        if any(solved.angles.angle):  # they are counted from the first position, which moves too
+            system, slope, which = _linear(self, (solved.length, None), values, changes, first, moved)
+            start = {name: x[None] for name, x in first.items()}
+            moved = _moved(system, slope, which, start, instants[:1])
+            moved = {name: moved[name][0] for name in first}
+        system, slope, which = _linear(self, (solved.length, solved.angles), values, changes, first, moved)
+        found = _moved(system, slope, which, coordinates, instants)
+        return {name: _where(regular, change, jnp.zeros_like(change)) for name, change in found.items()}
+
+
+MOST_BUILDERS = 16
+_builders: dict[Any, _Builder] = {}
+
+
+def _builder(mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism]) -> _Builder:
+    """Return what makes the model of a mechanism: the same for one that differs in the values of its parameters.
+
+    One whose joints are made anew each time is not compiled: that would be done each time.
+    """
+    numbers = {name: value for name, value in mechanism.parameters.items() if not isinstance(value, Tracer)}
+    plain = tuple((n, x if isinstance(x, str | Expression) else float(x)) for n, x in numbers.items())
+    fields = [field.name for field in dataclasses.fields(mechanism) if field.name != "parameters"]
+    held = [getattr(mechanism, name) for name in fields]
+    if traced_values(held) or (own := _users_code(mechanism)) is None:
+        return _Builder(mechanism, made_of, again=False)
+    key = (made_of, tuple(map(id, held)), tuple(mechanism.parameters), plain, own)
+    if key not in _builders:
+        while len(_builders) >= MOST_BUILDERS:
+            _builders.pop(next(iter(_builders)))
+        _builders[key] = _Builder(mechanism, made_of, again=True)  # which holds what the key is made of
+    return _builders[key]
+
+
+def _users_code(mechanism: Mechanism) -> tuple[Any, ...] | None:
+    """Return what tells code of users in a mechanism from others; None where it holds what JAX traces."""
+    if not holds_users_code(element for part in mechanism.elements.values() for element in part.values()):
+        return ()
+    return users_code([group for groups, _ in grouped_elements(mechanism, initial=True) for group in groups])
+
+
+def _where(regular: Any, values: Any, others: Any) -> Any:
+    return jnp.where(regular.reshape(*[1] * (values.ndim - 1), -1), values, others)
+
+
+def _linear(
+    built: _Builder, known: tuple[Any, Angles | None], values: Values, changes: Values, first: Any, moved: Any
+) -> tuple[System, list[Any], tuple[int, ...]]:
+    """Return the system of a model, how its numbers change, and which of them do."""
+    found: list[tuple[int, ...]] = []
+
+    def numbers(values: Values, first: Any) -> list[Any]:
+        made, which = built.numbers(values, *known, first)
+        found.append(which)
+        return made
+
+    here, slope = jax.jvp(numbers, (values, first), (changes, moved))
+    system = built.model(here, found[0], known[1] is not None).system
+    leaves, structure = jax.tree.flatten(system)
+    numbered = jax.tree.unflatten(structure, range(len(leaves)))
+    places = jax.tree.leaves(with_fields(numbered, forces=(), outputs=()))  # of what residuals need among all leaves
+    changes_at = dict(zip(found[0], slope, strict=True))
+    moving = [(place, changes_at[k]) for place, k in enumerate(places) if k in changes_at]
+    bare = with_fields(system, forces=(), outputs=())
+    return bare, [change for _, change in moving], tuple(place for place, _ in moving)
+
+
+def _moved(
+    system: System, slope: list[Any], which: tuple[int, ...], coordinates: dict[str, Any], instants: Any
+) -> dict[str, Any]:
+    pose_type = PlanarPose if "angle" in coordinates else SpatialPose
+    return _change_along(system, slope, coordinates, instants, pose_type=pose_type, which=which)
+
+
+@compiled("pose_type", "which")
+def _change_along(
+    system: System,
+    slope: Sequence[Numbers],
+    coordinates: dict[str, Numbers],
+    instants: Float[Numbers, " batch"],
+    pose_type: type[Pose],
+    which: tuple[int, ...],
+) -> dict[str, Any]:
+    """Return how the coordinates of a motion change as the numbers of a system do; `which` of its leaves."""
+    order = len(coordinates["position"]) - 1
+    pose = pose_type.from_coordinates({name: Jet(tuple(c)) for name, c in coordinates.items()})
+    pose = movable(jax.lax.optimization_barrier(pose))  # or XLA computes it again in everything that uses it
+    time = Jet.variable(instants[None], order)
+    leaves, structure = jax.tree.flatten(system)
+
+    def residual(numbers: Sequence[Any]) -> Any:
+        own = list(leaves)
+        for k, number in zip(which, numbers, strict=True):
+            own[k] = number
+        return stacked(jax.tree.unflatten(structure, own).residual(pose, time))
+
+    _, missing = jax.jvp(residual, ([leaves[k] for k in which],), (list(slope),))
+    found = solved_series(system, jacobian_series(system, pose, time), -missing)
+    parts = [system.coordinates(level, pose.shifts) for level in found]
+    shift, turn = (Jet(tuple(part)) for part in zip(*parts, strict=True))
+    return {name: stacked(jet) for name, jet in pose.varied(shift, turn).coordinates().items()}

@@ -1,0 +1,194 @@
+"""What a robot file holds: links, joints with their limits, masses, loops and whether they close."""
+
+from __future__ import annotations
+
+import dataclasses
+from os import PathLike, fspath
+from typing import Any, Literal, NotRequired
+
+from typing_extensions import TypedDict
+
+from jounce.errors import RobotError
+from jounce.reporting.text.summaries import freedom_words
+from jounce.robot import Joint, Robot
+from jounce.robot.closed_loops.closures import closure_wrenches
+
+
+class LinkFacts(TypedDict):
+    """A link: mass, and with which link it moves; kg, m, kg m^2."""
+
+    name: str
+    moves_with: str
+    mass: float | None
+    center_of_mass: list[float] | None
+    inertia: list[list[float]] | None
+
+
+class LimitFacts(TypedDict):
+    """Limits of a joint; None where there is none."""
+
+    lower: float | None
+    upper: float | None
+    velocity: float | None
+    acceleration: float | None
+    jerk: float | None
+    effort: float | None
+    effort_rate: float | None
+    deceleration: float | None
+
+
+class MimicFacts(TypedDict):
+    """Which joint another one follows."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+class JointFacts(TypedDict):
+    """A joint."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    axis: list[float] | None
+    unit: str | None
+    limits: LimitFacts | None
+    mimic: MimicFacts | None
+    armature: float
+    damping: float
+    friction: float
+
+
+class ClosureFacts(TypedDict):
+    """What closes a loop; the number of its independent and redundant equations is None where the loop cannot close."""
+
+    name: str
+    type: str
+    links: list[str]
+    equations: NotRequired[int | None]
+    redundant: NotRequired[int | None]
+
+
+class FreedomFacts(TypedDict):
+    """Coordinates, and what the equations of loops leave of them; None where that is not known."""
+
+    coordinates: int
+    equations: int
+    left: int | None
+    words: str
+
+
+class LoopFacts(TypedDict):
+    """Whether the loops close."""
+
+    status: Literal["assembled", "open"]
+    message: str | None
+
+
+class RobotFacts(TypedDict):
+    """What a robot file holds."""
+
+    kind: Literal["robot"]
+    title: str
+    gravity: list[float]
+    base: str
+    mass: float
+    links: list[LinkFacts]
+    joints: list[JointFacts]
+    closures: list[ClosureFacts]
+
+
+class InspectedRobot(RobotFacts):
+    """What a robot file holds, and how it starts; ``ok`` is whether its loops close."""
+
+    file: str | None
+    freedom: FreedomFacts
+    assembly: LoopFacts
+    ok: bool
+
+
+def robot_facts(robot: Robot) -> dict[str, Any]:
+    """Return what stands in a robot, before its loops are looked at: RobotFacts.
+
+    Parameters
+    ----------
+    robot : Robot
+    """
+    return {
+        "kind": "robot",
+        "title": robot.name,
+        "gravity": robot.gravity.tolist(),
+        "base": robot.base,
+        "mass": robot.mass,
+        "links": [_link(robot, name) for name in robot.links],
+        "joints": [_joint(joint) for joint in robot.joints.values()],
+        "closures": [{"name": name, "type": x.type, "links": list(x.links)} for name, x in robot.closures.items()],
+    }
+
+
+def inspected_robot(robot: Robot, path: str | PathLike[str] | None = None) -> dict[str, Any]:
+    """Return what there is to know of a robot before it moves, as plain data in SI units: InspectedRobot.
+
+    Parameters
+    ----------
+    robot : Robot
+        One whose loops cannot be closed is told of too.
+    path : optional
+        Its file.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> facts = inspected_robot(jn.load_robot("examples/robots/scara.urdf"))
+    >>> facts["freedom"]["words"], [joint["name"] for joint in facts["joints"] if joint["type"] == "prismatic"]
+    ('4 degrees of freedom', ['quill'])
+    """
+    facts, message, borne, wrenches = robot_facts(robot), None, 0, {}
+    try:
+        wrenches = closure_wrenches(robot)
+    except RobotError as error:
+        message = error.message
+    for closure in facts["closures"]:
+        name = closure["name"]
+        kept, rest = (len(part) for part in wrenches[name]) if name in wrenches else (None, None)
+        borne += kept or 0
+        closure.update(equations=kept, redundant=rest)
+    coordinates = len(robot.joint_names)
+    left = None if message else coordinates - borne
+    words = "unknown" if left is None else freedom_words(left, ())
+    return facts | {
+        "file": None if path is None else fspath(path),
+        "freedom": {"coordinates": coordinates, "equations": borne, "left": left, "words": words},
+        "assembly": {"status": "open" if message else "assembled", "message": message},
+        "ok": message is None,
+    }
+
+
+def _link(robot: Robot, name: str) -> dict[str, Any]:
+    inertia, frame = robot.links[name].inertia, robot.frames[name]
+    return {
+        "name": name,
+        "moves_with": robot.base if frame.body < 0 else robot.moving_links[frame.body],
+        "mass": None if inertia is None else float(inertia.mass),
+        "center_of_mass": None if inertia is None else inertia.center_of_mass.tolist(),
+        "inertia": None if inertia is None else inertia.tensor.tolist(),
+    }
+
+
+def _joint(joint: Joint) -> dict[str, Any]:
+    mimic = None if joint.mimic is None else dataclasses.asdict(joint.mimic)
+    return {
+        "name": joint.name,
+        "type": joint.type,
+        "parent": joint.parent,
+        "child": joint.child,
+        "axis": joint.axis.tolist() if joint.moving else None,
+        "unit": "rad" if joint.turning else "m" if joint.moving else None,
+        "limits": dataclasses.asdict(joint.limits) if joint.moving else None,
+        "mimic": mimic,
+        "armature": joint.armature,
+        "damping": joint.damping,
+        "friction": joint.friction,
+    }

@@ -1,0 +1,128 @@
+"""What is told of tolerances, as plain facts: how far each column spreads at most, and which parameter causes it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jounce.reporting.peaks import derivative_unit
+from jounce.reporting.text.tables import Table, number
+
+if TYPE_CHECKING:
+    import xarray
+
+Column = tuple[str, str, int]
+"""An output, a component or nothing, and a derivative."""
+
+
+def columns_of(spread: xarray.Dataset, wanted: Sequence[Column] | None) -> list[Column]:
+    """Return the columns that are meant, one for each component; all of the outputs unless some are wanted."""
+    outputs = [str(name) for name in spread.data_vars if f"{name}_peak" in spread.data_vars]
+    levels = [int(order) for order in spread["derivative"].values]
+    asked = [(name, "", order) for name in outputs for order in levels] if wanted is None else list(wanted)
+    found = []
+    for name, component, order in asked:
+        axes = [dim for dim in spread[name].dims if dim not in ("time", "derivative")]
+        labels = ["".join(map(str, x)) for x in itertools.product(*(spread[axis].values for axis in axes))]
+        found += [(name, label, order) for label in labels if component in ("", label)]
+    return list(dict.fromkeys(found))
+
+
+def spread_facts(spread: xarray.Dataset, columns: Sequence[Column]) -> dict[str, Any]:
+    """Return the facts of a spread."""
+    names = [str(name) for name in spread["parameter"].values]
+    deviations = dict(zip(names, spread["deviation"].values.tolist(), strict=True))
+    solved = spread["solved"].values.tolist() if "solved" in spread else None
+    rows = [_facts(spread, column, names) for column in columns]
+    return {"deviations": deviations, "solved": None if solved is None else min(solved), "spread": rows}
+
+
+def _facts(spread: Any, column: Column, names: Sequence[str]) -> dict[str, Any]:
+    """Return the facts of a column, at the instant at which it spreads most."""
+    name, component, order = column
+
+    def of(kind: str) -> np.ndarray | None:
+        return chosen(spread, f"{name}_{kind}", column) if f"{name}_{kind}" in spread else None
+
+    widest = of("std")
+    widest = of("linear_std") if widest is None else widest
+    at = 0 if widest is None or np.isnan(widest).all() else int(np.nanargmax(widest))
+    found: dict[str, Any] = {
+        "output": f"{name}_{component}" if component else name,
+        "derivative": order,
+        "unit": derivative_unit(spread[name].attrs["units"], order),
+        "at": float(spread["time"].values[at]),
+        "nominal": float(chosen(spread, name, column)[at]),
+    }
+    for kind in ("linear_std", "std", "low", "high"):
+        values = of(kind)
+        found[kind] = None if values is None else float(values[at])
+    for kind in ("peak", "peak_mean", "peak_std", "peak_low", "peak_high"):
+        values = of(kind)
+        found[kind] = None if values is None else float(values)
+    share = of("share")
+    found["share"] = None if share is None else dict(zip(names, share[:, at].tolist(), strict=True))
+    for kind in ("first_order", "total_order"):
+        values = of(f"peak_{kind}")
+        found[f"peak_{kind}"] = None if values is None else dict(zip(names, values.tolist(), strict=True))
+    return found
+
+
+def chosen(spread: xarray.Dataset, variable: str, column: Column) -> np.ndarray:
+    """Return what a variable holds of a column: numbers over time, for each parameter, or one."""
+    _, component, order = column
+    found = spread[variable].sel(derivative=order)
+    axes = [dim for dim in found.dims if dim not in ("time", "parameter")]
+    labels = ["".join(map(str, x)) for x in itertools.product(*(found[axis].values for axis in axes))]
+    kept = [dim for dim in ("parameter", "time") if dim in found.dims]
+    values = found.transpose(*axes, *kept).values
+    return np.asarray(values.reshape(-1, *values.shape[len(axes) :])[labels.index(component)])
+
+
+def spread_summary(facts: dict[str, Any], name: str, samples: int) -> str:
+    """Word what was varied, and how many designs were solved."""
+    parts = [f"{key} {number(value)}" for key, value in facts["deviations"].items()]
+    lines = [f"{name}: standard deviations (SI) {', '.join(parts)}"]
+    if samples:
+        solved = facts["solved"]
+        told = (
+            "all were solved"
+            if solved == samples
+            else f"at some instants only {solved} were solved, the rest is left out"
+        )
+        lines.append(f"  {samples} designs, of which {told}")
+    return "\n".join(lines)
+
+
+def spread_table(facts: dict[str, Any]) -> Table:
+    """Return a table of the widest spread of each column, and of what causes it."""
+    rows = []
+    for x in facts["spread"]:
+        numbers = [number(x[key]) for key in ("at", "nominal", "linear_std", "std", "low", "high")]
+        rows.append([x["output"], str(x["derivative"]), x["unit"], *numbers, _causes(x["share"])])
+    numbers = ("widest at t/s", "nominal", "std, linear", "std", "2.5 %", "97.5 %")
+    headings = ("output", "derivative", "unit", *numbers, "caused by")
+    return Table("", headings, rows, (1, 3, 4, 5, 6, 7, 8), True)
+
+
+def index_table(facts: dict[str, Any]) -> Table:
+    """Return a table of Sobol's indices of the peaks."""
+    rows = []
+    for x in facts["spread"]:
+        first, total = x["peak_first_order"], x["peak_total_order"]
+        told = [f"{name} {number(round(first[name], 4))} / {number(round(total[name], 4))}" for name in first]
+        rows.append([x["output"], str(x["derivative"]), number(x["peak"]), number(x["peak_std"]), ", ".join(told)])
+    return Table(
+        "Peaks", ("output", "derivative", "nominal", "std", "index of first order / total"), rows, (1, 2, 3), True
+    )
+
+
+def _causes(share: dict[str, float] | None) -> str:
+    """Word the parts of the variance, the largest first, those below a percent left out."""
+    if share is None:
+        return "-"
+    ordered = sorted(share.items(), key=lambda item: -item[1])
+    return ", ".join(f"{name} {100 * part:.0f} %" for name, part in ordered if part >= 0.005) or "-"

@@ -1,0 +1,1 @@
+"""Results of commands as JSON, and their schema."""

@@ -1,0 +1,135 @@
+"""Results of commands as JSON: SI units, null for what is not a number, keys that stay."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any
+
+from jounce.dynamics.limits.limit_report import LimitReport
+from jounce.dynamics.limits.motion_ends import TrajectoryEnd
+from jounce.dynamics.limits.trajectories import told_drives
+from jounce.errors import UNSET, JounceError, show_value
+from jounce.kinematics import Motion, Stretches
+from jounce.reporting.facts.mechanism_facts import grid_facts
+from jounce.reporting.facts.motion_facts import motion_facts
+from jounce.reporting.motion_ends import between_facts, ends_facts
+from jounce.reporting.peaks import Peak, peaks
+from jounce.trajectory import JointTrajectory
+
+if TYPE_CHECKING:
+    import xarray
+
+VERSION = 1
+"""Number of the form of the results; it grows where a key changes or goes."""
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON has it: None for numbers that are not finite, lists for arrays, text for paths.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> plain({"peak": np.float64("nan"), "at": np.array([1.0, 2.0])})
+    {'peak': None, 'at': [1.0, 2.0]}
+    """
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    if isinstance(value, bool) or value is None or isinstance(value, int | str):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return str(value) if isinstance(value, PurePath) else show_value(value, 200)
+
+
+def result_json(command: str, data: Mapping[str, Any]) -> str:
+    """Return the JSON text of the result of a command."""
+    from jounce.version import __version__
+
+    whole = {"jounce": __version__, "record": VERSION, "command": command, **plain(data)}
+    return json.dumps(whole, indent=1, allow_nan=False)
+
+
+def complaint(kind: str, problem: object) -> str:
+    """Return an error or a warning as JSON in one line: its kind, message, file, line, name and value."""
+    told: dict[str, Any] = {"kind": type(problem).__name__ if isinstance(problem, Exception) else "Error"}
+    cause = problem.args[0] if isinstance(problem, Exception) and problem.args else None
+    found = cause if isinstance(cause, JounceError) else problem
+    if isinstance(found, JounceError):
+        told["kind"] = type(found).__name__
+        value = None if found.value is UNSET else plain(found.value)
+        place = None if found.path is None else str(found.path)
+        told |= {"message": found.message, "file": place, "line": found.line, "name": found.name, "value": value}
+    else:
+        told |= {"message": str(found), "file": None, "line": None, "name": None, "value": None}
+    told["text"] = " ".join(str(found).split())
+    return json.dumps({kind: told}, allow_nan=False)
+
+
+def motion_result(motion: Motion | Stretches, file: Path, written: Path | None, refine: bool = True) -> dict[str, Any]:
+    """Return what `jounce run` and `jounce simulate` tell of a motion."""
+    told = [told_peak(peak) for peak in peaks(motion, refine=refine)]
+    return {"file": file, **motion_facts(motion), "peaks": told, "written": written}
+
+
+def told_peak(peak: Peak) -> dict[str, Any]:
+    """Return what is told of a peak, in SI."""
+    told = dataclasses.asdict(peak)
+    del told["size"]
+    return told
+
+
+def limits_result(
+    report: LimitReport, robot: Path, trajectory: Path, written: Path | None, motion: JointTrajectory | None = None
+) -> dict[str, Any]:
+    """Return what `jounce check` tells of a trajectory and the limits of a robot."""
+    names = {"worst": "value", "at": "time"}
+    keys = ("joint", "quantity", "unit", "worst", "limit", "ratio", "at", "broken")
+    return {
+        "robot": report.robot,
+        "file": robot,
+        "trajectory": trajectory,
+        "kept": report.kept,
+        "broken": len(report.broken),
+        "time": {"start": report.times[0], "stop": report.times[-1], "count": len(report.times)},
+        "held": dict(report.held),
+        "drives": report.drives,
+        "limits": [{key: getattr(row, names.get(key, key)) for key in keys} for row in report.rows],
+        "ends": ends_facts(report.ends),
+        "hand_over": report.hand_over,
+        "between": None if motion is None else between_facts(motion),
+        "written": written,
+    }
+
+
+def torques_result(
+    dataset: xarray.Dataset,
+    found: Iterable[Peak],
+    motion: JointTrajectory,
+    ends: Sequence[TrajectoryEnd],
+    files: tuple[Path, Path],
+    written: Path | None,
+) -> dict[str, Any]:
+    """Return what `jounce torques` tells of a robot on a trajectory."""
+    (robot, trajectory), times = files, dataset["time"].values
+    told = [told_peak(peak) for peak in found]
+    return {
+        "robot": dataset.attrs["title"],
+        "file": robot,
+        "trajectory": trajectory,
+        "rates": dataset.sizes["derivative"] - 1,
+        "time": grid_facts(times),
+        "held": [name for name in dataset.data_vars if name not in motion.names],
+        "drives": dataset.attrs["drives"] == told_drives(True),
+        "peaks": [{"joint": peak.pop("output"), **peak} for peak in told],
+        "ends": ends_facts(ends),
+        "between": between_facts(motion),
+        "written": written,
+    }

@@ -1,0 +1,204 @@
+"""Facts in words: of mechanisms, robots and motions, and of a trajectory and the limits of a robot."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jounce.dynamics.limits.limit_report import LimitReport
+from jounce.dynamics.limits.motion_ends import TrajectoryEnd
+from jounce.dynamics.limits.trajectories import told_drives
+from jounce.mechanism.time import last_step_words
+from jounce.reporting.motion_ends import between_words, breaks_words, ends_words
+from jounce.reporting.text.law_facts import law_words
+from jounce.trajectory import JointTrajectory
+
+if TYPE_CHECKING:
+    import xarray
+
+Facts = Mapping[str, Any]
+"""Plain data, by the keys of a kind of facts."""
+
+
+def motion_summary(facts: Facts, file: str) -> str:
+    """Word what was solved or simulated: bodies, degrees of freedom, instants, and how well energy was kept."""
+    time, title = facts["time"], facts["title"] or file
+    span = f"t = {time['start']:g} s" if time["count"] == 1 else f"from t = {time['start']:g} s to {time['stop']:g} s"
+    solved = time["solved"] == time["count"]
+    instants = count(time["count"], "instant") if solved else f"{time['solved']} of {time['count']} instants"
+    bodies = count(len(facts["bodies"]), "moving body", "moving bodies")
+    joints = count(len(facts["joints"]), "joint")
+    order = f"derivatives to order {facts['order']}"
+    if "steps" in facts:
+        head = f"{facts['space']}: {bodies}, {joints}, {count(len(facts['forces']), 'force')}"
+        taken = f"{instants} {span} in {count(facts['steps'], 'step')}, {order}"
+        lines = [title, head, facts["mobility"], taken, *_kept(facts), *facts["remarks"]]
+        return "\n".join(wrapped(line) for line in lines)
+    equations, drives = facts["equations_of_joints"], facts["equations_of_drivers"]
+    bodies, joints = f"{bodies} ({facts['coordinates']} coordinates)", f"{joints} ({count(equations, 'equation')})"
+    lines = [title, f"{facts['space']}: {bodies}, {joints}", freedom_words(drives, facts["drivers"])]
+    lines.append(f"{instants} {span}, {order}")
+    if facts["change_points"]:
+        passed = ", ".join(f"{t:g} s" for t in facts["change_points"][:6])
+        more = ", ..." if len(facts["change_points"]) > 6 else ""
+        lines.append(f"passes a change point, where another motion could branch off, at t = {passed}{more}")
+    lines += [wrapped(remark) for remark in facts["remarks"]]
+    return "\n".join(lines)
+
+
+def _kept(facts: Facts) -> list[str]:
+    """Word how well a simulation kept energy and constraints."""
+    if not facts["time"]["solved"]:
+        return []
+    energy, kinks = facts["energy"], facts["kinks"]
+    change, size = energy["largest_change"], energy["largest_kinetic"]
+    share = f", {change / size:.1e} of the largest kinetic energy" if size else ""
+    lines = [f"energy: {energy['start']:.9g} J at the start; it changes by {change:.2g} J{share}"]
+    if facts["drivers"] or facts["forces"]:
+        lines.append("(drivers, actuators and dampers change it)")
+    if kinks:
+        names = ", ".join(dict.fromkeys(kink["name"] for kink in kinks))
+        found = count(len(kinks), "kink or jump", "kinks or jumps")
+        lines.append(f"{found}: {names}, the first at t = {kinks[0]['time']:.6g} s; no derivatives there")
+    lines.append(f"constraint drift: {facts['drift']:.1e} (rad, or sizes of the mechanism)")
+    return lines
+
+
+def freedom_words(freedom: int, drivers: Iterable[str]) -> str:
+    """Word degrees of freedom and what drives them."""
+    words, names = count(freedom, "degree of freedom", "degrees of freedom"), ", ".join(drivers)
+    return f"{words}, driven by {names}" if names else words
+
+
+def start_summary(facts: Facts) -> str:
+    """Word how many degrees of freedom a mechanism or a robot has, and whether a motion can start."""
+    return "\n".join(_mechanism_start(facts) if facts["kind"] == "mechanism" else _robot_start(facts))
+
+
+def start_heading(facts: Facts) -> str:
+    """Word what a file holds."""
+    freedom = facts["freedom"]["words"]
+    if facts["kind"] == "mechanism":
+        return f"{facts['title'] or facts['file']}\n{facts['space']} mechanism: {freedom}"
+    return f"{facts['title']}\nrobot on {facts['base']}: {freedom}, {facts['mass']:.6g} kg"
+
+
+def _mechanism_start(facts: Facts) -> list[str]:
+    freedom, assembly, time = facts["freedom"], facts["assembly"], facts["time"]
+    bodies = count(len(facts["bodies"]), "moving body", "moving bodies")
+    lines = [
+        "Degrees of freedom",
+        f"  {bodies}: {count(freedom['coordinates'], 'coordinate')}",
+        f"  joints: {count(freedom['equations'] - freedom['of_drivers'], 'equation')}"
+        f"; drivers: {count(freedom['of_drivers'], 'equation')}; independent: {freedom['independent']}",
+    ]
+    for repeated in freedom["repeated"]:
+        equations = count(repeated["equations"], "equation")
+        lines.append(f"  {repeated['kind']} {repeated['name']} repeats {equations} of {', '.join(repeated['of'])}")
+    if (mobility := facts["mobility"]) is not None:
+        if mobility["order"] is not None:
+            lines.append(f"  with drivers released: {mobility['count']} by count, {mobility['instantaneous']} by rank")
+        lines.append(f"  {mobility['words']}")
+    if freedom["left"]:
+        lines.append(f"  left to move: {freedom['left']}, with which {', '.join(freedom['moving'])} can move")
+    assembled = assembly["status"] == "assembled"
+    lines += ["", "Start", f"  put together at t = {assembly['at']:g} s" if assembled else f"  {assembly['message']}"]
+    if time is not None:
+        lines.append(f"  time: {count(time['count'], 'instant')} from {time['start']:g} s to {time['stop']:g} s")
+        lines += [f"  {time['remark']}"] if "remark" in time else []
+    else:
+        lines.append("  no time grid is given")
+    lines += [f"  {line}" for line in (*law_words(facts["laws"]), *facts["remarks"])]
+    if freedom["message"] and facts["ok"] and freedom["left"]:
+        lines.append("  it has degrees of freedom left: jounce simulate moves it by its forces")
+    elif freedom["message"]:
+        lines.append(f"  {freedom['message']}")
+    elif facts["ok"]:
+        lines.append("  all motion is prescribed: jounce run solves it")
+    return lines
+
+
+def _robot_start(facts: Facts) -> list[str]:
+    freedom, message = facts["freedom"], facts["assembly"]["message"]
+    lines = ["Degrees of freedom", f"  {count(freedom['coordinates'], 'moving joint')} that follow no other"]
+    if facts["closures"] and facts["ok"]:
+        lines.append(f"  loops: {count(freedom['equations'], 'independent equation')}; left: {freedom['left']}")
+    return lines + ([f"  {message}"] if message else [])
+
+
+def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, trajectory: Path) -> str:
+    """Word what was compared, which joints stand still, and what has no limits."""
+    moved = count(len(motion.names), "moving joint")
+    lines = [
+        f"{report.robot}: {moved} ({robot.name}, {trajectory.name})",
+        f"t = {motion.start:g} s to {motion.stop:g} s, {len(report.times)} instants and the peaks between them",
+    ]
+    lines += filter(None, [last_step_words(motion.times)])
+    if report.held:
+        units = {row.joint: "m" if row.unit == "N" else "rad" for row in report.rows if row.unit in ("N", "N m")}
+        held = [f"{name} at {value:.6g} {units[name]}" for name, value in report.held.items()]
+        lines.append(f"not in the trajectory, held still: {', '.join(held)}")
+    if any(row.unit.startswith("N") for row in report.limited):
+        lines.append(f"torques: {told_drives(report.drives)}")
+    free: dict[str, list[str]] = {}
+    for row in report.rows:
+        if row.ratio is None:
+            free.setdefault(row.quantity, []).append(row.joint)
+    if free:
+        limited = {row.quantity for row in report.limited}
+        told = [f"{word} of {', '.join(names)}" if word in limited else word for word, names in free.items()]
+        lines.append(f"without a limit: {', '.join(told)}")
+    lines += [*between_words(motion), *ends_words(report.ends)]
+    return "\n".join(wrapped(line) for line in lines)
+
+
+def torques_summary(
+    dataset: xarray.Dataset, motion: JointTrajectory, ends: Sequence[TrajectoryEnd], robot: Path, trajectory: Path
+) -> str:
+    """Word of which joints torques were computed, when, which stand still, and what is met at the ends."""
+    rates, instants = dataset.sizes["derivative"] - 1, dataset["time"].values
+    told = f", with {count(rates, 'rate')}" if rates else ""
+    lines = [
+        f"{dataset.attrs['title']}: torques of {count(len(dataset.data_vars), 'moving joint')}{told} "
+        f"({robot.name}, {trajectory.name})",
+        f"t = {instants[0]:g} s to {instants[-1]:g} s, {count(len(instants), 'instant')}",
+    ]
+    lines.append(f"torques: {dataset.attrs['drives']}")
+    lines += filter(None, [last_step_words(instants)])
+    still = [str(name) for name in dataset.data_vars if name not in motion.names]
+    if still:
+        lines.append(f"not in the trajectory, held still: {', '.join(still)}")
+    lines += [*between_words(motion), *ends_words(ends)]
+    return "\n".join(wrapped(line) for line in lines)
+
+
+def verdict(report: LimitReport) -> str:
+    """Word whether the limits are kept, and the place that is nearest to breaking one or breaks one most."""
+    number, worst = len(report.limited), report.worst
+    assert worst is not None
+    size = "infinite by a jump" if worst.infinite else f"{worst.ratio:.4g} of its limit"
+    place = f"{worst.joint} {worst.quantity}, {size} at t = {worst.time:.5g} s"
+    ends = [] if report.hand_over else breaks_words(report.ends)
+    if report.kept:
+        return f"All limits kept ({number}).\nClosest: {place}"
+    if report.broken:
+        return "\n".join([f"{len(report.broken)} of {count(number, 'limit')} broken.\nWorst: {place}", *ends])
+    told = [f"Limits broken at the ends, not within the motion ({number}). Closest there: {place}", *ends]
+    hint = "If the robot moves before the start and after the stop, say so with --hand-over."
+    return "\n".join([*map(wrapped, told), hint])
+
+
+def wrapped(line: str) -> str:
+    """Break a long line after commas and colons only."""
+    import textwrap
+
+    glued = re.sub("(?<![,:]) ", "\0", line)
+    broken = textwrap.fill(glued, 80, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    return broken.replace("\0", " ")
+
+
+def count(number: int, noun: str, plural: str = "") -> str:
+    """Word a number of things."""
+    return f"{number} {noun if number == 1 else plural or f'{noun}s'}"

@@ -1,0 +1,159 @@
+"""Tables of what is told of mechanisms, motions and robots: cells of text, whatever shows them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+from jounce.dynamics.limits.limit_report import LimitReport
+from jounce.reporting.peaks import Peak
+from jounce.reporting.text.summaries import Facts
+
+
+@dataclasses.dataclass(frozen=True)
+class Table:
+    """Cells of a table, as text.
+
+    Parameters
+    ----------
+    title : str
+        May be empty.
+    headings : sequence of str
+    rows : sequence of sequences of str
+    numbers : sequence of int
+        Columns that are aligned to the right.
+    grouped : bool, default False
+        Whether rows with the same first cell, one below the other, belong together.
+    marks : sequence of sequences of int
+        Columns of each row whose cells stand out; none where it is empty.
+    markable : sequence of int
+        Columns in which marks can be.
+    meaning : str
+        What a mark means.
+    """
+
+    title: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    numbers: Sequence[int] = ()
+    grouped: bool = False
+    marks: Sequence[Sequence[int]] = ()
+    markable: Sequence[int] = ()
+    meaning: str = ""
+
+
+def table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> Table:
+    """Return a table without the columns that are empty throughout."""
+    kept = [k for k in range(len(headings)) if any(row[k] for row in rows)] or [0]
+    aligned = [k for k, column in enumerate(kept) if column in numbers]
+    return Table(title, [headings[k] for k in kept], [[row[k] for k in kept] for row in rows], aligned)
+
+
+def mechanism_tables(facts: Facts, bodies: Table) -> list[Table]:
+    """Return parameters, bodies, elements and outputs of a mechanism."""
+    parameters = [[p["name"], f"{p['value']:.9g}", p["unit"] or "", p["written"] or ""] for p in facts["parameters"]]
+    found = [table("Parameters (SI)", ("name", "value", "unit", "as written"), parameters, (1,)), bodies]
+    for section, title in (("joints", "Joints"), ("drivers", "Drivers"), ("initial", "Initial conditions")):
+        rows = [
+            [x["name"], x["type"], ", ".join(x["bodies"]), str(x.get("rows", "")), x.get("motion", "")]
+            for x in facts[section]
+        ]
+        found.append(table(title, (section.rstrip("s"), "type", "bodies", "equations", "motion"), rows, (3,)))
+    forces = [[x["name"], x["type"], ", ".join(x["bodies"]), x.get("law", "")] for x in facts["forces"]]
+    outputs = [[x["name"], x["quantity"], ", ".join(x["of"]), x["unit"]] for x in facts["outputs"]]
+    found.append(table("Forces", ("force", "type", "bodies", "law"), forces))
+    found.append(table("Outputs", ("output", "quantity", "of", "unit"), outputs))
+    return [each for each in found if each.rows]
+
+
+def bodies_table(facts: Facts) -> Table:
+    """Return the bodies of a mechanism that was inspected."""
+    angle = "angle" if facts["space"] == "planar" else "quaternion"
+    rows = []
+    for body in facts["bodies"]:
+        pose, moved, by = body["pose"] or body["guess"], body["moved"], "-"
+        turned = [pose[angle]] if angle == "angle" else pose[angle]
+        if moved is not None:
+            by = f"{_rounded(moved['distance']):.3g} m, {_rounded(math.degrees(moved['angle'])):.3g} deg"
+        rows.append([body["name"], number(body["mass"]), vector(pose["position"]), vector(turned), by])
+    placed = "put together" if facts["assembly"]["status"] == "assembled" else "as guessed"
+    title = f"Bodies, {placed}, at t = {facts['assembly']['at']:g} s"
+    return table(title, ("body", "mass/kg", "position/m", "angle/rad" if angle == "angle" else angle, "moved by"), rows)
+
+
+def robot_tables(facts: Facts) -> list[Table]:
+    """Return the joints, links and closures of a robot."""
+    moving, fixed = [], []
+    for joint in facts["joints"]:
+        links = f"{joint['parent']} > {joint['child']}"
+        if joint["limits"] is None:
+            fixed.append([joint["name"], links])
+            continue
+        limits, mimic = joint["limits"], joint["mimic"]
+        free = limits["lower"] is None and limits["upper"] is None
+        span = "-" if free else f"{number(limits['lower'])} to {number(limits['upper'])} {joint['unit']}"
+        follows = f"{mimic['joint']} x {mimic['multiplier']:g}" if mimic else ""
+        most = [number(limits[key]) for key in ("velocity", "effort")]
+        moving.append([joint["name"], joint["type"], links, span, *most, follows])
+    headings = ("joint", "type", "links", "range", "velocity", "effort", "follows")
+    links = []
+    for link in facts["links"]:
+        holder = "" if link["moves_with"] == link["name"] else link["moves_with"]
+        links.append([link["name"], number(link["mass"]), vector(link["center_of_mass"]), holder])
+    closures = [
+        [x["name"], x["type"], ", ".join(x["links"]), *(_count(x, key) for key in ("equations", "redundant"))]
+        for x in facts["closures"]
+    ]
+    found = [
+        table("Moving joints (rad, m, N m, N)", headings, moving, (4, 5)),
+        table("Fixed joints", ("joint", "links"), fixed),
+        table("Links", ("link", "mass/kg", "centre of mass/m", "fixed to"), links, (1,)),
+        table("Loops closed by", ("closure", "type", "links", "equations", "redundant"), closures, (3, 4)),
+    ]
+    return [each for each in found if each.rows]
+
+
+def _count(closure: Facts, key: str) -> str:
+    found = closure.get(key, "")
+    return "-" if found is None else str(found)
+
+
+def peaks_table(found: Sequence[Peak]) -> Table:
+    """Return peak values with their times; the largest magnitudes stand out."""
+    latest = max((abs(at) for p in found for at in (p.minimum_at, p.maximum_at) if math.isfinite(at)), default=1.0)
+    decimals = 3 - math.floor(math.log10(latest or 1.0))  # of times: a table is read, not computed with
+    rows = []
+    for peak in found:
+        early, late = (x if float(f"{x:.3g}") == x else round(x, decimals) for x in (peak.minimum_at, peak.maximum_at))
+        low, high = peak.shown
+        rows.append([peak.output, peak.derivative, peak.unit, *map(number, (low, early, high, late))])
+    marks = [[k for k, largest in zip((3, 5), peak.largest, strict=True) if largest] for peak in found]
+    headings = ("output", "derivative", "unit", "minimum", "at t/s", "maximum", "at t/s")
+    return Table("", headings, rows, (3, 4, 5, 6), True, marks, (3, 5), "largest magnitude")
+
+
+def limits_table(report: LimitReport) -> Table:
+    """Return the worst instant of each joint and quantity that has a limit; broken limits stand out."""
+    rows = [
+        [row.joint, row.quantity, row.unit, "infinite" if row.infinite else number(row.value), number(row.limit or 0.0),
+         f"{row.ratio or 0.0:.4f}", f"{row.time:.5g}"]
+        for row in report.limited
+    ]  # fmt: skip
+    marks = [[5] if row.broken else [] for row in report.limited]
+    headings = ("joint", "quantity", "unit", "worst", "limit", "ratio", "at t/s")
+    return Table("", headings, rows, (3, 4, 5, 6), True, marks, (5,), "broken" if any(marks) else "")
+
+
+def number(value: float | None) -> str:
+    """Word a number that is read, not computed with; a dash where there is none."""
+    return "-" if value is None or not math.isfinite(value) else f"{value:.6g}"
+
+
+def vector(values: Sequence[float] | None) -> str:
+    """Word the components of a vector."""
+    return "-" if values is None else ", ".join(f"{_rounded(x):.5g}" for x in values)
+
+
+def _rounded(value: float) -> float:
+    return 0.0 if abs(value) < 5e-13 else value

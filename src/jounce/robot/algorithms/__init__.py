@@ -1,0 +1,1 @@
+"""What is computed of a robot with its joint coordinates: torques, accelerations, Jacobians."""

@@ -1,0 +1,111 @@
+"""The motion of a base that moves freely: a pose without singular orientation, and velocities in its own axes."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
+
+from jounce.errors import RobotError
+from jounce.jet import Jet, cross
+from jounce.jet.algebra import stacked
+from jounce.rigid.inertia import Inertia
+from jounce.rigid.spatial import body_axes
+from jounce.robot.model.abstract_robot import AbstractRobot
+from jounce.robot.model.arguments import floats
+from jounce.robot.recursions.tree_equations import BaseBody
+from jounce.shapes import Numbers
+
+UNIT = 1e-6  # by which the length of a quaternion may differ from one: rounding of files; it is then divided by it
+TwistSeries = Float[Numbers, "levels 6 batch"]
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
+class BaseMotion:
+    """Where a free base is and how it moves, with derivatives of any order.
+
+    Parameters
+    ----------
+    position : array_like of shape (..., 3)
+        Of the origin of the base link, in the axes of the scene, m.
+    quaternion : array_like of shape (..., 4)
+        Unit Euler parameters ``[e0, e1, e2, e3]``, scalar first, from the base to the scene.
+    twist : array_like of shape (..., levels, 6)
+        Velocity of that origin, m/s, then angular velocity, rad/s, in the axes of the base, and the time derivatives of
+        these components. The first of them is not the acceleration: that is ``v' + w x v``.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.BaseMotion([0, 0, 0.3], [1, 0, 0, 0], [[0.1, 0, 0, 0, 0, 2.0]]).twist
+    [[0.1, 0, 0, 0, 0, 2.0]]
+    """
+
+    position: Any
+    quaternion: Any
+    twist: Any
+
+
+def base_arrays(base: BaseMotion, lead: tuple[int, ...], levels: int) -> tuple[Any, Any]:
+    """Return pose, (..., 1, 7), and twist, (..., levels, 6), of a base, checked.
+
+    Raises
+    ------
+    RobotError
+        If shapes do not fit the samples, or a quaternion has no unit length.
+    """
+    if not isinstance(base, BaseMotion):
+        raise RobotError("must be a jn.BaseMotion", name="base", value=type(base).__name__)
+    parts = []
+    for name, shape in (("position", (3,)), ("quaternion", (4,)), ("twist", (levels, 6))):
+        array = floats(f"base.{name}", getattr(base, name))
+        if name == "twist" and array.ndim == len(lead) + 2 and array.shape[-2] > levels:
+            array = array[..., :levels, :]
+        if array.shape != (*lead, *shape):
+            message = f"must have the shape {(*lead, *shape)}, as the coordinates have, not {array.shape}"
+            raise RobotError(message, name=f"base.{name}")
+        parts.append(array)
+    position, quaternion, twist = parts
+    library = jnp if any(isinstance(x, jax.Array) for x in parts) else np
+    length = library.sqrt(library.sum(quaternion * quaternion, axis=-1, keepdims=True))
+    if not isinstance(length, Tracer) and (far := np.abs(np.asarray(length) - 1)).size and far.max() > UNIT:
+        value = float(np.ravel(length)[far.argmax()])
+        raise RobotError("must be of unit length, scalar first; its length is", name="base.quaternion", value=value)
+    return library.concatenate([position, quaternion / length], axis=-1)[..., None, :], twist
+
+
+def base_body(robot: AbstractRobot) -> BaseBody:
+    """Return the inertia of the base; it may have none, as where a massless frame carries the robot."""
+    inertia = robot.base_inertia or Inertia(0.0, strict=False)
+    mass = inertia.mass if isinstance(inertia.mass, Tracer) else np.float64(inertia.mass)
+    return BaseBody(mass, inertia.center_of_mass, inertia.tensor)
+
+
+def scene_axes(quaternion: Float[Numbers, "4 batch"], twist: TwistSeries) -> tuple[Jet, Jet, Jet]:
+    """Return the axes of the scene as vectors in the axes of the base: ``u' = -w x u``, to one order more."""
+    still = body_axes(quaternion)
+    found = []
+    for i in range(3):
+        axis = Jet([jnp.stack([column[i] for column in still])])
+        for k in range(len(twist)):
+            turned = cross(axis, Jet(tuple(twist[: k + 1, 3:])))
+            axis = axis.append(turned.dense().coefficients[k] / (k + 1))
+        found.append(axis)
+    return found[0], found[1], found[2]
+
+
+def in_base(axes: tuple[Jet, Jet, Jet], vector: Jet | Numbers) -> Jet:
+    """Return a vector in the axes of the base, from its components in those of the scene."""
+    parts = [vector[i : i + 1] for i in range(3)]
+    found = axes[0] * parts[0] + axes[1] * parts[1] + axes[2] * parts[2]
+    return found.dense()
+
+
+def falling(axes: tuple[Jet, Jet, Jet], gravity: Numbers, levels: int) -> Float[Numbers, "level 3 batch"]:
+    """Return the velocity, zero now, of a base that accelerates against gravity, in its axes, (levels, 3, batch)."""
+    against = stacked(in_base(axes, -jnp.asarray(gravity)[:, None]))[: levels - 1]
+    return jnp.concatenate([jnp.zeros_like(against[:1]), against])

@@ -1,0 +1,244 @@
+"""Motion of a robot from torques: accelerations and their rates to any order."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, overload
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import RobotError, SingularityError, check_name, flag
+from jounce.robot.algorithms.base_motion import BaseMotion, base_arrays, base_body
+from jounce.robot.algorithms.motion_series import MotionSeries, motion_series
+from jounce.robot.algorithms.wrenches import Wrench, wrench_arrays
+from jounce.robot.model.arguments import checked_state, floats, joints_of
+from jounce.robot.model.tree import Tree
+from jounce.robot.recursions.articulated_bodies import LEAST_INERTIA
+from jounce.robot.recursions.batches import Batched
+from jounce.robot.recursions.kinematics import place_of
+from jounce.robot.recursions.tree_equations import TreeEquations, Unknowns, free_base
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike, Numbers, is_traced
+
+MOST_UNROLLED = 5  # orders, each with code of its own
+WIDE = 32  # samples side by side where there are rates: their histories shall stay in the cache
+
+
+@overload
+def forward_dynamics(
+    robot: Robot,
+    state: ArrayLike,
+    tau: ArrayLike,
+    *,
+    driven: Sequence[str] = (),
+    wrenches: Sequence[Wrench] = (),
+    time: ArrayLike | None = None,
+    drives: bool = True,
+    base: None = None,
+    strict: bool = True,
+) -> Float[Numbers, "*batch derivative joint"]: ...
+@overload
+def forward_dynamics(
+    robot: Robot,
+    state: ArrayLike,
+    tau: ArrayLike,
+    *,
+    driven: Sequence[str] = (),
+    wrenches: Sequence[Wrench] = (),
+    time: ArrayLike | None = None,
+    drives: bool = True,
+    base: BaseMotion,
+    strict: bool = True,
+) -> tuple[BaseMotion, Float[Numbers, "*batch derivative joint"]]: ...
+def forward_dynamics(
+    robot: Robot,
+    state: ArrayLike,
+    tau: ArrayLike,
+    *,
+    driven: Sequence[str] = (),
+    wrenches: Sequence[Wrench] = (),
+    time: ArrayLike | None = None,
+    drives: bool = True,
+    base: BaseMotion | None = None,
+    strict: bool = True,
+) -> Float[Numbers, "*batch derivative joint"] | tuple[BaseMotion, Float[Numbers, "*batch derivative joint"]]:
+    """Return the motion that joint torques or forces cause, to any order: the inverse of `inverse_dynamics`.
+
+    Articulated bodies (Featherstone 2008, Rigid Body Dynamics Algorithms, chapter 7), in a time linear in the number of
+    joints; their inertias are made once and serve all orders. Where joints follow others, a dense mass matrix does.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with what it holds (`Robot.with_payload`) and the gravity that it feels.
+    state : array_like of shape (..., 2, n)
+        Coordinates and velocities in the order of `robot.joint_names`, rad or m, by s.
+    tau : array_like of shape (..., order + 1, n)
+        Torques or forces ``tau, tau', ...`` in N m or N, by s. In the columns of driven joints: their accelerations
+        ``q'', q''', ...``. With `base` also of shape (..., order + 1, 6 + n), as `inverse_dynamics` gives it: the force
+        on the base and the moment about its origin, in its axes, come first.
+    driven : sequence of str, optional
+        Joints that move as told, whatever it takes; `inverse_dynamics` of the result gives their torques.
+    wrenches : sequence of Wrench, optional
+        Forces and torques from outside; arrays of them hold order + 1 levels.
+    time : array_like of shape (...), optional
+        Instants of the samples, s; needed where a wrench is a function of time.
+    drives : bool, default True
+        Let the drives count: armature inertia, viscous damping and Coulomb friction of the joints. Friction has the
+        sign of the velocity and is zero at rest.
+    base : BaseMotion, optional
+        Where a free base is and how it moves, with its twist alone; the base is fixed unless given.
+    strict : bool, default True
+        Raise where nothing resists a joint; otherwise such samples are NaN.
+
+    Returns
+    -------
+    array of shape (..., order + 3, n)
+        ``q, q', q'', ...`` to the derivative order + 2, rad or m, by s.
+    base : BaseMotion
+        Only with `base`, and first then: with the rates of its twist to the order order + 1.
+
+    Raises
+    ------
+    RobotError
+        If an argument does not fit the robot, or the robot has closed loops: `jounce.simulate` and
+        `jounce.constraint_equations` take the mechanism that it is (`Robot.mechanism`).
+    SingularityError
+        If a joint moves no inertia, so that nothing determines its acceleration (with `strict`).
+
+    Notes
+    -----
+    Derivatives of free motion grow fast with the order, and rounding with them: the torques that `inverse_dynamics`
+    gives back agree to rounding with the largest term in them, the inertia times the highest derivative.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
+    >>> pendulum = jn.Robot("pendulum", [jn.Link("base"), jn.Link("rod", rod)], [pin])
+    >>> state = [[0.0], [1.0]]
+    >>> jn.forward_dynamics(pendulum, state, [[5.905], [2.0]]).round(12).tolist()  # torque and torque rate
+    [[0.0], [1.0], [3.0], [6.0]]
+    """
+    joints_of(robot)
+    if robot.closures:
+        message = (
+            "the loops of this robot make its coordinates depend on one another; jn.simulate(robot.mechanism(...)) "
+            "gives its motion under forces, robot.opened() the tree without closures"
+        )
+        raise RobotError(message, name=robot.name, value=list(robot.closures))
+    drives, strict = flag("drives", drives, error=RobotError), flag("strict", strict, error=RobotError)
+    state = checked_state(robot, state)
+    forces, at_base = _checked_forces(robot, tau, state.shape[:-2], base is not None)
+    lead, levels, count = state.shape[:-2], forces.shape[-2], len(robot.joint_names)
+    mask = np.zeros(count)
+    for name in (driven,) if isinstance(driven, str) else driven:
+        check_name("moving joint", name, robot.joint_names, RobotError, name="driven")
+        mask[robot.joint_names.index(name)] = 1.0
+    pushes = wrench_arrays(robot, wrenches, lead, levels, time, free=base is not None)
+    places = tuple(place_of(robot, wrench.link, wrench.point) for wrench in wrenches)
+    moved = () if base is None else (*base_arrays(base, lead, 1), at_base)
+    arrays = (state, forces, *moved, *pushes)
+    constants = (mask, places, None if base is None else base_body(robot))
+    traced = is_traced((arrays, robot.tree, constants))
+    static = (tuple(wrench.frame == "base" for wrench in wrenches), drives, traced)
+    q, margin, *found = _moved(robot, arrays, constants, static)
+    if strict and not traced:
+        _check_margins(robot, margin, mask)
+    return q if base is None else (BaseMotion(base.position, base.quaternion, found[0]), q)
+
+
+def _checked_forces(robot: Robot, tau: Any, lead: tuple[int, ...], free: bool) -> tuple[Any, Any]:
+    """Return the forces of the joints, and those on a free base, of the same number of levels."""
+    tau, n = floats("tau", tau), len(robot.joint_names)
+    columns = (n, 6 + n) if free else (n,)
+    if tau.ndim != len(lead) + 2 or tau.shape[:-2] != lead or tau.shape[-1] not in columns or not tau.shape[-2]:
+        wanted = " or ".join(f"({', '.join([*map(str, lead), 'order + 1', str(c)])})" for c in columns)
+        raise RobotError(f"must have the shape {wanted}, as the state has, not {tau.shape}", name="tau")
+    if tau.shape[-1] == n:
+        return tau, np.zeros((*tau.shape[:-1], 6))
+    return tau[..., 6:], tau[..., :6]
+
+
+@Batched
+def _moved(
+    tree: Tree,
+    arrays: tuple[Any, ...],
+    constants: Any,
+    global_axes: tuple[bool, ...],
+    drives: bool,
+    reversible: bool,
+) -> Any:
+    """Return coordinates, margins of the joints and the twist of the base, as Taylor coefficients."""
+    driven, places, body = constants
+    equations = TreeEquations(tree, driven, body, places, global_axes, drives)
+    levels, lanes = len(arrays[1]), arrays[0].shape[-1]
+
+    def found(arrays: tuple[Any, ...]) -> Any:
+        return _coefficients(equations, arrays, reversible)
+
+    if levels == 1 or lanes % WIDE or lanes == WIDE:
+        return found(arrays)
+    parts = tuple(jnp.moveaxis(x.reshape(*x.shape[:-1], lanes // WIDE, WIDE), -2, 0) for x in arrays)
+    whole = jax.lax.map(found, parts)
+    return jax.tree.map(lambda x: jnp.moveaxis(x, 0, -2).reshape(*x.shape[1:-1], lanes), whole)
+
+
+def _coefficients(equations: TreeEquations, arrays: tuple[Any, ...], reversible: bool) -> Any:
+    state, forces, *rest = arrays
+    free = equations.base is not None
+    base = free_base(rest[0][0, :3], rest[0][0, 3:], rest[1][0]) if free else None
+    at_base, pushes = (rest[2], tuple(rest[3:])) if free else (None, tuple(rest))
+    mask = jnp.asarray(equations.driven)[None, :, None]
+    driven = mask * forces
+
+    def applied(_: Any, given: Any) -> Any:
+        forces, at_base, pushes = given
+        return Unknowns(forces, at_base), pushes
+
+    order = len(forces) - 1
+    # forces of driven joints are what they have to be: nothing is missing there
+    given = ((1.0 - mask) * forces, at_base, pushes)
+    # one sample, of whose program machine code is made: that of long histories is too long
+    alone = state.shape[-1] == 1 and not reversible and len(forces) <= MOST_UNROLLED
+    motion = equations.motion(state[0], state[1], base)
+    series = motion_series(equations, motion, applied, given, driven, order, reversible=reversible, unrolled=alone)
+    q, margin = coordinates_of(series, order), series.factor.margin[None]
+    moved, rates = series.motion.base, series.accelerations.base
+    if moved is None or rates is None:
+        return q, margin
+    twist, last = moved.twist, rates[order:] / (order + 1)
+    return q, margin, jnp.concatenate([twist[: order + 1], last])
+
+
+def coordinates_of(series: MotionSeries, order: int) -> Float[Numbers, "level coordinate batch"]:
+    """Return the coefficients of the coordinates, two more than those of the accelerations."""
+    last = series.accelerations.joints[order:] / ((order + 1) * (order + 2))
+    return jnp.concatenate([series.motion.coordinates[: order + 2], last])
+
+
+def _check_margins(robot: Robot, margin: Any, driven: np.ndarray) -> None:
+    """Raise SingularityError, by name, where nothing resists a joint."""
+    margin = np.reshape(margin, (math.prod(margin.shape[:-1]), margin.shape[-1]))  # a lone body has no joints
+    free = np.ones(margin.shape[1])
+    if robot.tree.shape.direct:
+        free[: len(driven)] = 1.0 - driven
+    bad = ~(margin > LEAST_INERTIA) & (free > 0)
+    if not bad.any():
+        return
+    sample = int(np.argwhere(bad)[0, 0])
+    where = f" at sample {sample}" if len(margin) > 1 else ""
+    names = [joint.name for joint in robot.moving_joints] if robot.tree.shape.direct else []
+    joints = np.flatnonzero(bad[sample, : len(names)])
+    if not joints.size:
+        message = f"some motion of the joints or of the free base has no inertia{where}: it has no acceleration"
+        raise SingularityError(f"{message}; give the links and the base inertias", name=robot.name)
+    message = (
+        f"the bodies that this joint moves have no inertia about its axis{where}, so that its acceleration is not "
+        "determined; give the link an inertia, or the joint an armature, or drive it"
+    )
+    # the outermost one: what carries it is not known there either
+    raise SingularityError(message, name=names[int(joints[-1])])

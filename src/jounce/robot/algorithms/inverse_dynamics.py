@@ -1,0 +1,217 @@
+"""Torques of a prescribed motion and the wrenches that its joints carry, with their rates, to any order."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import RobotError, check_choice, flag
+from jounce.jet import Jet, concatenate, cross, matvec
+from jounce.jet.algebra import stacked, total
+from jounce.robot.algorithms.base_motion import BaseMotion, base_arrays, base_body, falling, scene_axes
+from jounce.robot.algorithms.equations_of_motion import drive_forces
+from jounce.robot.algorithms.wrenches import FRAMES, Wrench, wrench_arrays
+from jounce.robot.model.arguments import checked_coordinates
+from jounce.robot.model.tree import Frame, Tree
+from jounce.robot.recursions.batches import Batched
+from jounce.robot.recursions.kinematics import body_frames, place_of
+from jounce.robot.recursions.newton_euler import BodyWrenches, inertial_wrench, recursive_newton_euler
+from jounce.robot.recursions.tree_scan import of_one_body, to_coordinates
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike, Numbers
+
+
+def inverse_dynamics(
+    robot: Robot,
+    q: ArrayLike,
+    *,
+    wrenches: Sequence[Wrench] = (),
+    time: ArrayLike | None = None,
+    drives: bool = True,
+    base: BaseMotion | None = None,
+) -> Float[Numbers, "*batch derivative joint"]:
+    """Return the joint torques or forces that a motion needs, and their rates, exact to rounding.
+
+    Recursive Newton-Euler on jets: Negrean 2025, equations 123-125 and 144-146, to any order.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, with what it holds (`Robot.with_payload`) and the gravity that it feels.
+    q : array_like of shape (..., order + 1, n)
+        Coordinates and their derivatives ``q, q', q'', ...`` in the order of `robot.joint_names`, rad or m; order 2 or
+        more. Every derivative beyond the second gives one rate of the torques.
+    wrenches : sequence of Wrench, optional
+        Forces and torques from outside.
+    time : array_like of shape (...), optional
+        Instants of the samples, s; needed where a wrench is a function of time.
+    drives : bool, default True
+        Add what the drives need: armature inertia, viscous damping and Coulomb friction of the joints. Friction has the
+        sign of the velocity and is zero at rest; its jumps are not in the rates.
+    base : BaseMotion, optional
+        Motion of the base, its twist with order - 1 derivatives; it stands still unless given. Gravity, and wrenches in
+        the axes of the base, are then in those of the scene.
+
+    Returns
+    -------
+    array of shape (..., order - 1, n), or (..., order - 1, 6 + n) with `base`
+        ``tau, tau', tau'', ...`` in N m, or N for prismatic joints, by s. A joint that others follow bears their part.
+        Of a base that moves come first the force on it from outside, N, and the moment about its origin, N m, in its
+        axes, and their rates: zero where the motion is one that it can make alone.
+
+    Raises
+    ------
+    RobotError
+        If q, a wrench or the motion of the base does not fit the robot.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
+    >>> pendulum = jn.Robot("pendulum", [jn.Link("base"), jn.Link("rod", rod)], [pin])
+    >>> jn.inverse_dynamics(pendulum, [[0.0], [1.0], [3.0], [6.0]]).round(12).tolist()  # torque and torque rate
+    [[5.905], [2.0]]
+    """
+    q = checked_coordinates(robot, q, 2)
+    drives = flag("drives", drives, error=RobotError)
+    arrays, static = _applied(robot, q, wrenches, time, free=base is not None)
+    if base is None:
+        return _generalised_forces(robot, arrays[0], arrays[1], (*static, drives))
+    moved = base_arrays(base, q.shape[:-2], q.shape[-2] - 1)
+    return _forces_of_free_tree(robot, (*arrays[0], *moved), (arrays[1], base_body(robot)), (*static, drives))
+
+
+def joint_wrenches(
+    robot: Robot, q: ArrayLike, *, wrenches: Sequence[Wrench] = (), time: ArrayLike | None = None, frame: str = "link"
+) -> Float[Numbers, "*batch derivative body 6"]:
+    """Return the forces and moments that the joints carry, and their rates: what bearings and flanges feel.
+
+    Parameters
+    ----------
+    robot, q, wrenches, time
+        As for `inverse_dynamics`.
+    frame : {"link", "base"}, default "link"
+        Axes of the components: those of the moved link, of which the rates are then the rates of the components, or
+        those of the base.
+
+    Returns
+    -------
+    array of shape (..., order - 1, bodies, 6)
+        Force, N, and moment about the origin of the link, N m, that each of `robot.moving_links` gets through its joint
+        from its parent, by s.
+
+    Raises
+    ------
+    RobotError
+        If q or a wrench does not fit the robot.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(2.0, center_of_mass=[0.5, 0, 0])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
+    >>> jn.joint_wrenches(jn.Robot("pendulum", links, [pin]), [[0.0], [0.0], [0.0]])[0, 0].round(12).tolist()
+    [0.0, 0.0, 19.62, 0.0, -9.81, 0.0]
+    """
+    check_choice("frame", frame, FRAMES, RobotError)
+    q = checked_coordinates(robot, q, 2)
+    arrays, static = _applied(robot, q, wrenches, time)
+    turned = [robot.frames[link].rotation for link in robot.moving_links]
+    aligned = np.moveaxis(np.array(turned).reshape(-1, 3, 3), 0, -1)
+    return _carried(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
+
+
+def _applied(
+    robot: Robot, q: Any, wrenches: Sequence[Wrench], time: ArrayLike | None, *, free: bool = False
+) -> tuple[Any, Any]:
+    """Return the arrays, the constants and what is static of the wrenches."""
+    given = wrench_arrays(robot, wrenches, q.shape[:-2], q.shape[-2] - 2, time, free=free)
+    places = tuple(place_of(robot, wrench.link, wrench.point) for wrench in wrenches)
+    return ((q, *given), places), (tuple(wrench.frame == "base" for wrench in wrenches),)
+
+
+def _on_bodies(
+    tree: Tree,
+    arrays: tuple[Any, ...],
+    places: tuple[Frame, ...],
+    global_axes: tuple[bool, ...],
+    scene: tuple[Jet, Jet, Jet] | None = None,
+) -> BodyWrenches | None:
+    """Return external wrenches about the origins of bodies, in their frames, that of the base last; None without any.
+
+    The axes of the scene are given, in those of the base, where that turns.
+    """
+    q, *wrenches = arrays
+    if not wrenches:
+        return None
+    levels = q.shape[0] - 2
+    frames: Any = body_frames(tree, q[:levels]) if any(global_axes) else None
+    whole = jnp.zeros((levels, tree.shape.bodies + 1, 6, q.shape[-1]))
+    for values, (body, point, rotation), in_base in zip(wrenches, places, global_axes, strict=True):
+        force, torque = Jet(tuple(values[:, :3])), Jet(tuple(values[:, 3:]))
+        if in_base:
+            frame = frames.take(body)
+            if scene is not None:
+                force, torque = (total(u * part[i : i + 1] for i, u in enumerate(scene)) for part in (force, torque))
+            force, torque = frame.to_body(force), frame.to_body(torque)
+        else:
+            force, torque = (matvec(rotation[:, :, None], part) for part in (force, torque))
+        moment = torque + cross(point[:, None], force)
+        whole = whole + of_one_body(stacked(concatenate([force, moment])), body, tree.shape.bodies + 1)
+    return whole
+
+
+@Batched
+def _generalised_forces(
+    tree: Tree, arrays: tuple[Any, ...], places: tuple[Frame, ...], global_axes: tuple[bool, ...], drives: bool
+) -> Float[Numbers, "levels coordinate batch"]:
+    q = arrays[0]
+    applied = _on_bodies(tree, arrays, places, global_axes)
+    applied = None if applied is None else applied[:, :-1]
+    forces = to_coordinates(tree, recursive_newton_euler(tree, q, applied)[0])
+    return forces + _of_drives(tree, q) if drives else forces
+
+
+def _of_drives(tree: Tree, q: Any) -> Any:
+    acceleration = Jet(tuple(q)).differentiate().differentiate()
+    return stacked(acceleration * jnp.asarray(tree.armature)[:, None]) + drive_forces(tree, q, q.shape[0] - 2)
+
+
+@Batched
+def _forces_of_free_tree(
+    tree: Tree, arrays: tuple[Any, ...], constants: Any, global_axes: tuple[bool, ...], drives: bool
+) -> Float[Numbers, "levels row batch"]:
+    q, *wrenches, pose, twist = arrays
+    places, body = constants
+    scene = scene_axes(pose[0, 3:], twist)
+    applied = _on_bodies(tree, (q, *wrenches), places, global_axes, scene)
+    moving = twist[:, 3:], twist[:, :3] + falling(scene, tree.gravity, len(twist))
+    on_bodies = None if applied is None else applied[:, :-1]
+    along, _, _, carried = recursive_newton_euler(tree, q, on_bodies, moving)
+    forces = to_coordinates(tree, along)
+    w, v = (Jet(tuple(x)) for x in moving)
+    own = inertial_wrench(jnp.asarray(body.mass), jnp.asarray(body.center), jnp.asarray(body.inertia), w, v)
+    at_base = jnp.concatenate([stacked(a) + b for a, b in zip(own, carried, strict=True)], axis=1)
+    at_base = at_base if applied is None else at_base - applied[:, -1]
+    return jnp.concatenate([at_base, forces + _of_drives(tree, q) if drives else forces], axis=1)
+
+
+@Batched
+def _carried(
+    tree: Tree, arrays: tuple[Any, ...], constants: Any, global_axes: tuple[bool, ...], in_base: bool
+) -> BodyWrenches:
+    q = arrays[0]
+    places, aligned = constants
+    applied = _on_bodies(tree, arrays, places, global_axes)
+    applied = None if applied is None else applied[:, :-1]
+    _, force, moment, _ = recursive_newton_euler(tree, q, applied)
+    parts = [Jet(tuple(jnp.swapaxes(x, 1, 2))) for x in (force, moment)]  # components, bodies, batch
+    if in_base:
+        frames = body_frames(tree, q[:-2])
+        found = [frames.without_base().direction(part) for part in parts]
+    else:
+        found = [part.map(lambda c: jnp.einsum("ijb,ibs->jbs", aligned, c)) for part in parts]
+    return jnp.swapaxes(stacked(concatenate(found)), 1, 2)

@@ -1,0 +1,120 @@
+"""Jacobians with their rates, and operational accelerations of any order. Negrean 2025, equations 55-59."""
+
+from typing import Any
+
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from jounce.jet import Jet, concatenate, cross
+from jounce.jet.algebra import stacked
+from jounce.robot.model.arguments import checked_coordinates
+from jounce.robot.model.tree import Frame, Tree
+from jounce.robot.recursions.batches import Batched
+from jounce.robot.recursions.kinematics import body_frames, link_frame, place_of
+from jounce.robot.recursions.tree_scan import Series
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike, Numbers
+
+
+def jacobian_jet(tree: Tree, q: Series, place: Frame) -> Jet:
+    """Return the Jacobian of a frame as a jet of shape (6, coordinates, batch), linear rows first."""
+    frames = body_frames(tree, q)
+    target = frames.take(place.body).point(place.position)[:, None]
+    bodies = frames.without_base()
+    axis = bodies.axes[2]
+    turning = jnp.asarray(tree.turning)[:, None]
+    moved = jnp.asarray(tree.ancestors)[place.body][:, None] * jnp.asarray(tree.multiplier)[:, None]
+    linear = cross(axis, target - bodies.position) * turning + axis * (1 - turning)
+    columns = concatenate([linear, axis * turning]) * moved
+    if tree.shape.direct:
+        return columns
+    shape = (6, tree.shape.coordinates, q.shape[-1])
+    return columns.map(lambda c: jnp.zeros(shape).at[:, jnp.asarray(tree.coordinate)].add(c))
+
+
+@Batched
+def _jacobian(tree: Tree, arrays: tuple[Series], place: Frame) -> Any:
+    return stacked(jacobian_jet(tree, arrays[0], place))
+
+
+def jacobian(
+    robot: Robot, q: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0)
+) -> Float[Numbers, "*batch derivative 6 joint"]:
+    """Return the Jacobian of a point of a link and its time derivatives, to any order.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q : array_like of shape (..., order + 1, n)
+        Coordinates and their derivatives, rad or m; the order may be 0.
+    link : str
+        Name of the link.
+    point : array_like of shape (3,), default the origin
+        Point in the frame of the link, m.
+
+    Returns
+    -------
+    array of shape (..., order + 1, 6, n)
+        ``J, J', J'', ...``: three rows for the velocity of the point, three for the angular velocity, in the frame of
+        the base.
+
+    Raises
+    ------
+    RobotError
+        If there is no such link, or q does not fit the robot.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
+    >>> jn.jacobian(jn.Robot("one", links, [pin]), [[0.0]], "rod", [2, 0, 0])[0, :, 0].tolist()
+    [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
+    """
+    return _jacobian(robot, (checked_coordinates(robot, q),), place_of(robot, link, point))
+
+
+def twist(tree: Tree, q: Series, place: Frame) -> Jet:
+    """Return the velocity of a point and the angular velocity of its link, (6, batch), one order shorter than q."""
+    frame = link_frame(tree, q, place)
+    assert frame.angular_velocity is not None  # there are velocities
+    return concatenate([frame.position.differentiate(), frame.angular_velocity])
+
+
+@Batched
+def _operational(tree: Tree, arrays: tuple[Series], place: Frame) -> Any:
+    return stacked(twist(tree, arrays[0], place))
+
+
+def operational_accelerations(
+    robot: Robot, q: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0)
+) -> Float[Numbers, "*batch order 6"]:
+    """Return the operational velocity and accelerations of all orders of a point of a link: Negrean 2025, equation 59.
+
+    Parameters
+    ----------
+    robot, q, link, point
+        As for `jacobian`, with q of order 1 or more.
+
+    Returns
+    -------
+    array of shape (..., order, 6)
+        ``X', X'', ..., X^(order)``: the velocity of the point and the angular velocity, then their derivatives, in the
+        frame of the base. Equal to the sum of ``C(m - 1, k) J^(k) q^(m - k)``.
+
+    Raises
+    ------
+    RobotError
+        If there is no such link, or q does not fit the robot.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
+    >>> robot = jn.Robot("one", links, [pin])
+    >>> jn.operational_accelerations(robot, [[0.0], [2.0], [0.0]], "rod", [1, 0, 0]).tolist()
+    [[0.0, 2.0, 0.0, 0.0, 0.0, 2.0], [-4.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+    """
+    return _operational(robot, (checked_coordinates(robot, q, 1),), place_of(robot, link, point))

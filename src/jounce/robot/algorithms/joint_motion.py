@@ -1,0 +1,174 @@
+"""Joint motion from the motion of a link, order by order, by one pseudo-inverse. Negrean 2025, equation 60."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Bool, Float
+
+from jounce.errors import RobotError, SingularityError, check_choice
+from jounce.jet.algebra import stacked
+from jounce.linear_algebra.linear import singular_values
+from jounce.rigid.inertia import finite_numbers
+from jounce.robot.algorithms.jacobian import jacobian_jet, twist
+from jounce.robot.model.arguments import checked_position, floats
+from jounce.robot.model.tree import Tree
+from jounce.robot.recursions.batches import Batched
+from jounce.robot.recursions.kinematics import place_of
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike, Numbers
+
+TASKS = {"pose": (0, 1, 2, 3, 4, 5), "position": (0, 1, 2), "orientation": (3, 4, 5)}
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True, eq=False)
+class JointMotion:
+    """Joint coordinates of a prescribed motion of a link.
+
+    Parameters
+    ----------
+    q : array of shape (..., order + 1, n)
+        Coordinates and their derivatives.
+    singular_values : array of shape (..., k)
+        Of the Jacobian of the task, the largest first.
+    singular : array of bool, shape (...)
+        Whether the configuration is singular: the motion is damped there, or NaN where no damping was asked for.
+    residual : array of shape (..., order, task)
+        What the motion lacks of the one prescribed: zero to rounding, unless damped or where joints are too few.
+    """
+
+    q: Float[Numbers, "*batch derivative joint"]
+    singular_values: Float[Numbers, "*batch value"]
+    singular: Bool[Numbers, "*batch"] | np.bool
+    residual: Float[Numbers, "*batch derivative-1 row"]
+
+
+@Batched
+def _solved(
+    tree: Tree,
+    arrays: tuple[Float[Numbers, "1 coordinate batch"], Float[Numbers, "order row batch"]],
+    constants: Any,
+    rows: tuple[int, ...],
+) -> Any:
+    position, wanted = arrays
+    frame, damping, threshold = constants
+    rows_ = np.array(rows)
+
+    def task_twist(q: Any) -> Any:
+        return stacked(twist(tree, q, frame))[:, rows_]
+
+    u, s, v = singular_values(jacobian_jet(tree, position, frame).coefficients[0][rows_])
+    limit = threshold * s[:1]
+    near = s <= limit  # also where all are zero, and no motion is possible
+    squares = jnp.where(near, damping**2 * (1 - (s / jnp.where(limit == 0, 1.0, limit)) ** 2), 0.0)
+    inverse = jnp.where(near & (damping == 0), jnp.nan, s / jnp.where(squares + s == 0, 1.0, s**2 + squares))
+    # the pseudo-inverse is made once, and serves all orders
+    pseudo = jnp.sum(v[:, None] * (u * inverse[None])[None], axis=2)
+    q = position
+    for k in range(wanted.shape[0]):
+        trial = jnp.concatenate([q, jnp.zeros_like(position)])
+        missing = wanted[k] - task_twist(trial)[k]
+        q = jnp.concatenate([q, jnp.sum(pseudo * missing[None], axis=1)[None] / (k + 1)])
+    residual = wanted - task_twist(q)
+    return q, s[None], near.any(axis=0).astype(float)[None, None], residual
+
+
+def joint_motion(
+    robot: Robot,
+    position: ArrayLike,
+    operational: ArrayLike,
+    link: str,
+    point: ArrayLike = (0.0, 0.0, 0.0),
+    *,
+    task: str | Sequence[int] = "pose",
+    damping: float = 0.0,
+    threshold: float = 1e-3,
+    strict: bool = True,
+) -> JointMotion:
+    """Return the joint motion that gives a link a prescribed motion, order by order: Negrean 2025, equation 60.
+
+    One pseudo-inverse of the Jacobian, from its singular values, serves all orders. A redundant robot moves with the
+    least norm of each derivative in turn.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    position : array_like of shape (..., n)
+        Coordinates, rad or m.
+    operational : array_like of shape (..., order, 6) or (..., order, rows)
+        ``X', X'', ...`` as `operational_accelerations` gives them, or the rows of the task alone.
+    link, point
+        As for `jacobian`.
+    task : {"pose", "position", "orientation"} or sequence of int, default "pose"
+        Which rows count; numbers from 0 to 5 choose them freely, as ``(0, 1)`` for a place in the x-y plane.
+    damping : float, default 0
+        Damped least squares: how strongly directions near singularity are held back, in the units of the Jacobian; it
+        fades in below the threshold. Zero is no damping: singular configurations are errors.
+    threshold : float, default 1e-3
+        A configuration is singular where the smallest singular value does not exceed this part of the largest.
+    strict : bool, default True
+        Raise at singular configurations without damping; otherwise they are NaN.
+
+    Returns
+    -------
+    JointMotion
+        Coordinates with their derivatives, singular values, and what is lacking.
+
+    Raises
+    ------
+    RobotError
+        If an argument does not fit the robot.
+    SingularityError
+        If a configuration is singular, there is no damping, and `strict` is True.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
+    >>> robot = jn.Robot("one", links, [pin])
+    >>> jn.joint_motion(robot, [0.0], [[0.0, 2.0, 0.0], [-4.0, 0.0, 0.0]], "rod", [1, 0, 0], task="position").q.tolist()
+    [[0.0], [2.0], [0.0]]
+    """
+    rows = _rows(task)
+    for name, value, least in (("damping", damping, 0.0), ("threshold", threshold, 1e-15)):
+        if finite_numbers(name, value, ()) < least:
+            raise RobotError(f"must be {least:g} or greater", name=name, value=value)
+    start, wanted = checked_position(robot, position, "position"), floats("operational", operational)
+    lead = start.shape[:-2]
+    if wanted.ndim < 2 or wanted.shape[:-2] != lead or wanted.shape[-1] not in (6, len(rows)) or wanted.shape[-2] < 1:
+        shape = f"{(*lead, 'order', len(rows))}".replace("'", "")
+        raise RobotError(f"must have the shape {shape}, order 1 or more, not {wanted.shape}", name="operational")
+    if wanted.shape[-1] == 6:
+        wanted = wanted[..., np.array(rows)]
+    constants = (place_of(robot, link, point), np.float64(damping), np.float64(threshold))
+    q, values, singular, residual = _solved(robot, (start, wanted), constants, (rows,))
+    values, singular = values[..., 0, :], singular[..., 0, 0] > 0
+    if strict and damping == 0 and not isinstance(singular, Tracer) and np.any(singular):
+        first = tuple(int(i) for i in np.argwhere(np.atleast_1d(singular))[0])
+        smallest, largest = (float(values[first if lead else ()][k]) for k in (-1, 0))
+        where = "" if not lead else f" at sample {first[0] if len(first) == 1 else first}"
+        message = (
+            f"the configuration is singular for this task{where}: the singular values of the Jacobian reach from "
+            f"{largest:.2g} down to {smallest:.2g}; give a damping, or take another task or path"
+        )
+        raise SingularityError(message, name=link)
+    return JointMotion(q, values, singular, residual)
+
+
+def _rows(task: str | Sequence[int]) -> tuple[int, ...]:
+    """Return the rows of the Jacobian that a task has."""
+    if isinstance(task, str):
+        check_choice("task", task, TASKS, RobotError)
+        return TASKS[task]
+    rows = tuple(task)
+    whole = all(isinstance(row, int | np.integer) and 0 <= row <= 5 for row in rows)
+    if not whole or not rows or len(set(rows)) < len(rows):
+        raise RobotError("must be a name or different rows from 0 to 5", name="task", value=list(rows))
+    return tuple(int(row) for row in rows)

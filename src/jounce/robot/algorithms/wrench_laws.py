@@ -1,0 +1,102 @@
+"""Wrenches on links as functions of time and state, for simulations."""
+
+import inspect
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import RobotError
+from jounce.jet.compose import OfSample
+from jounce.modules import Module
+from jounce.robot.algorithms.wrenches import Wrench, check_wrenches
+from jounce.robot.model.arguments import floats
+from jounce.robot.model.tree import Frame
+from jounce.robot.recursions.kinematics import place_of
+from jounce.robot.robot import Robot
+
+STATE = 3  # arguments of a function of time, coordinates and rates
+
+
+class WrenchPart(Module):
+    """The force, or the torque, of a wrench."""
+
+    constant: Any
+    function: OfSample | None
+    of_state: bool = eqx.field(static=True)
+
+    def __call__(self, time: Any, q: Any, rate: Any) -> Any:
+        """Return three components at states, the batch last."""
+        if self.function is None:
+            return jnp.broadcast_to(jnp.asarray(self.constant)[:, None], (3, time.shape[-1]))
+        given = (time, q, rate) if self.of_state else (time,)
+        return self.function(*given)
+
+    def at(self, *state: Any) -> Any:
+        """Return three components at one state, or at one time, as the function did when it was read off."""
+        assert self.function is not None
+        return self.function.at(*state)
+
+
+class WrenchLaws(Module):
+    """Wrenches from outside as functions of time and state; see `wrench_laws`."""
+
+    parts: tuple[tuple[WrenchPart, WrenchPart], ...]
+
+    @property
+    def changing(self) -> bool:
+        """Whether one depends on anything but the pose of its link."""
+        return any(part.function is not None for both in self.parts for part in both)
+
+    def __call__(self, time: Any, q: Any, rate: Any) -> tuple[Any, ...]:
+        """Return force and torque of each wrench, (6, batch)."""
+        return tuple(jnp.concatenate([part(time, q, rate) for part in both]) for both in self.parts)
+
+
+def wrench_laws(
+    robot: Robot, wrenches: Sequence[Wrench], *, free: bool
+) -> tuple[WrenchLaws, tuple[Frame, ...], tuple[bool, ...]]:
+    """Return the laws of wrenches, where they act, and whether they are in the axes of the scene.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    wrenches : sequence of Wrench
+        Whose forces and torques are constant, or functions of time, or of time, coordinates and rates.
+    free : bool
+        Whether the base moves, and may be pushed.
+
+    Raises
+    ------
+    RobotError
+        If a wrench is none, a link does not exist or does not move, or a force is neither constant nor such a function.
+    """
+    check_wrenches(robot, wrenches, free=free)
+    parts, n = [], len(robot.joint_names)
+    for k, wrench in enumerate(wrenches):
+        each = ("force", "torque")
+        parts.append(tuple(_part(f"wrenches[{k}].{name}", getattr(wrench, name), n) for name in each))
+    places = tuple(place_of(robot, wrench.link, wrench.point) for wrench in wrenches)
+    return WrenchLaws(tuple(parts)), places, tuple(wrench.frame == "base" for wrench in wrenches)
+
+
+def _part(where: str, given: Any, n: int) -> WrenchPart:
+    if not callable(given):
+        value = np.asarray(floats(where, given))
+        if value.shape != (3,) or not np.isfinite(value).all():
+            message = "must be three finite numbers, or a function of time, or of time, q and rates"
+            raise RobotError(message, name=where, value=value.tolist())
+        return WrenchPart(value, None, False)
+    of_state = len(inspect.signature(given).parameters) == STATE
+    state = (jnp.zeros(()), jnp.zeros(n), jnp.zeros(n)) if of_state else (jnp.zeros(()),)
+    try:
+        found = OfSample.of(given, *state)
+    except TypeError as error:
+        message = f"must be a function of time, or of time, q and rates, by operations of JAX: {error}"
+        raise RobotError(message.splitlines()[0], name=where) from error
+    if found.shape != (3,):
+        raise RobotError(f"the function must return three components, not the shape {found.shape}", name=where)
+    return WrenchPart(np.zeros(3), found, of_state)

@@ -1,0 +1,128 @@
+"""External wrenches: forces and torques that act on links, as functions of time."""
+
+import dataclasses
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import RobotError, check_choice, check_name
+from jounce.jet import Jet, compose
+from jounce.rigid.inertia import finite_numbers
+from jounce.robot.model.arguments import floats
+from jounce.robot.robot import Robot
+from jounce.shapes import ArrayLike, Refused, is_traced, seconds
+
+FRAMES = ("base", "link")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Wrench:
+    """A force and a torque from outside on a link, for example of a contact or a tool.
+
+    Parameters
+    ----------
+    link : str
+        Name of the link that it acts on.
+    force, torque : array_like or callable, default zero
+        N and N m. Shape (3,): constant. Shape (..., order - 1, 3): values and derivatives in time for each sample, as
+        many as torques are asked for. A callable maps the time, a scalar in s, to three components, by JAX functions.
+    point : array_like of shape (3,), default zero
+        Where the force acts, in the frame of the link, m.
+    frame : {"base", "link"}, default "base"
+        Whose axes the components refer to; those of the link turn with it. Where the base moves (`BaseMotion`), "base"
+        are the axes of the scene, in which its pose is given.
+
+    Raises
+    ------
+    RobotError
+        If the frame is not known or the point is not made of three finite numbers.
+    """
+
+    link: str
+    force: Any = (0.0, 0.0, 0.0)
+    torque: Any = (0.0, 0.0, 0.0)
+    point: Any = (0.0, 0.0, 0.0)
+    frame: str = "base"
+
+    def __post_init__(self) -> None:
+        check_choice("frame", self.frame, FRAMES, RobotError, name="wrench.frame")
+        object.__setattr__(self, "point", finite_numbers("wrench.point", self.point, (3,)))
+
+
+def wrench_arrays(
+    robot: Robot,
+    wrenches: Sequence[Wrench],
+    lead: tuple[int, ...],
+    levels: int,
+    time: ArrayLike | None,
+    *,
+    free: bool = False,
+) -> tuple[Any, ...]:
+    """Return the wrenches as arrays of plain derivatives, of shape (..., levels, 6): force, then torque.
+
+    The base may be pushed where it is free.
+
+    Raises
+    ------
+    RobotError
+        If a wrench is none, a link does not exist, the base is pushed, a shape does not fit the samples, or a function
+        has no time.
+    """
+    check_wrenches(robot, wrenches, free=free)
+    arrays = []
+    for k, wrench in enumerate(wrenches):
+        where = f"wrenches[{k}]"
+        parts = [
+            _derivatives(f"{where}.{name}", getattr(wrench, name), lead, levels, time) for name in ("force", "torque")
+        ]
+        arrays.append(jnp.concatenate(parts, axis=-1) if is_traced(parts) else np.concatenate(parts, axis=-1))
+    return tuple(arrays)
+
+
+def check_wrenches(robot: Robot, wrenches: Sequence[Wrench] | Refused, *, free: bool) -> None:
+    """Raise RobotError unless these are wrenches on links that move; on the base where it is free."""
+    if not isinstance(wrenches, Sequence) or isinstance(wrenches, str):
+        raise RobotError("must be a list of jn.Wrench", name="wrenches", value=type(wrenches).__name__)
+    for k, wrench in enumerate(wrenches):
+        where = f"wrenches[{k}]"
+        if not isinstance(wrench, Wrench):
+            raise RobotError("must be a jn.Wrench", name=where, value=type(wrench).__name__)
+        check_name("link", wrench.link, robot.frames, RobotError, name=f"{where}.link")
+        if robot.frames[wrench.link].body < 0 and not free:
+            message = "this link is fixed to the base: nothing moves it"
+            raise RobotError(message, name=f"{where}.link", value=wrench.link)
+
+
+def _derivatives(where: str, value: Any, lead: tuple[int, ...], levels: int, time: Any) -> Any:
+    shape = (*lead, levels, 3)
+    if callable(value):
+        if time is None:
+            raise RobotError("is a function of time: give the instants of the samples as `time`", name=where)
+        instants = jnp.asarray(floats("time", time, seconds))
+        if instants.shape != lead:
+            raise RobotError(
+                f"must have one instant for each sample, the shape {lead}, not {instants.shape}", name="time"
+            )
+        given = jax.eval_shape(lambda t: jnp.asarray(value(t), float), jnp.zeros(())).shape
+        if given != (3,):
+            raise RobotError(f"the function must return three components, not the shape {given}", name=where)
+        jet = Jet.variable(instants, levels - 1)
+        parts = [compose(partial(_component, value, i), jet).derivatives() for i in range(3)]
+        return jnp.moveaxis(jnp.stack(parts, axis=1), (0, 1), (-2, -1))
+    array = floats(where, value)
+    if array.shape == (3,):
+        level = np.zeros((levels, 1))
+        level[0] = 1.0
+        library = jnp if isinstance(array, jax.Array) else np
+        return library.broadcast_to(level * array[None], shape)
+    if array.shape != shape:
+        raise RobotError(f"must have the shape (3,) or {shape}, not {array.shape}", name=where)
+    return array
+
+
+def _component(function: Any, index: int, time: Any) -> Any:
+    return jnp.asarray(function(time)[index], float)

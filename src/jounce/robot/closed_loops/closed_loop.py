@@ -1,0 +1,199 @@
+"""A robot as a mechanism: bodies with masses, joints, loops closed, drives that prescribe coordinates."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import JounceError, RobotError, check_name, flag
+from jounce.forces import AbstractForce
+from jounce.jet import Jet
+from jounce.mechanism import Body, Mechanism, time_grid
+from jounce.mechanism.mechanism import names_column
+from jounce.mechanism.redundant_reactions import RedundantReactions
+from jounce.mechanism.resolve import resolve_motion
+from jounce.mechanism.time import TimeLike
+from jounce.rigid.inertia import finite_numbers
+from jounce.robot.closed_loops.closures import GivenCoordinates, Loops, given_coordinates
+from jounce.robot.closed_loops.mechanism_parts import RobotParts, on_body
+from jounce.robot.model.abstract_robot import AbstractRobot
+from jounce.shapes import ArrayLike
+from jounce.trajectory.joint_trajectory import JointTrajectory
+
+DRIVE, START = "_drive", "_start"
+
+
+def mechanism(
+    robot: AbstractRobot,
+    q: GivenCoordinates = None,
+    *,
+    drivers: Mapping[str, Any] | JointTrajectory | None = None,
+    initial: Mapping[str, Any] | None = None,
+    forces: Mapping[str, AbstractForce] | None = None,
+    outputs: Mapping[str, Any] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    time: TimeLike | None = None,
+    drives: bool = True,
+    redundant_reactions: RedundantReactions | None = None,
+) -> Mechanism:
+    """Return a robot as a spatial mechanism, with masses and gravity, its loops closed.
+
+    Each moving link is a body of that name, whose frame is that of the link; links fixed to it are part of it, the base
+    is the ground. Joints and closures keep their names. The six joints of a base that floats, and the three turns of a
+    ball, are one free body, and one spherical joint, unless a coordinate of theirs is driven. A closure holds in those
+    directions only in which the joints do not hold already (`closure_wrenches`), so that reactions in the others are
+    the joints' alone; with `redundant_reactions` it holds in all, and what becomes of its reactions is told by that.
+
+    Parameters
+    ----------
+    robot : Robot
+        With closures or without.
+    q : array_like of shape (n,) or dict of str to float, optional
+        Coordinates near which the mechanism is put together, zero unless given. Driven joints start where their laws
+        do, the others are moved until the loops are closed.
+    drivers : dict of str to law, or JointTrajectory, optional
+        Laws of coordinates, by name of the joint: expressions of t, functions of time, motions or numbers; rad or m.
+        The driver of joint A is named ``A_drive``, and its force is the torque or force of the joint.
+    initial : dict of str to law, optional
+        Coordinates that hold at the start of a simulation only, named ``A_start``.
+    forces : dict of str to AbstractForce, optional
+        Applied forces; their bodies are moving links, or ``"ground"``.
+    outputs : dict of str to AbstractOutput or str, optional
+        Quantities wanted; a word is the name of a joint whose coordinate is wanted. Unless given, the coordinates of
+        all joints in `joint_names` under their names, with ``_`` behind those of columns of results, such as
+        ``time``. An angle starts between half a turn either side of zero.
+    parameters : dict of str to number or expression, optional
+        Named values for laws and forces.
+    time : array_like or TimeGrid, optional
+        Instants to solve for, s; of a trajectory, its own unless given.
+    drives : bool, default True
+        Count the armature inertia of the joints, each as that of a rotor on the ground, the body ``A_rotor``, that the
+        constraint ``A_gear`` turns with the joint; their viscous damping and Coulomb friction, as forces named
+        ``A_damping`` and ``A_friction``. Friction has the sign of the velocity and is zero at rest. Without, all three
+        are left out.
+    redundant_reactions : {"unique", "least_norm"} or dict of str to dict, optional
+        As of `Mechanism`: reactions without a unique value are NaN, those of least norm, or as stiffnesses of joints
+        share them. The redundant equations of closures must then agree, as those of any mechanism: to 1e-9.
+
+    Returns
+    -------
+    Mechanism
+        Square where as many joints are driven as the robot has degrees of freedom.
+
+    Raises
+    ------
+    RobotError
+        If a name or a value does not fit the robot, or the loops cannot be closed near q.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
+    >>> pendulum = jn.Robot("pendulum", links, [pin]).mechanism(drivers={"pin": "0.5*t**2"})
+    >>> motion = jn.solve(pendulum, [0.0, 1.0], order=2)
+    >>> motion.outputs["pin"].round(12).tolist()
+    [[0.0, 0.0, 1.0], [0.5, 1.0, 1.0]]
+    """
+    drives = flag("drives", drives, error=RobotError)
+    if time is None:
+        time = getattr(drivers, "times", None)
+    laws = {"drivers": getattr(drivers, "laws", drivers) or {}, "initial": initial or {}}
+    driven = {name: law for kind in laws.values() for name, law in kind.items()}
+    for kind, given in laws.items():
+        for name in given:
+            check_name("moving joint that follows no other", name, robot.joint_names, RobotError, name=kind)
+    kept = {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}
+    parts = RobotParts(robot, kept, forces, outputs, drives)
+    wanted = _coordinate_outputs(parts.coordinates) if outputs is None else outputs
+    start = _start(robot, q, driven, parameters or {}, time)
+    joints = parts.joints()
+    if robot.closures:
+        loops = Loops(robot)
+        free = np.array([name not in driven for name in robot.joint_names], bool)
+        start = loops.closed(start, free)
+        borne = loops.wrenches if redundant_reactions else [kept for kept, _ in loops.independent(start)]
+        found = zip(robot.closures.values(), borne, strict=True)
+        joints |= {closure.name: parts.closure(closure, kept) for closure, kept in found if len(kept)}
+    return Mechanism(
+        space="spatial",
+        bodies=parts.bodies(start),
+        joints=joints,
+        drivers={name + DRIVE: parts.driver(name, law) for name, law in laws["drivers"].items()},
+        initial={name + START: parts.driver(name, law) for name, law in laws["initial"].items()},
+        forces={**(forces or {}), **parts.losses()},
+        outputs={name: parts.output(name, x) if isinstance(x, str) else x for name, x in wanted.items()},
+        parameters=parameters or {},
+        gravity=robot.gravity.tolist(),
+        time=time,
+        redundant_reactions=redundant_reactions or "unique",
+        title=robot.name,
+    )
+
+
+def _coordinate_outputs(joints: tuple[str, ...]) -> dict[str, str]:
+    """Return joints by the names of the outputs of their coordinates: their own, unless results have such columns."""
+    found = {}
+    for joint in joints:
+        name = joint
+        while names_column(name) or (name != joint and name in joints):
+            name += "_"
+        found[name] = joint
+    return found
+
+
+def _start(
+    robot: AbstractRobot, q: Any, laws: Mapping[str, Any], parameters: Mapping[str, Any], time: Any
+) -> np.ndarray:
+    """Return the coordinates to start from: those given, and what the laws say of the driven joints."""
+    start = given_coordinates(robot, q)
+    if laws:
+        values = Mechanism(
+            space="spatial", bodies={"any": Body([0.0] * 3)}, joints={}, parameters=parameters
+        ).parameter_values
+        instant = Jet([np.full((1, 1), 0.0 if time is None else time_grid(time, values)[0])])
+        for name, law in laws.items():
+            try:
+                value = float(np.squeeze(resolve_motion(law, values)(instant).coefficients[0]))
+            except JounceError as error:
+                raise error.located(name=f"drivers.{name}") from None
+            if not np.isfinite(value):
+                message = f"the law has no finite value at t = {float(instant.coefficients[0][0, 0]):g} s"
+                raise RobotError(message, name=f"drivers.{name}", value=value)
+            start[robot.joint_names.index(name)] = value
+    return start
+
+
+def body_point(robot: AbstractRobot, link: str, point: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[str, np.ndarray]:
+    """Return the body of a mechanism that a link is part of, and where a point of the link is in the frame of the body.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    link : str
+        Name of the link; the base and what is fixed to it are the ground.
+    point : array_like of shape (3,), default the origin
+        In the frame of the link, m.
+
+    Returns
+    -------
+    tuple of str and array of shape (3,)
+        Name of the body, and the point in its frame, m.
+
+    Raises
+    ------
+    RobotError
+        If there is no such link.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> arm = jn.load_robot("examples/robots/planar_arm.xml")
+    >>> body, point = jn.robot.body_point(arm, "ram", [0.1, 0, 0])
+    >>> body, point.tolist()
+    ('ram', [0.1, 0.0, 0.0])
+    """
+    check_name("link", link, robot.links, RobotError, name="link")
+    body, position, rotation = on_body(robot, link)
+    return body, position + rotation @ finite_numbers("point", point, (3,))

@@ -1,0 +1,306 @@
+"""Closing the loops of a robot: what holds two links together, and which of it the joints of the tree do already.
+
+In a loop of hinges with parallel axes a closure holds some directions that the hinges hold too. Such equations are
+redundant: the forces in them have no unique value. They are found by the rank of the velocities of the closures in
+the coordinates of the tree, near the closed position as well as in it, and left out.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.constraints import AbstractConstraint, Scalar, Vector
+from jounce.constraints.base import Wrenches
+from jounce.errors import MechanismError, RobotError
+from jounce.jet import Jet, cross, dot, stack
+from jounce.jet.algebra import stacked, total
+from jounce.rigid import SpatialPose
+from jounce.rigid.inertia import finite_numbers
+from jounce.robot.model.abstract_robot import AbstractRobot
+from jounce.robot.model.links_and_joints import Closure
+from jounce.robot.model.tree import Frame, Tree, axes_with_z_along
+from jounce.robot.recursions.batches import Batched
+from jounce.robot.recursions.kinematics import body_frames, place_of
+from jounce.robot.recursions.tree_scan import Series
+from jounce.shapes import ArrayLike, Numbers
+
+GivenCoordinates = Mapping[str, float] | ArrayLike | None
+"""Coordinates in order, or by name of the joint; those not given are zero."""
+
+RANK_TOLERANCE = 1e-5  # rad, or sizes of the robot: files give axes with six digits
+MAX_STEPS = 100
+SWAY = 0.05  # rad, or sizes of the robot: how far a position in general is from the one given
+
+
+class LinkClosure(AbstractConstraint, type="closure", space="spatial"):
+    """Two links held together in some directions, each a wrench that the closure can bear.
+
+    With the offset d of the points and the turn e that is missing, both in axes of body i, the rows are
+    ``force . d + moment . e``.
+    """
+
+    point_i: Vector  # m, in the frame of body i
+    point_j: Vector
+    wrenches: Wrenches  # (rows, 6): force and moment, in axes of body i
+    vector_part: Vector = None  # of the Euler parameters of the frame of body j in that of body i, when closed
+    scalar_part: Scalar = None
+    sense: Any = eqx.field(default=None, init=False)  # 1 or -1, found from the starting guess
+
+    dimensions = {"vector_part": "ratio", "scalar_part": "ratio"}
+
+    def __check_init__(self):
+        if (self.vector_part is None) != (self.scalar_part is None):
+            raise MechanismError("Euler parameters have a vector_part and a scalar_part", name="vector_part")
+        if self.vector_part is None and np.any(np.asarray([row[3:] for row in self.wrenches]) != 0):
+            message = "a closure that bears moments needs vector_part and scalar_part, the attitude when closed"
+            raise MechanismError(message, name="vector_part")
+
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, _time: Jet) -> Jet:
+        """Return the rows, shape (rows, ...)."""
+        offset = body_i.to_body(body_j.point(self.point_j) - body_i.point(self.point_i))
+        force, moment = self.wrenches[:, :3], self.wrenches[:, 3:]
+        rows = offset.map(lambda d: jnp.sum(force * d[None], axis=1))
+        if self.vector_part is None:
+            return rows
+        e0, e = body_i.relative_quaternion(body_j.quaternion)
+        turn = 2.0 * (self.scalar_part * e - e0 * self.vector_part - cross(e, self.vector_part))
+        turn = turn if self.sense is None else turn * self.sense
+        return rows + turn.map(lambda x: jnp.sum(moment * x[None], axis=1))
+
+    def sense_at(self, body_i: SpatialPose, body_j: SpatialPose) -> Float[Numbers, "..."] | None:
+        """Return the sign of the Euler parameters at a pose, (...), as either sign tells the same attitude; or None.
+
+        A row of force and moment both would else be another one. The sign stays along a motion: none is looked for on
+        the way, as it would change where a body turns past half a turn in a pin, and the Jacobian with it.
+        """
+        if self.vector_part is None:
+            return None
+        e0, e = body_i.relative_quaternion(body_j.quaternion)
+        along = self.scalar_part * e0 + dot(self.vector_part, e)
+        return jnp.where(along.coefficients[0] < 0, -1.0, 1.0)
+
+
+def constraint_wrenches(closure: Closure) -> np.ndarray:
+    """Return the wrenches that a closure can bear, (rows, 6): force and moment in the frame of its first link."""
+    everything = np.eye(6)
+    if closure.type == "connect":
+        return everything[:3]
+    if closure.type == "weld":
+        return everything
+    axes = np.kron(np.eye(2), axes_with_z_along(closure.axis).T)
+    return axes[[0, 1, 2, 3, 4]] if closure.type == "pin" else axes[[0, 1, 3, 4, 5]]
+
+
+@Batched
+def _gaps(tree: Tree, arrays: tuple[Series], places: tuple[Frame, Frame]) -> Float[Numbers, "order 2 3 closure batch"]:
+    """Return offset of the points and missing turn of each closure, in axes of its first link."""
+    frames = body_frames(tree, arrays[0])
+
+    def placed(place: Frame) -> tuple[Jet, list[Jet]]:
+        frame = jax.tree.map(lambda c: jnp.take(c, place.body, axis=1), frames)
+        local = (place.position, *jnp.moveaxis(place.rotation, 2, 0))
+        point, *axes = (jnp.moveaxis(x, 0, -1)[:, :, None] for x in local)
+        return frame.point(point), [frame.direction(axis) for axis in axes]
+
+    (origin, axes), (other, others) = map(placed, places)
+    turn = total(cross(a, b) for a, b in zip(axes, others, strict=True)) * 0.5
+    seen = [stack([axis.dot(vector) for axis in axes]) for vector in (other - origin, turn)]
+    return jnp.stack([stacked(part) for part in seen], axis=1)
+
+
+class Loops:
+    """The closures of a robot as functions of the coordinates of its tree.
+
+    Parameters
+    ----------
+    robot : Robot
+        With closures.
+    """
+
+    def __init__(self, robot: AbstractRobot):
+        self.tree, self.size = robot.opened(), size_of(robot)
+        self.names = tuple(robot.closures)
+        turning = [robot.joints[name].turning for name in robot.joint_names]
+        self.scale = np.where(turning, 1.0, self.size)  # of the coordinates
+        self.wrenches = [constraint_wrenches(closure) for closure in robot.closures.values()]
+        sides: list[list[Frame]] = [[], []]
+        for closure in robot.closures.values():
+            first, second = (place_of(robot, link, p) for link, p in zip(closure.links, closure.points, strict=True))
+            sides[0].append(first)
+            sides[1].append(second._replace(rotation=second.rotation @ closure.rotation.T))
+        self.places = tuple(jax.tree.map(lambda *xs: np.stack(xs), *side) for side in sides)
+
+    def gaps(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the scaled gaps of all closures, (closures, 6), and their slopes by the scaled coordinates."""
+        count = len(q)
+        directions = np.diag(self.scale) if count else np.zeros((1, 0))
+        states = np.stack([np.broadcast_to(q, directions.shape), directions], axis=1)
+        found = _gaps(self.tree, (states,), self.places)  # (coordinates, 2, 2, 3, closures)
+        found = np.moveaxis(found.reshape(*found.shape[:2], 6, -1), -1, 2) / np.repeat([self.size, 1.0], 3)
+        return found[0, 0], np.moveaxis(found[:count, 1], 0, -1)
+
+    def closed(self, q: Float[np.ndarray, " joint"], free: Any = slice(None)) -> Float[np.ndarray, " joint"]:
+        """Return the coordinates nearest to the given ones at which the loops are closed; only those free change.
+
+        Raises
+        ------
+        RobotError
+            If there are none nearby.
+        """
+        q = np.array(q, float)
+
+        def state(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            gaps, slopes = self.gaps(q)
+            gap = np.concatenate([w @ g for w, g in zip(self.wrenches, gaps, strict=True)])
+            return gap, np.concatenate([w @ s for w, s in zip(self.wrenches, slopes, strict=True)])[:, free]
+
+        gap, slope = state(q)
+        for _ in range(MAX_STEPS):
+            step = -np.linalg.lstsq(slope, gap, rcond=RANK_TOLERANCE)[0]
+            length = float(np.max(np.abs(step), initial=0.0))
+            step *= min(1.0, 0.5 / max(length, 1e-300))
+            for _halving in range(12):
+                trial = q.copy()
+                trial[free] += step * self.scale[free]
+                there = state(trial)
+                if np.linalg.norm(there[0]) < np.linalg.norm(gap) or length < 1e-12:
+                    break
+                step *= 0.5
+            else:
+                break
+            q, (gap, slope) = trial, there
+            if length < 1e-12:
+                break
+        self._check_closed(q)
+        return q
+
+    def _check_closed(self, q: np.ndarray) -> None:
+        gaps, _ = self.gaps(q)
+        open_ = [np.abs(w @ g).max() for w, g in zip(self.wrenches, gaps, strict=True)]
+        worst = int(np.argmax(open_))
+        if not open_[worst] <= 10 * RANK_TOLERANCE:
+            message = (
+                f"the loops cannot be closed from the coordinates given: {self.names[worst]} stays open by about "
+                f"{open_[worst]:.2g} (rad, or sizes of the robot); give coordinates q nearer to a closed position, and "
+                "check points and driven joints"
+            )
+            raise RobotError(message, name=f"closures.{self.names[worst]}")
+
+    def independent(self, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return for each closure the wrenches that it alone bears, (k, 6), and those that the rest bears too.
+
+        What vanishes in this position only, as at a dead point, counts as independent: positions nearby tell.
+        """
+        found = self._split(q)
+        best = found
+        random = np.random.default_rng(1)  # any directions do, the same each time
+        for _ in range(2):
+            slopes = np.concatenate([w @ s for (w, _), s in zip(best, self.gaps(q)[1], strict=True)])
+            motions = _null_space(slopes)
+            if not motions.shape[1]:
+                break
+            sway = motions @ random.normal(size=motions.shape[1])
+            try:
+                nearby = self._split(self.closed(q + SWAY * self.scale * sway / np.abs(sway).max()))
+            except RobotError:
+                continue
+            if sum(len(kept) for kept, _ in nearby) > sum(len(kept) for kept, _ in best):
+                best = nearby
+        unscaled = np.repeat([1.0, self.size], 3)
+        return [(kept * unscaled, rest * unscaled) for kept, rest in best]
+
+    def _split(self, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        _, slopes = self.gaps(q)
+        motions = np.eye(len(q))  # that the closures so far allow
+        found = []
+        for wrenches, slope in zip(self.wrenches, slopes, strict=True):
+            rows = wrenches @ slope @ motions
+            left, sizes, right = np.linalg.svd(rows)
+            rank = int(np.sum(sizes > RANK_TOLERANCE))
+            found.append(tuple(_aligned(part) @ wrenches for part in (left[:, :rank], left[:, rank:])))
+            motions = motions @ right[rank:].T
+        return found
+
+
+def _aligned(basis: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis, as rows, of the same space as the columns given: along the axes where it can be."""
+    projector = basis @ basis.T
+    rows = []
+    for _ in range(basis.shape[1]):
+        lengths = np.linalg.norm(projector, axis=0)
+        row = projector[:, int(np.argmax(lengths > 0.999 * lengths.max()))]
+        row = row / np.linalg.norm(row)
+        row = np.where(np.abs(row) < 1e-12, 0.0, row)
+        projector = projector - np.outer(row, row @ projector)
+        rows.append(row)
+    return np.reshape(rows, (-1, len(basis)))
+
+
+def _null_space(matrix: np.ndarray) -> np.ndarray:
+    _, sizes, right = np.linalg.svd(matrix)
+    return right[int(np.sum(sizes > RANK_TOLERANCE)) :].T
+
+
+def given_coordinates(robot: AbstractRobot, q: GivenCoordinates) -> Float[np.ndarray, " joint"]:
+    """Return coordinates from an array, or from values by name of the joint; zero where none are given."""
+    if q is None or isinstance(q, Mapping):
+        return robot.coordinates(**(q or {}))
+    return np.array(finite_numbers("q", q, (len(robot.joint_names),)))
+
+
+def size_of(robot: AbstractRobot) -> float:
+    """Return a length of the robot, m: the largest distance from a joint to the next, or from a joint to a closure."""
+    lengths = [float(np.linalg.norm(joint.position)) for joint in robot.joints.values()]
+    lengths += [float(np.linalg.norm(p)) for closure in robot.closures.values() for p in closure.points]
+    return max(lengths, default=0.0) or 1.0
+
+
+def closure_wrenches(
+    robot: AbstractRobot, q: GivenCoordinates = None
+) -> dict[str, tuple[Float[np.ndarray, "wrench 6"], Float[np.ndarray, "redundant 6"]]]:
+    """Return what each closure of a robot bears, and what of it is redundant, as the joints of the tree bear it too.
+
+    A mechanism of the robot has one equation for each wrench of the first kind. Those of the second kind hold by
+    themselves; their reactions would have no unique value, and are zero in the mechanism.
+
+    Parameters
+    ----------
+    robot : Robot
+        With closures.
+    q : array_like of shape (n,) or dict of str to float, optional
+        Coordinates near which the loops are closed; zero unless given.
+
+    Returns
+    -------
+    dict of str to tuple of array
+        By name of the closure: wrenches borne (k, 6) and redundant ones (m, 6), each a force and a moment about the
+        point of the closure, in the frame of its first link.
+
+    Raises
+    ------
+    RobotError
+        If the loops cannot be closed near q.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
+    >>> links = [jn.Link("base"), *(jn.Link(name, rod) for name in ("crank", "rod", "rocker"))]
+    >>> joints = [jn.Joint("A", "base", "crank"), jn.Joint("B", "crank", "rod", position=[1, 0, 0])]
+    >>> joints.append(jn.Joint("D", "base", "rocker", position=[1, 1, 0]))
+    >>> tip = jn.Closure("C", ("rod", "rocker"), points=[[1, 0, 0], [1, 0, 0]])
+    >>> four_bar = jn.Robot("four-bar", links, joints, closures=[tip])
+    >>> borne, redundant = jn.robot.closure_wrenches(four_bar, {"A": 0.1, "B": 0.4})["C"]
+    >>> abs(redundant).tolist()  # forces along the axes of the hinges
+    [[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]]
+    """
+    if not robot.closures:
+        return {}
+    loops = Loops(robot)
+    closed = loops.closed(given_coordinates(robot, q))
+    return dict(zip(loops.names, loops.independent(closed), strict=True))

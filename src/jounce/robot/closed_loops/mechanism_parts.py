@@ -1,0 +1,232 @@
+"""The bodies, joints, closures and drives that a robot becomes as a mechanism, in the frames of its moving links."""
+
+from collections.abc import Container
+from typing import Any
+
+import numpy as np
+
+from jounce.constraints import AbstractConstraint, spatial
+from jounce.constraints.drivers import RotationDriver, SpatialSlideDriver
+from jounce.errors import RobotError, check_name
+from jounce.forces import AbstractForce
+from jounce.forces.actuators import SlideForce, SpatialTorque
+from jounce.forces.springs import SlideSpring, SpatialTorsionalSpring
+from jounce.mechanism import AbstractOutput, Body, RelativeAngleOutput
+from jounce.mechanism.mechanism import GROUND
+from jounce.rigid.euler_parameters import from_rotation_matrices
+from jounce.rigid.inertia import Inertia
+from jounce.robot.closed_loops.closures import LinkClosure
+from jounce.robot.closed_loops.coupling import JointPlacement, SlideOutput, coupled
+from jounce.robot.model.abstract_robot import AbstractRobot
+from jounce.robot.model.links_and_joints import Closure, Mimic
+from jounce.robot.model.tree import axes_with_z_along
+from jounce.robot.recursions.kinematics import forward_kinematics
+
+DAMPING, FRICTION, ROTOR, GEAR = "_damping", "_friction", "_rotor", "_gear"
+DRIVES = ("armature", "damping", "friction")
+
+
+def on_body(robot: AbstractRobot, link: str) -> tuple[str, np.ndarray, np.ndarray]:
+    """Return the body that a link is part of, and the pose of the link in its frame."""
+    index, position, rotation = robot.frames[link]
+    if index < 0:
+        return GROUND, position, rotation
+    name = robot.moving_links[index]
+    if name == link:
+        return name, np.zeros(3), np.eye(3)
+    turned = robot.frames[name].rotation.T
+    return name, turned @ position, turned @ rotation
+
+
+class RobotParts:
+    """The bodies, joints and drives of a robot, in the frames of its moving links.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    kept : set of str
+        Joints whose coordinates are wanted, so that they are not merged into a free body or a ball.
+    forces, outputs
+        What may name links that are otherwise merged.
+    drives : bool
+        Whether armature, damping and friction of the joints are wanted.
+    """
+
+    def __init__(self, robot: AbstractRobot, kept: set[str], forces: Any, outputs: Any, drives: bool):
+        self.robot, self.tree = robot, robot.opened().tree
+        self.moving = robot.moving_joints
+        self.driven = [x for x in self.moving if any(getattr(x, field) for field in DRIVES)] if drives else []
+        kept = kept.union(joint.name for joint in self.driven)
+        if GROUND in robot.moving_links:
+            raise RobotError("a link of this name moves; rename it, it stands for the base", name="links", value=GROUND)
+        elements = [*(forces or {}).values(), *(x for x in (outputs or {}).values() if not isinstance(x, str))]
+        links = {body for element in elements for body in element.bodies}
+        links |= {on_body(robot, link)[0] for closure in robot.closures.values() for link in closure.links}
+        self.merged: dict[int, int] = {}  # by index of the last joint of a chain, how many joints are one
+        for k in range(len(self.moving)):
+            for count in (6, 3):
+                first = k - count + 1
+                if first >= 0 and self._is_free(first, count, kept, links) and first not in self._inner():
+                    self.merged[k] = count
+                    break
+        self.rotors: dict[str, str] = {}  # what the bodies are called, by joint
+        for joint in self.driven:
+            if joint.armature:
+                self.rotors[joint.name] = _unused(joint.name + ROTOR, {*robot.links, *self.rotors.values()})
+        inner = self._inner()
+        merged = {self.moving[k].name for k in inner.union(self.merged)}
+        self.coordinates = tuple(name for name in robot.joint_names if name not in merged)
+        self.links = [joint.child for k, joint in enumerate(self.moving) if k not in inner]
+
+    def _inner(self) -> set[int]:
+        """Return the indices of the massless bodies within merged chains."""
+        return {k for last, count in self.merged.items() for k in range(last - count + 1, last)}
+
+    def _is_free(self, first: int, count: int, kept: set[str], links: set[str]) -> bool:
+        """Whether joints in a row let a body move freely (6), or turn freely (3), and nobody asks for one of them."""
+        robot, tree, chain = self.robot, self.tree, self.moving[first : first + count]
+        following = {joint.mimic.joint for joint in self.moving if joint.mimic is not None}
+        if any(joint.mimic is not None or joint.name in kept | following for joint in chain):
+            return False
+        for k, joint in enumerate(chain[:-1], first):
+            children = [other for other in self.moving if robot.frames[other.parent].body == k]
+            if tree.mass[k] or children != [chain[k - first + 1]] or joint.child in links:
+                return False
+        turns = np.arange(first + count - 3, first + count)
+        slides = np.arange(first, first + count - 3)
+        if not all(tree.turning[turns]) or any(tree.turning[slides]) or np.abs(tree.position[turns[1:]]).max() > 1e-12:
+            return False
+        if any(abs(tree.rotation[k][2, 2]) > 1e-9 for k in turns[1:]):
+            return False  # neighbours not at right angles cannot turn a body every way
+        if count == 3:
+            return True
+        axes = [np.eye(3)[2], tree.rotation[slides[1]] @ np.eye(3)[2]]
+        axes.append(tree.rotation[slides[1]] @ tree.rotation[slides[2]] @ np.eye(3)[2])
+        return bool(abs(np.linalg.det(np.array(axes))) > 1e-3)
+
+    def placed(self, index: int) -> JointPlacement:
+        """Return a moving joint in the frames of the two bodies."""
+        joint = self.moving[index]
+        parent, position, rotation = on_body(self.robot, joint.parent)
+        point, rotation = position + rotation @ joint.position, rotation @ joint.rotation
+        side = axes_with_z_along(joint.axis)[:, 0]
+        return JointPlacement(
+            (parent, joint.child), joint.turning, point, rotation @ joint.axis, joint.axis, rotation @ side, side
+        )
+
+    def _named(self, name: str) -> JointPlacement:
+        return self.placed([joint.name for joint in self.moving].index(name))
+
+    def joints(self) -> dict[str, AbstractConstraint]:
+        """Return the joints of the tree, and what couples joints that follow others."""
+        found: dict[str, AbstractConstraint] = {}
+        inner = self._inner()
+        for k, joint in enumerate(self.moving):
+            if k in inner or self.merged.get(k) == 6:
+                continue
+            if self.merged.get(k) == 3:
+                first = self.placed(k - 2)
+                bodies = (first.bodies[0], joint.child)
+                found[self.moving[k - 2].name] = spatial.Spherical(bodies, first.point, np.zeros(3))
+                continue
+            at = self.placed(k)
+            ends = (at.point, np.zeros(3), at.axis_i, at.axis_j)
+            if at.turning:
+                found[joint.name] = spatial.Revolute(at.bodies, *ends)
+            else:
+                found[joint.name] = spatial.Prismatic(at.bodies, *ends, at.vector_i, at.vector_j)
+        for joint in self.moving:
+            if joint.mimic is not None:
+                pair = (self._named(joint.mimic.joint), self._named(joint.name))
+                found[self._named_apart(f"{joint.name}_mimic", found)] = coupled(
+                    *pair, joint.mimic.multiplier, joint.mimic.offset
+                )
+        origin, x, _, z = np.zeros(3), *np.eye(3)
+        for name, rotor in self.rotors.items():
+            turning = JointPlacement((GROUND, rotor), True, origin, z, z, x, x)
+            found[self._named_apart(name + ROTOR, found)] = spatial.Revolute(turning.bodies, origin, origin, z, z)
+            found[self._named_apart(name + GEAR, found)] = coupled(self._named(name), turning, 1.0, 0.0)
+        return found
+
+    def _named_apart(self, name: str, taken: Any) -> str:
+        return _unused(name, {*taken, *self.robot.joints, *self.robot.closures})
+
+    def closure(self, closure: Closure, wrenches: np.ndarray) -> LinkClosure:
+        """Return what closes a loop, in the directions of the wrenches given in the frame of the first link."""
+        ends = [on_body(self.robot, link) for link in closure.links]
+        points = [at + turned @ p for (_, at, turned), p in zip(ends, closure.points, strict=True)]
+        (first, _, turned), (second, _, other) = ends
+        axes = np.kron(np.eye(2), turned.T)
+        attitude = {}
+        if np.any(wrenches[:, 3:]):
+            quaternion = from_rotation_matrices(turned @ closure.rotation @ other.T)
+            attitude = {"vector_part": quaternion[1:], "scalar_part": float(quaternion[0])}
+        return LinkClosure((first, second), points[0], points[1], wrenches @ axes, **attitude)
+
+    def driver(self, name: str, law: Any) -> AbstractConstraint:
+        """Return the driver of a coordinate."""
+        at = self._named(name)
+        if at.turning:
+            return RotationDriver(at.bodies, at.axis_i, law, at.vector_i, at.vector_j)
+        return SpatialSlideDriver(at.bodies, at.point, np.zeros(3), at.axis_i, law)
+
+    def output(self, name: str, joint: str) -> AbstractOutput:
+        """Return the coordinate of a joint as an output."""
+        check_name("moving joint", joint, [j.name for j in self.moving], RobotError, name=f"outputs.{name}")
+        at = self._named(joint)
+        if at.turning:
+            return RelativeAngleOutput(at.bodies, at.axis_i, at.vector_i, at.vector_j)
+        return SlideOutput(at.bodies, at.point, np.zeros(3), at.axis_i)
+
+    def losses(self) -> dict[str, AbstractForce]:
+        """Return the dampers of the joints, and their dry friction."""
+        found: dict[str, AbstractForce] = {}
+        for joint in self.driven:
+            at, law = self._named(joint.name), f"-{joint.friction!r}*sign(v)"
+            turn = {"axis_i": at.axis_i, "vector_i": at.vector_i, "vector_j": at.vector_j}
+            ends = {"point_i": at.point, "point_j": np.zeros(3), "vector_i": at.axis_i}
+            if joint.damping:
+                kind, places = (SpatialTorsionalSpring, turn) if at.turning else (SlideSpring, ends)
+                found[joint.name + DAMPING] = kind(at.bodies, **places, stiffness=0.0, damping=joint.damping)
+            if joint.friction:
+                kind, places = (SpatialTorque, turn) if at.turning else (SlideForce, ends)
+                found[joint.name + FRICTION] = kind(at.bodies, **places, law=law)
+        return found
+
+    def bodies(self, q: np.ndarray) -> dict[str, Body]:
+        """Return the moving bodies with their masses, at the pose that the coordinates give.
+
+        Armature is inertia against the rate of a coordinate alone, of which the links know nothing: it is that of a
+        rotor on the ground, without mass, that turns by as many radians as the coordinate has radians or metres.
+        """
+        robot, tree = self.robot, self.robot.opened()
+        masses: dict[str, list[Inertia]] = {name: [] for name in self.links}
+        for name, link in robot.links.items():
+            body, position, rotation = on_body(robot, name)
+            if link.inertia is not None and body != GROUND:
+                masses[body].append(link.inertia.moved(position, rotation))
+        found = {}
+        for name, parts in masses.items():
+            at = forward_kinematics(tree, q[None], name)
+            whole = Inertia.total(parts) if parts else None
+            found[name] = Body(
+                at.position[0].tolist(),
+                orientation=from_rotation_matrices(np.asarray(at.rotation[0])).tolist(),
+                mass=None if whole is None else whole.mass,
+                inertia=None if whole is None else whole.tensor,
+                center_of_mass=None if whole is None else whole.center_of_mass,
+            )
+        for name, rotor in self.rotors.items():
+            mimic = robot.joints[name].mimic or Mimic(name)
+            angle = mimic.multiplier * q[robot.joint_names.index(mimic.joint)] + mimic.offset
+            attitude = {"axis": [0.0, 0.0, 1.0], "angle": float(angle)}
+            inertia = [robot.joints[name].armature] * 3
+            found[rotor] = Body([0.0] * 3, orientation=attitude, mass=0.0, inertia=inertia)
+        return found
+
+
+def _unused(name: str, taken: Container[str]) -> str:
+    while name in taken:
+        name += "_"
+    return name

@@ -1,0 +1,1 @@
+"""Links, joints and laws of a robot, and its tree."""

@@ -1,0 +1,367 @@
+"""Links and joints by name, moving joints in the order of q, and changed copies; frozen."""
+
+import abc
+import dataclasses
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+import numpy as np
+
+from jounce.display import Displayed
+from jounce.errors import RobotError, check_name, did_you_mean
+from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers
+from jounce.robot.model.floating_base import floating_joints
+from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link, limits_with_followers
+from jounce.robot.model.tree import Tree, arrange, ordered, turn_about
+from jounce.shapes import ArrayLike, Real, is_traced
+
+Made = TypeVar("Made", bound="AbstractRobot")
+
+STANDARD_GRAVITY = 9.81  # m/s^2, as in Pinocchio and MuJoCo
+
+
+class AbstractRobot(Displayed, abc.ABC):
+    """Links and joints by name and the tree that they form: all of a robot but what is made of it; see `Robot`."""
+
+    def __init__(
+        self,
+        name: str,
+        links: Sequence[Link],
+        joints: Sequence[Joint],
+        gravity: Any = (0.0, 0.0, -STANDARD_GRAVITY),
+        closures: Sequence[Closure] = (),
+        strict: bool = True,
+    ):
+        self.name, self.strict = name, strict
+        self.gravity = finite_numbers("gravity", gravity, (3,))
+        self.links: Mapping[str, Link] = MappingProxyType(_by_name("links", links, Link))
+        in_order = ordered(self.links, _by_name("joints", joints, Joint))
+        self.joints: Mapping[str, Joint] = MappingProxyType({joint.name: joint for joint in in_order})
+        self.base = ({*self.links} - {joint.child for joint in self.joints.values()}).pop()
+        self.joint_names = tuple(joint.name for joint in self.moving_joints if joint.mimic is None)
+        for joint in self.moving_joints:
+            self._check_mimic(joint)
+        self._tree, self.frames = arrange(self.base, self.links, in_order, self.gravity)
+        if strict and (massless := self.massless_joints):
+            message = (
+                "this joint moves no mass; give its link, or one that it carries, an inertia, or keep it with "
+                "strict=False, where its torque is zero"
+            )
+            raise RobotError(message, name=f"links.{self.joints[massless[0]].child}.inertia", value=None)
+        given = _by_name("closures", closures, Closure)
+        placed = {name: self._checked_closure(closure) for name, closure in given.items()}
+        self.closures: Mapping[str, Closure] = MappingProxyType(placed)
+        self._made = True
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if "_made" in self.__dict__:  # the tree would not follow
+            message = "a robot does not change; make another, as with_gravity, with_payload and locked do"
+            raise AttributeError(f"{name}: {message}")
+        object.__setattr__(self, name, value)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        closures = list(self.closures.values())
+        parts = (list(self.links.values()), list(self.joints.values()))
+        return type(self), (self.name, *parts, self.gravity, closures, self.strict)
+
+    def __repr__(self) -> str:
+        count = len(self.joint_names)
+        closed = f", closed by {', '.join(self.closures)}" if self.closures else ""
+        joints = "joint" if count == 1 else "joints"
+        return f"<Robot {self.name}: {count} {joints}, {len(self.links)} links{closed}>"
+
+    @property
+    def tree(self) -> Tree:
+        """The arrays that the algorithms on coordinates work with; a robot with closures has none."""
+        if self.closures:
+            message = (
+                "the loops of this robot make its coordinates depend on one another; jn.solve(robot.mechanism(...)) "
+                "gives its motion and forces, robot.opened() the tree without closures"
+            )
+            raise RobotError(message, name=self.name, value=list(self.closures))
+        return self._tree
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Names of the links; each is also the name of a frame."""
+        return tuple(self.links)
+
+    @property
+    def moving_joints(self) -> tuple[Joint, ...]:
+        """Joints that are not fixed, parents before children; some may follow others."""
+        return tuple(joint for joint in self.joints.values() if joint.moving)
+
+    @property
+    def moving_links(self) -> tuple[str, ...]:
+        """Names of the links that joints move, one for each, in the order of results for each body.
+
+        Links fixed to one of them move with it, and their mass is counted there.
+        """
+        return tuple(joint.child for joint in self.moving_joints)
+
+    @property
+    def massless_joints(self) -> tuple[str, ...]:
+        """Joints that move no mass, so that no force is needed for any motion of them."""
+        tree = self._tree
+        if any(isinstance(link.inertia, TracedInertia) for link in self.links.values()):
+            return ()  # the masses are not known: forward dynamics tells where nothing resists a joint
+        moved = ((tree.mass > 0) | tree.inertia.any((1, 2))) @ tree.ancestors[:-1]
+        return tuple(joint.name for joint, some in zip(self.moving_joints, moved, strict=True) if not some)
+
+    @property
+    def limits(self) -> dict[str, Limits]:
+        """Limits of the joints in `joint_names`, which keep those of joints that follow them too.
+
+        Raises
+        ------
+        RobotError
+            If no coordinate, or but one, is within the range of a joint and of those that follow it.
+        """
+        return self.limits_with({})
+
+    def limits_with(self, given: Mapping[str, Limits]) -> dict[str, Limits]:
+        """Return the limits of the joints in `joint_names` with others in the place of their own.
+
+        Joints that follow others keep their own limits: of what is given to the joint that they follow and of these,
+        the tighter one holds.
+
+        Parameters
+        ----------
+        given : dict of str to Limits
+            Of some of the joints in `joint_names`.
+
+        Raises
+        ------
+        RobotError
+            If no coordinate, or but one, is within the range of a joint and of those that follow it.
+
+        Examples
+        --------
+        >>> import jounce as jn
+        >>> left = jn.Joint("left", "base", "a", "prismatic")
+        >>> follows = {"limits": jn.Limits(velocity=1.0), "mimic": jn.Mimic("left", -2.0)}
+        >>> right = jn.Joint("right", "base", "b", "prismatic", **follows)
+        >>> links = [jn.Link(name, jn.Inertia(1.0)) for name in ("base", "a", "b")]
+        >>> gripper = jn.Robot("gripper", links, [left, right])
+        >>> gripper.limits_with({"left": jn.Limits(velocity=5.0)})["left"].velocity
+        0.5
+        """
+        followers: dict[str, list[Joint]] = {name: [] for name in self.joint_names}
+        for joint in self.moving_joints:
+            if joint.mimic is not None:
+                followers[joint.mimic.joint].append(joint)
+        return {
+            name: limits_with_followers(name, given.get(name, self.joints[name].limits), others)
+            for name, others in followers.items()
+        }
+
+    @property
+    def base_inertia(self) -> Inertia | None:
+        """Inertia of the base and of all links fixed to it, in the frame of the base; None if it has none."""
+        fixed = {name: frame for name, frame in self.frames.items() if frame.body < 0}
+        parts = [
+            inertia.moved(frame.position, frame.rotation)
+            for name, frame in fixed.items()
+            if (inertia := self.links[name].inertia) is not None
+        ]
+        return Inertia.total(parts) if parts else None
+
+    @property
+    def mass(self) -> float:
+        """Mass of all links, the base included, kg."""
+        return sum((link.inertia.mass for link in self.links.values() if link.inertia is not None), 0.0)
+
+    def with_gravity(self: Made, gravity: ArrayLike) -> Made:
+        """Return the same robot under another acceleration of free fall, m/s^2 in the frame of the base."""
+        return self._changed(gravity=gravity)
+
+    def with_closures(self: Made, closures: Sequence[Closure]) -> Made:
+        """Return the robot with more closures."""
+        return self._changed(closures=[*self.closures.values(), *closures])
+
+    def opened(self: Made) -> Made:
+        """Return the tree without closures; its coordinates do not depend on one another."""
+        return self._changed(closures=())
+
+    def with_payload(self: Made, link: str, payload: Inertia) -> Made:
+        """Return the robot with a load fixed to a link, given in the frame of that link: Q_SU of Negrean 2025, 125.
+
+        Raises
+        ------
+        RobotError
+            If there is no such link.
+        """
+        check_name("link", link, self.links, RobotError, name="link")
+        held = self.links[link].inertia
+        whole = payload if held is None else Inertia.total([held, payload])
+        links = {**self.links, link: Link(link, whole)}
+        return self._changed(links=list(links.values()))
+
+    def with_inertia(
+        self: Made,
+        link: str,
+        *,
+        mass: Real | None = None,
+        center_of_mass: ArrayLike | None = None,
+        tensor: ArrayLike | None = None,
+    ) -> Made:
+        """Return the robot with another inertia of a link; what is not given stays, zero where the link had none.
+
+        JAX may trace the values, so that torques, accelerations and the mass matrix have gradients by them; they are
+        not checked then.
+
+        Parameters
+        ----------
+        link : str
+            Name of the link.
+        mass : float, optional
+            kg.
+        center_of_mass : array_like of shape (3,), optional
+            m, in the frame of the link.
+        tensor : array_like of shape (3, 3) or (3,), optional
+            Inertia about the centre of mass, in axes parallel to those of the link, kg m^2; three numbers are its
+            diagonal.
+
+        Raises
+        ------
+        RobotError
+            If there is no such link, or a value is not one of a real body (unless the robot is not strict).
+
+        Examples
+        --------
+        >>> import jax
+        >>> import jounce as jn
+        >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+        >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
+        >>> arm = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", rod)], [pin])
+        >>> def torque(mass):
+        ...     return jn.inverse_dynamics(arm.with_inertia("rod", mass=mass), [[0.0], [0.0], [0.0]])[0, 0]
+        >>> with jax.enable_x64(True):
+        ...     round(float(jax.grad(torque)(1.0)), 9)  # N m for each kg at half a metre
+        4.905
+        """
+        check_name("link", link, self.links, RobotError, name="link")
+        held = self.links[link].inertia or Inertia(0.0, strict=False)
+        given = {"mass": mass, "center_of_mass": center_of_mass, "tensor": tensor}
+        values: dict[str, Any] = {k: getattr(held, k) if v is None else v for k, v in given.items()}
+        if is_traced(values) or isinstance(held, TracedInertia):
+            inertia = TracedInertia(**values)
+        else:
+            inertia = Inertia(**values, strict=self.strict)
+        links = {**self.links, link: Link(link, inertia)}
+        return self._changed(links=list(links.values()))
+
+    def locked(self: Made, positions: Mapping[str, float]) -> Made:
+        """Return the robot with joints held at given coordinates, rad or m; joints that follow them are held too.
+
+        Raises
+        ------
+        RobotError
+            If there is no such moving joint, or it follows another.
+        """
+        for name, value in positions.items():
+            check_name("moving joint", name, self.joint_names, RobotError, name="locked")
+            finite_numbers(f"locked.{name}", value, ())
+        joints = []
+        for joint in self.joints.values():
+            held = positions.get(joint.name)
+            if joint.moving and joint.mimic is not None and joint.mimic.joint in positions:
+                held = joint.mimic.multiplier * positions[joint.mimic.joint] + joint.mimic.offset
+            joints.append(joint if held is None else _held(joint, float(held)))
+        return self._changed(joints=joints)
+
+    def with_floating_base(self: Made, sequence: str = "ZYX") -> Made:
+        """Return the robot on a base that moves freely: three slides along x, y, z, then three turns.
+
+        The new base is the link ``world``, or ``world_`` where the robot has a link of that name. The coordinates
+        base_x, base_y, base_z (m) and base_angle_1 to 3 (rad) come first in q. Their generalised forces are those that
+        would have to hold the base: for one that is free, they tell how far a motion is from what physics allows. The
+        angles have a singular orientation (for ``ZYX`` the second at a right angle): choose a sequence that stays away
+        from it.
+
+        Parameters
+        ----------
+        sequence : str, default "ZYX"
+            Axes of the turns, three letters, each about the axes as moved by those before.
+        """
+        world = "world"
+        while world in self.links:
+            world += "_"
+        links, joints = floating_joints(self.base, sequence, world=world)
+        return self._changed(links=[*links, *self.links.values()], joints=[*joints, *self.joints.values()])
+
+    @abc.abstractmethod
+    def mechanism(self, q: Any = None, **settings: Any) -> Any:
+        """Return the mechanism that the robot is."""
+
+    def coordinates(self, **values: float) -> np.ndarray:
+        """Return an array for q, shape (n,), with the named joints at the given values and the others at zero."""
+        for name in values:
+            check_name("moving joint", name, self.joint_names, RobotError, name="joint")
+        return np.array([finite_numbers(name, values.get(name, 0.0), ()) for name in self.joint_names])
+
+    def _changed(self: Made, **parts: Any) -> Made:
+        """Return the robot with other links, joints, gravity or closures."""
+        held = {name: list(getattr(self, name).values()) for name in ("links", "joints", "closures")}
+        return type(self)(**{"name": self.name, "gravity": self.gravity, "strict": self.strict, **held, **parts})
+
+    def _checked_closure(self, closure: Closure) -> Closure:
+        """Return a closure with what it leaves to the pose at coordinates zero."""
+        where = f"closures.{closure.name}"
+        if closure.name in self.joints:
+            raise RobotError("a joint and a closure have the same name", name=where)
+        for link in closure.links:
+            check_name("link", link, self.links, RobotError, name=where)
+        if len({self.frames[link].body for link in closure.links}) == 1:
+            message = "these links are fixed to one another already; a closure joins links that move"
+            raise RobotError(message, name=f"{where}.links", value=list(closure.links))
+        poses = _poses_at_zero(self.joints)
+        (origin, turned), (other, other_turned) = (poses[link] for link in closure.links)
+        points, rotation = closure.points, closure.rotation
+        if points.shape == (3,):
+            points = np.array([points, other_turned.T @ (origin + turned @ points - other)])
+        if rotation is None:
+            rotation = turned.T @ other_turned
+        return dataclasses.replace(closure, points=points, rotation=rotation)
+
+    def _check_mimic(self, joint: Joint) -> None:
+        if joint.mimic is not None and joint.mimic.joint not in self.joint_names:
+            message = (
+                f"must follow a moving joint that follows no other; {did_you_mean(joint.mimic.joint, self.joint_names)}"
+            )
+            raise RobotError(message, name=f"joints.{joint.name}.mimic", value=joint.mimic.joint)
+
+
+def _by_name(kind: str, parts: Sequence[Any], wanted: type) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for k, part in enumerate(parts):
+        if not isinstance(part, wanted):
+            raise RobotError(f"must be a {wanted.__name__}", name=f"{kind}[{k}]", value=part)
+        if part.name in found:
+            raise RobotError("this name is given twice", name=kind, value=part.name)
+        found[part.name] = part
+    if not found and kind == "links":
+        raise RobotError("a robot needs at least one link", name=kind)
+    return found
+
+
+def _poses_at_zero(joints: Mapping[str, Joint]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return position and rotation of all links at coordinates zero, in the frame of the base."""
+    found: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    for joint in joints.values():
+        follows = joint.moving and joint.mimic is not None
+        still = _held(joint, joint.mimic.offset if follows and joint.mimic is not None else 0.0)
+        position, rotation = found.setdefault(joint.parent, (np.zeros(3), np.eye(3)))
+        found[joint.child] = (position + rotation @ still.position, rotation @ still.rotation)
+    return found
+
+
+def _held(joint: Joint, coordinate: float) -> Joint:
+    """Return the fixed joint that holds a moving one at a coordinate."""
+    position, rotation = joint.position, joint.rotation
+    if joint.turning:
+        rotation = rotation @ turn_about(joint.axis, coordinate)
+    else:
+        position = position + rotation @ joint.axis * coordinate
+    return dataclasses.replace(joint, type="fixed", position=position, rotation=rotation, mimic=None)

@@ -1,0 +1,104 @@
+"""What users hand to the functions of robots, checked: numbers, coordinates and their derivatives."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce import errors
+from jounce.errors import RobotError
+from jounce.robot.model.abstract_robot import AbstractRobot
+from jounce.shapes import Numbers, is_real, real_numbers
+from jounce.trajectory.joint_trajectory import MAX_ORDER
+
+
+def floats(name: str, values: Any, read: Callable[..., np.ndarray] = real_numbers) -> Float[Numbers, "..."]:
+    """Return values as an array of double precision, of NumPy unless it is one of JAX.
+
+    Raises
+    ------
+    RobotError
+        If they are not real numbers in one rectangular array.
+    """
+    if is_real(values):
+        return values.astype(float, copy=False)
+    return read(name, values, _no_array, "an array of real numbers")
+
+
+def _no_array(message: str, name: str, value: object) -> RobotError:
+    return RobotError(message, name=name, value=type(value).__name__)
+
+
+whole_number = partial(errors.whole_number, error=RobotError)
+
+
+def joints_of(robot: object) -> tuple[str, ...]:
+    """Return the names of the joints of what must be a robot.
+
+    Raises
+    ------
+    RobotError
+        If it is none.
+    """
+    if not isinstance(robot, AbstractRobot):
+        raise RobotError("must be a jn.Robot, as jn.load_robot gives it", name="robot", value=robot)
+    return robot.joint_names
+
+
+def checked_position(robot: AbstractRobot, q: object, name: str = "q") -> Float[Numbers, "*batch 1 joint"]:
+    """Return coordinates without derivatives as those of order zero.
+
+    Raises
+    ------
+    RobotError
+        If there is no robot, or their shape, (..., n), does not fit it.
+    """
+    n, q = len(joints_of(robot)), floats(name, q)
+    if q.ndim < 1 or q.shape[-1] != n:
+        raise RobotError(f"must have the shape (..., n) with n = {n}, not {q.shape}", name=name)
+    return q[..., None, :]
+
+
+def checked_state(robot: AbstractRobot, state: object) -> Float[Numbers, "*batch 2 joint"]:
+    """Return coordinates and velocities.
+
+    Raises
+    ------
+    RobotError
+        If there is no robot, or their shape, (..., 2, n), does not fit it.
+    """
+    n, state = len(joints_of(robot)), floats("state", state)
+    if state.ndim < 2 or state.shape[-2:] != (2, n):
+        message = f"must hold q and q', the shape (..., 2, {n}) for the joints of {robot.name}, not {state.shape}"
+        raise RobotError(message, name="state")
+    return state
+
+
+def checked_coordinates(
+    robot: AbstractRobot, q: object, least: int = 0, most: int | None = None
+) -> Float[Numbers, "*batch derivative joint"]:
+    """Return coordinates and their derivatives, at least so many, cut to at most so many.
+
+    Raises
+    ------
+    RobotError
+        If there is no robot, their shape does not fit it, or the derivatives are too few or too many.
+    """
+    n, q = len(joints_of(robot)), floats("q", q)
+    if q.ndim < 2 or q.shape[-1] != n:
+        joints = f"{robot.name} has {n} {'joint' if n == 1 else 'joints'}"
+        raise RobotError(f"must have the shape (..., order + 1, n), not {q.shape}; {joints}: n = {n}", name="q")
+    if q.shape[-2] < least + 1:
+        names = ", ".join(["q", "q'", "q''"][: least + 1])
+        lacks = f"must hold {names}" if least < 3 else f"needs derivatives of q to order {least}"
+        message = f"{lacks} along its last axis but one: the shape (..., order + 1, n), not {q.shape}"
+        raise RobotError(message, name="q")
+    if q.shape[-2] > MAX_ORDER + 1:
+        message = (
+            f"must have at most {MAX_ORDER} derivatives along its last axis but one, not {q.shape[-2] - 1}; positions "
+            "at many instants alone have the shape (..., 1, n), as q[..., None, :]"
+        )
+        raise RobotError(message, name="q")
+    return q if most is None else q[..., : most + 1, :]

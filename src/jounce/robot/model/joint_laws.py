@@ -1,0 +1,179 @@
+"""Forces of joints as functions of time and state: feedback, expressions, motion laws and constants."""
+
+import abc
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import JounceError, RobotError, check_name
+from jounce.jet import Jet
+from jounce.jet.compose import OfSample
+from jounce.modules import Module
+from jounce.robot.model.arguments import floats
+from jounce.shapes import ArrayLike, Numbers
+from jounce.trajectory.joint_trajectory import JointTrajectory
+from jounce.trajectory.motion import AbstractMotion
+from jounce.trajectory.user_laws import read_laws
+from jounce.units.expression import Expression
+
+RATE = "_d1"  # as columns of files name rates
+
+
+class _Expressed(Module):
+    """An expression of time, coordinates and rates by the names of joints."""
+
+    expression: Expression = eqx.field(static=True)
+    names: tuple[str, ...] = eqx.field(static=True)
+
+    def __call__(self, time: Any, q: Any, rate: Any) -> Any:
+        known = {name: q[k] for k, name in enumerate(self.names)}
+        known |= {name + RATE: rate[k] for k, name in enumerate(self.names)}
+        return self.expression.evaluate({"t": time, **known})
+
+
+class _OfTime(Module):
+    """A motion law, read as a force of time."""
+
+    law: AbstractMotion
+
+    def __call__(self, time: Any, *_: Any) -> Any:
+        return self.law(Jet([time])).coefficients[0]
+
+
+class AbstractJointLaws(Module):
+    """Forces of all joints, of whole batches at once."""
+
+    @property
+    @abc.abstractmethod
+    def changing(self) -> bool:
+        """Whether they depend on anything."""
+
+    @abc.abstractmethod
+    def __call__(
+        self, time: Float[Numbers, "1 batch"], q: Float[Numbers, "n batch"], rate: Float[Numbers, "n batch"]
+    ) -> Float[Numbers, "n batch"]:
+        """Return the forces of the joints, N m or N."""
+
+
+class JointLaws(AbstractJointLaws):
+    """Forces of all joints; see `joint_laws`.
+
+    Attributes
+    ----------
+    constant : array of shape (coordinates,)
+        What does not change.
+    whole : callable or None
+        Gives the forces of all joints at once.
+    single : tuple of callable
+        Give the force of one joint each.
+    columns : tuple of int
+        Which.
+    """
+
+    constant: Any
+    whole: OfSample | None
+    single: tuple[Any, ...]
+    columns: tuple[int, ...] = eqx.field(static=True)
+
+    @property
+    def changing(self) -> bool:
+        """Whether they depend on anything."""
+        return self.whole is not None or bool(self.single)
+
+    def __call__(
+        self, time: Float[Numbers, "1 batch"], q: Float[Numbers, "n batch"], rate: Float[Numbers, "n batch"]
+    ) -> Float[Numbers, "n batch"]:
+        """Return the forces of the joints, N m or N."""
+        found = jnp.broadcast_to(jnp.asarray(self.constant)[:, None], q.shape)
+        if self.whole is not None:
+            return found + self.whole(time[0], q, rate)
+        rows = {k: law(time[0], q, rate) for k, law in zip(self.columns, self.single, strict=True)}
+        if not rows:
+            return found
+        shape = time[0].shape
+        return jnp.stack([jnp.broadcast_to(rows[k], shape) if k in rows else found[k] for k in range(len(found))])
+
+
+GivenLaws = ArrayLike | Callable[..., Any] | Mapping[str, Any] | JointTrajectory | AbstractJointLaws
+"""Forces of joints: constants, a function of time and state, or by name of the joint a law of its own."""
+
+
+def joint_laws(names: Sequence[str], given: GivenLaws | None, what: str = "torque") -> AbstractJointLaws:
+    """Return what a user gives for the forces of joints, checked.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the joints, in the order of q.
+    given : None, array_like of shape (n,), callable, mapping, JointTrajectory or AbstractJointLaws
+        None for no forces; constants; a function of time, q and rates, of one sample, by operations of JAX, that
+        returns n forces; or one law for each joint that has a force: a number, an expression of ``t``, of the names of
+        joints and of their rates as ``NAME_d1``, a motion law, or a function that returns one force.
+    what : str
+        Name of the argument, for messages.
+
+    Raises
+    ------
+    RobotError
+        If a joint does not exist, or a law is none or returns another shape.
+    """
+    count, nothing = len(names), np.zeros(len(names))
+    if given is None:
+        return JointLaws(nothing, None, (), ())
+    if isinstance(given, AbstractJointLaws):
+        return given
+    if isinstance(given, JointTrajectory):
+        given = given.laws
+    if callable(given):
+        return JointLaws(nothing, _read(given, count, (count,), what), (), ())
+    if not isinstance(given, Mapping):
+        constant = np.asarray(floats(what, given))
+        if constant.shape != (count,) or not np.isfinite(constant).all():
+            message = f"must hold {count} finite numbers, one for each joint, or be a function, or a mapping of names"
+            raise RobotError(message, name=what, value=constant.tolist())
+        return JointLaws(constant, None, (), ())
+    laws: dict[int, Any] = {}
+    for name, law in given.items():
+        check_name("moving joint", name, names, RobotError, name=what)
+        laws[names.index(name)] = _single(law, tuple(names), f"{what}.{name}")
+    for k in [k for k, law in laws.items() if isinstance(law, float)]:
+        nothing[k] = laws.pop(k)
+    return JointLaws(nothing, None, tuple(laws.values()), tuple(laws))
+
+
+def _single(law: Any, names: tuple[str, ...], where: str) -> Any:
+    if isinstance(law, str):
+        try:
+            expression = Expression(law)
+            expression.check({"t", *names, *(name + RATE for name in names)})
+        except JounceError as error:
+            error.name = where
+            raise
+        return _Expressed(expression, names)
+    if isinstance(law, AbstractMotion):
+        return _OfTime(read_laws(law))
+    if callable(law):
+        return _read(law, len(names), (), where)
+    value = float(floats(where, law)) if np.ndim(law) == 0 else np.nan
+    if not np.isfinite(value):
+        message = "must be a finite number, an expression, a motion law or a function of time, q and rates"
+        raise RobotError(message, name=where, value=law)
+    return value
+
+
+def _read(function: Callable[..., Any], count: int, wanted: tuple[int, ...], where: str) -> OfSample:
+    """Return what a function of a user computes now, checked."""
+    state = jnp.zeros(()), jnp.zeros(count), jnp.zeros(count)
+    try:
+        found = OfSample.of(function, *state)
+    except TypeError as error:
+        message = f"must be a function of time, q and rates, by operations of JAX: {str(error).splitlines()[0]}"
+        raise RobotError(message, name=where) from error
+    if found.shape != wanted:
+        noun = f"an array of {count} forces" if wanted else "one number"
+        raise RobotError(f"the function must return {noun}, the shape {wanted}, not {found.shape}", name=where)
+    return found

@@ -1,0 +1,246 @@
+"""The robot as the algorithms see it: moving bodies in depth-first order, as arrays that are scanned."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
+
+from jounce.errors import RobotError, check_name
+from jounce.rigid.inertia import Inertia
+from jounce.robot.model.links_and_joints import Joint, Link, Mimic
+
+MASSLESS = Inertia(0.0, strict=False)
+
+
+@dataclasses.dataclass(frozen=True)
+class Shape:
+    """What is known when the algorithms are compiled: how many bodies there are and what kinds of joints.
+
+    Parameters
+    ----------
+    bodies, coordinates, slots : int
+        Moving bodies; coordinates in q; places in which states of parents are kept until their last child is done.
+    turning, sliding : bool
+        Whether any joint turns, or slides.
+    direct : bool
+        Whether body k has coordinate k for its own, as where no joint follows another.
+    """
+
+    bodies: int
+    coordinates: int
+    slots: int
+    turning: bool
+    sliding: bool
+    direct: bool
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Tree:
+    """Arrays of a robot, one entry for each moving body; its frame has the axis of its joint for z.
+
+    Links fixed to a moving one are part of its body. Bodies are in depth-first order.
+
+    Parameters
+    ----------
+    rotation, position : array of shape (bodies, 3, 3) and (bodies, 3)
+        Pose of the body at coordinate zero in the frame of its parent body.
+    mass, center, inertia : array of shape (bodies,), (bodies, 3), (bodies, 3, 3)
+        Mass, centre of mass and inertia about it, in the frame of the body.
+    turning : array of shape (bodies,)
+        1 where the joint turns, 0 where it slides.
+    coordinate, multiplier, offset : array of shape (bodies,)
+        The coordinate of the joint is ``multiplier * q[coordinate] + offset``.
+    slot, parent_slot : array of int, shape (bodies,)
+        Where the state of the body is kept, and where that of its parent is.
+    ancestors : array of shape (bodies + 1, bodies)
+        1 where joint j moves body i; the last row is the base.
+    armature, damping, friction : array of shape (coordinates,)
+        Of the drives, those of joints that follow included.
+    gravity : array of shape (3,)
+        m/s^2.
+    """
+
+    rotation: Any
+    position: Any
+    mass: Any
+    center: Any
+    inertia: Any
+    turning: Any
+    coordinate: Any
+    multiplier: Any
+    offset: Any
+    slot: Any
+    parent_slot: Any
+    ancestors: Any
+    armature: Any
+    damping: Any
+    friction: Any
+    gravity: Any
+    shape: Shape = dataclasses.field(metadata={"static": True})
+
+
+class Frame(NamedTuple):
+    """Where a link is: the body that it moves with (-1 is the base), and its pose in the frame of that body."""
+
+    body: int
+    position: Float[np.ndarray, " 3"]
+    rotation: Float[np.ndarray, "3 3"]
+
+
+def ordered(links: Mapping[str, Link], joints: Mapping[str, Joint]) -> list[Joint]:
+    """Return the joints in depth-first order from the base, and check that they form one tree."""
+    parents: dict[str, Joint] = {}
+    children: dict[str, list[Joint]] = {name: [] for name in links}
+    for joint in joints.values():
+        for role in ("parent", "child"):
+            link = getattr(joint, role)
+            check_name("link", link, links, RobotError, name=f"joints.{joint.name}.{role}")
+        if joint.child in parents:
+            first = parents[joint.child].name
+            message = (
+                f"link {joint.child} is the child of two joints, {first} and {joint.name}: a loop, which a tree cannot "
+                "have; leave one of them out"
+            )
+            raise RobotError(message, name=f"joints.{joint.name}.child", value=joint.child)
+        parents[joint.child] = joint
+        children[joint.parent].append(joint)
+    roots = [name for name in links if name not in parents]
+    if not roots:
+        raise RobotError(
+            "the joints form a loop: every link is the child of a joint, and none can be the base", name="joints"
+        )
+    if len(roots) > 1:
+        message = "exactly one link must be no joint's child, the base; join the others to it"
+        raise RobotError(message, name="links", value=roots)
+    found: list[Joint] = []
+    waiting = list(reversed(children[roots[0]]))
+    while waiting:
+        joint = waiting.pop()
+        found.append(joint)
+        waiting += reversed(children[joint.child])
+    if len(found) < len(joints):
+        reached = {joint.name for joint in found}
+        lost = [name for name in joints if name not in reached]
+        raise RobotError("these joints form a loop that the base does not reach", name="joints", value=lost)
+    return found
+
+
+def arrange(
+    base: str, links: Mapping[str, Link], joints: Sequence[Joint], gravity: np.ndarray
+) -> tuple[Tree, dict[str, Frame]]:
+    """Merge fixed links, turn the axes of all joints to z, and lay the bodies out for the scans.
+
+    Joints are in order, those of parents first.
+    """
+    identity, zero = np.eye(3), np.zeros(3)
+    frames = {base: Frame(-1, zero, identity)}
+    parents, places, masses, moving = [], [], [], []
+    for joint in joints:
+        body, position, rotation = frames[joint.parent]
+        position, rotation = position + rotation @ joint.position, rotation @ joint.rotation
+        if joint.moving:
+            aligned = axes_with_z_along(joint.axis)
+            places.append((position, rotation @ aligned))
+            parents.append(body)
+            moving.append(joint)
+            masses.append([])
+            body, position, rotation = len(moving) - 1, zero, aligned.T
+        frames[joint.child] = Frame(body, position, rotation)
+        inertia = links[joint.child].inertia
+        if inertia is not None and body >= 0:
+            masses[body].append(inertia.moved(position, rotation))
+    whole = [Inertia.total(parts) if parts else MASSLESS for parts in masses]
+    slots, parent_slots, count = _slots(parents)
+    bodies, order = len(moving), [joint.name for joint in moving if joint.mimic is None]
+    mimics = [joint.mimic or Mimic(joint.name) for joint in moving]  # each follows another, or itself
+    coordinate = np.array([order.index(mimic.joint) for mimic in mimics], int)
+    multiplier = np.array([mimic.multiplier for mimic in mimics], float)
+    weights = {"armature": multiplier**2, "damping": multiplier**2, "friction": np.abs(multiplier)}
+    drives = {  # what those of all joints make together at each coordinate, by virtual work
+        field: np.bincount(coordinate, weight * [getattr(joint, field) for joint in moving], len(order)).astype(float)
+        for field, weight in weights.items()
+    }
+    turning = np.array([joint.turning for joint in moving], float)
+    tree = Tree(
+        rotation=np.array([rotation for _, rotation in places]).reshape(bodies, 3, 3),
+        position=np.array([position for position, _ in places]).reshape(bodies, 3),
+        mass=_array([one.mass for one in whole]),
+        center=_array([one.center_of_mass for one in whole]).reshape(bodies, 3),
+        inertia=_array([one.tensor for one in whole]).reshape(bodies, 3, 3),
+        turning=turning,
+        coordinate=coordinate,
+        multiplier=multiplier,
+        offset=np.array([mimic.offset for mimic in mimics], float),
+        slot=np.array(slots, int),
+        parent_slot=np.array(parent_slots, int),
+        ancestors=_ancestors(parents),
+        **drives,
+        gravity=gravity,
+        shape=Shape(
+            bodies=bodies,
+            coordinates=len(order),
+            slots=count,
+            turning=bool(turning.any()),
+            sliding=bool((turning == 0).any()),
+            direct=len(order) == bodies,
+        ),
+    )
+    return tree, frames
+
+
+def _array(parts: list[Any]) -> Any:
+    """Return parts as one array, of JAX where it traces some of them."""
+    return jnp.stack(parts) if any(isinstance(part, Tracer) for part in parts) else np.array(parts)
+
+
+def axes_with_z_along(axis: Float[np.ndarray, " 3"]) -> Float[np.ndarray, "3 3"]:
+    """Return a rotation matrix whose third column is the given unit vector; exact for the axes of a frame."""
+    third = int(np.argmax(np.abs(axis)))
+    first = np.eye(3)[(third + 1) % 3]
+    first = first - (first @ axis) * axis
+    first /= np.linalg.norm(first)
+    return np.column_stack([first, np.cross(axis, first), axis])
+
+
+def turn_about(axis: Float[np.ndarray, " 3"], angle: float) -> Float[np.ndarray, "3 3"]:
+    """Return the matrix of a rotation about a unit vector: Negrean 2025, equation 20."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(angle * np.asarray(axis)).as_matrix()
+
+
+def quaternion_matrix(quaternion: Float[np.ndarray, " 4"]) -> Float[np.ndarray, "3 3"]:
+    """Return the rotation matrix of a unit quaternion, scalar first."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
+
+
+def _slots(parents: list[int]) -> tuple[list[int], list[int], int]:
+    """Give each body a place for its state, taken over from its parent by the last child, so that few are needed."""
+    last = {parent: k for k, parent in enumerate(parents)}
+    place, free, count = {-1: 0}, [], 1
+    for k, parent in enumerate(parents):
+        if last[parent] == k:
+            place[k] = place[parent]
+        elif free:
+            place[k] = free.pop()
+        else:
+            place[k], count = count, count + 1
+        if k not in last:
+            free.append(place[k])
+    return [place[k] for k in range(len(parents))], [place[parent] for parent in parents], count
+
+
+def _ancestors(parents: list[int]) -> np.ndarray:
+    moves = np.zeros((len(parents) + 1, len(parents)))
+    for k, parent in enumerate(parents):
+        moves[k] = moves[parent]
+        moves[k, k] = 1.0
+    return moves

@@ -1,0 +1,1 @@
+"""Recursions over the tree of links: poses, Newton and Euler, articulated bodies."""

@@ -1,0 +1,215 @@
+"""Articulated bodies: the inertias of a tree whose joints are free, made once, which give accelerations for any forces.
+
+Featherstone 2008, Rigid Body Dynamics Algorithms, chapter 7. Vectors are in the axes of the base, and moments refer to
+the origin of each body, so that a step from joint to joint is a shift and no turn.
+"""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from jounce.jet import cross
+from jounce.jet.algebra import total
+from jounce.linear_algebra.linear import DenseFactor
+from jounce.modules import Module
+from jounce.robot.model.tree import Tree
+from jounce.robot.recursions.tree_scan import fill_slots, materialised, read_slot, write_slot
+from jounce.robot.recursions.tree_sums import BaseVector, BodyVectors
+from jounce.shapes import Numbers
+
+Joints = Float[Numbers, "body batch"]
+"""One number for each moving body, or its joint."""
+LEAST_INERTIA = 1e-13  # of a joint, of that of the articulated body that it moves: less is rounding
+
+
+class RigidInertia(Module):
+    """Inertia of bodies in the axes of the base: mass, centre of mass from the origin, tensor about the centre."""
+
+    mass: Float[Numbers, "*body 1"]
+    center: Float[Numbers, "3 *body batch"]
+    tensor: Float[Numbers, "3 3 *body batch"]
+
+    def blocks(self) -> tuple[Any, Any, Any]:
+        """Return the blocks of the spatial inertia about the origin: moments by turns, by shifts, forces by shifts."""
+        c, mass = self.center, self.mass[None, None]
+        x, y, z = c
+        zero = jnp.zeros_like(x)
+        coupling = mass * jnp.stack([jnp.stack([zero, -z, y]), jnp.stack([z, zero, -x]), jnp.stack([-y, x, zero])])
+        unit = jnp.reshape(jnp.eye(3), (3, 3) + (1,) * (c.ndim - 1))
+        about = self.tensor + mass * (unit * jnp.sum(c * c, axis=0)[None, None] - c[:, None] * c[None])
+        return about, coupling, unit * mass * jnp.ones_like(x)[None, None]
+
+
+class ArticulatedBodies(Module):
+    """What the joints of a tree resist with, ready to be solved for; driven joints do not give way.
+
+    Attributes
+    ----------
+    axis, arm : array of shape (3, bodies, batch)
+        Axis of each joint, and the way from the origin of the parent to that of the body.
+    moment, force : array of shape (3, bodies, batch)
+        That a unit acceleration of the joint takes.
+    compliance : array of shape (bodies, batch)
+        Acceleration of the joint by a unit of force along it; zero where it is driven, NaN where nothing resists.
+    margin : array of shape (bodies, batch)
+        Inertia along the joint, as part of the largest of its articulated body; not finite where it moves no mass.
+    base : tuple of DenseFactor and array of shape (6, batch), optional
+        Of the inertia of a free base, scaled, and the scales.
+    """
+
+    tree: Tree
+    axis: BodyVectors
+    arm: BodyVectors
+    moment: BodyVectors
+    force: BodyVectors
+    compliance: Joints
+    margin: Joints
+    base: tuple[DenseFactor, Float[Numbers, "6 batch"]] | None
+
+    @classmethod
+    def of(
+        cls,
+        tree: Tree,
+        axis: BodyVectors,
+        arm: BodyVectors,
+        inertia: RigidInertia,
+        armature: Float[Numbers, " body"],
+        free: Float[Numbers, " body"],
+        base: RigidInertia | None = None,
+    ) -> "ArticulatedBodies":
+        """Return the articulated bodies of a tree in a position.
+
+        Parameters
+        ----------
+        tree : Tree
+            Arrays of the robot.
+        axis, arm : array of shape (3, bodies, batch)
+            As in the attributes.
+        inertia : RigidInertia
+            Of the bodies.
+        armature, free : array of shape (bodies,)
+            Inertia of the drives; 0 where the acceleration of the joint is given, else 1.
+        base : RigidInertia, optional
+            Of a free base.
+        """
+
+        def inward(state: Any, entry: Any) -> tuple[Any, Any]:
+            body, z, r, own, drive, gives_way = entry
+            about, coupling, mass = (a + b for a, b in zip(own.blocks(), read_slot(tree, state, body[0]), strict=True))
+            turned = _product(about, z), _transposed_product(coupling, z)
+            slid = _product(coupling, z), _product(mass, z)
+            if tree.shape.turning and tree.shape.sliding:
+                moment, force = (body[2] * a + (1 - body[2]) * b for a, b in zip(turned, slid, strict=True))
+            else:
+                moment, force = turned if tree.shape.turning else slid
+            inertia = jnp.sum(z * (body[2] * moment + (1 - body[2]) * force), axis=0) + drive
+            largest = body[2] * _trace(about) + (1 - body[2]) * _trace(mass) + drive
+            margin = inertia / largest
+            compliance = jnp.where(margin > LEAST_INERTIA, gives_way / inertia, jnp.where(gives_way > 0, jnp.nan, 0.0))
+            moment, force, compliance = materialised((moment, force, compliance))
+            by_moment, by_force = (moment * compliance[None])[None], (force * compliance[None])[None]
+            about, coupling = about - moment[:, None] * by_moment, coupling - moment[:, None] * by_force
+            mass = mass - force[:, None] * by_force
+            # seen from the origin of the parent
+            first = _rows_crossed(r, coupling)
+            coupling = coupling + _rows_crossed(r, mass).swapaxes(0, 1)
+            about = about + first + _rows_crossed(r, coupling).swapaxes(0, 1)
+            sent = materialised((about, coupling, mass))
+            if tree.shape.slots > 1:
+                state = write_slot(tree, state, body[0], jax.tree.map(jnp.zeros_like, sent))
+                sent = jax.tree.map(jnp.add, sent, read_slot(tree, state, body[1]))
+            return write_slot(tree, state, body[1], sent), (moment, force, compliance, margin)
+
+        def by_body(x: Any) -> Any:
+            return jnp.moveaxis(x, -2, 0)
+
+        nothing = (jnp.zeros((3, 3, axis.shape[-1])),) * 3
+        each = (*(jnp.asarray(x) for x in (tree.slot, tree.parent_slot, tree.turning)),)
+        bodies = (each, by_body(axis), by_body(arm), jax.tree.map(by_body, inertia), armature, free)
+        state, found = jax.lax.scan(inward, fill_slots(tree, nothing), bodies, reverse=True)
+        moment, force, compliance, margin = found
+        factor = None
+        if base is not None:
+            carried = state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
+            whole = _six_by_six(*(a + b for a, b in zip(base.blocks(), carried, strict=True)))
+            scale = 1.0 / jnp.sqrt(jnp.stack([whole[k, k] for k in range(6)]))
+            factor = DenseFactor.of(whole * scale[:, None] * scale[None]), scale
+        moment, force = (jnp.moveaxis(x, 0, 1) for x in (moment, force))
+        return cls(tree, axis, arm, moment, force, compliance, margin, factor)
+
+    def solve(self, along: Joints, at_base: BaseVector | None = None) -> tuple[Joints, BaseVector | None]:
+        """Return the accelerations that forces along the joints cause, and that of a free base.
+
+        Parameters
+        ----------
+        along : array of shape (bodies, batch)
+            Force or torque along each joint.
+        at_base : array of shape (6, batch), optional
+            Moment about the origin of a free base, and force on it.
+
+        Returns
+        -------
+        joints : array of shape (bodies, batch)
+        base : array of shape (6, batch) or None
+            Angular acceleration of the base, and acceleration of its origin.
+        """
+        tree = self.tree
+        turning = jnp.asarray(tree.turning)
+
+        def inward(state: Any, entry: Any) -> tuple[Any, Any]:
+            (slot, parent_slot, turn), z, r, moment, force, compliance, given = entry
+            m, f = read_slot(tree, state, slot)
+            left = given - jnp.sum(z * (turn * m + (1 - turn) * f), axis=0)
+            given = (left * compliance)[None]
+            m, f = m + moment * given, f + force * given
+            sent = m + cross(r, f), f
+            if tree.shape.slots > 1:
+                state = write_slot(tree, state, slot, jax.tree.map(jnp.zeros_like, sent))
+                sent = jax.tree.map(jnp.add, sent, read_slot(tree, state, parent_slot))
+            return write_slot(tree, state, parent_slot, sent), left
+
+        def outward(state: Any, entry: Any) -> tuple[Any, Any]:
+            (slot, parent_slot, turn), z, r, moment, force, compliance, left = entry
+            spin, shift = read_slot(tree, state, parent_slot)
+            shift = shift + cross(spin, r)
+            found = compliance * (left - jnp.sum(moment * spin + force * shift, axis=0))
+            spin, shift = spin + z * (turn * found)[None], shift + z * ((1 - turn) * found)[None]
+            return write_slot(tree, state, slot, (spin, shift)), found
+
+        each = (jnp.asarray(tree.slot), jnp.asarray(tree.parent_slot), turning)
+        rows = (jnp.moveaxis(x, 1, 0) for x in (self.axis, self.arm, self.moment, self.force))
+        bodies = (each, *rows, self.compliance)
+        nothing = jnp.zeros((3, self.axis.shape[-1]))
+        state, left = jax.lax.scan(inward, fill_slots(tree, (nothing, nothing)), (*bodies, along), reverse=True)
+        start, base = (nothing, nothing), None
+        if self.base is not None and at_base is not None:
+            carried = state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
+            inertia, scale = self.base
+            base = inertia.solve((at_base - jnp.concatenate(carried)) * scale) * scale
+            start = base[:3], base[3:]
+        _, found = jax.lax.scan(outward, fill_slots(tree, start), (*bodies, left))
+        return found, base
+
+
+def _product(matrix: Any, vector: Any) -> Any:
+    return total(matrix[:, k] * vector[k : k + 1] for k in range(3))
+
+
+def _transposed_product(matrix: Any, vector: Any) -> Any:
+    return total(matrix[k] * vector[k : k + 1] for k in range(3))
+
+
+def _rows_crossed(vector: Any, matrix: Any) -> Any:
+    """Return the matrix whose rows are the vector times those of a matrix."""
+    return cross(vector[:, None], jnp.swapaxes(matrix, 0, 1)).swapaxes(0, 1)
+
+
+def _trace(matrix: Any) -> Any:
+    return matrix[0, 0] + matrix[1, 1] + matrix[2, 2]
+
+
+def _six_by_six(about: Any, coupling: Any, mass: Any) -> Any:
+    upper = jnp.concatenate([about, coupling], axis=1)
+    return jnp.concatenate([upper, jnp.concatenate([jnp.swapaxes(coupling, 0, 1), mass], axis=1)])

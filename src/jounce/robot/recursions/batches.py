@@ -1,0 +1,78 @@
+"""How batches of samples go through the algorithms: one sample's program, run for many (see `execution.mapped`).
+
+Machine code is used for a single sample, too: it is compiled as fast as one of XLA's programs, of which each size of
+blocks needs one, and called in a third of the time.
+"""
+
+import math
+from collections.abc import Callable
+from functools import cached_property, update_wrapper
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.execution.mapped import SIDE_BY_SIDE, Mapped
+from jounce.execution.threads import thread_count
+from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
+from jounce.robot.model.abstract_robot import AbstractRobot
+from jounce.settings import check_process
+from jounce.shapes import is_traced
+
+LEAST_THREADED = 2**12  # samples of a thread: fewer are done before threads are started
+MOST_LINES = 40_000  # of machine code's text: it is compiled in four seconds, XLA's programs for all widths in as many
+WIDTHS = (8, SIDE_BY_SIDE, 16 * SIDE_BY_SIDE)  # sizes of blocks by XLA: each compiles once for a kind of robot
+
+
+class Batched:
+    """A function on Taylor coefficients, batch last, made to work on plain derivatives, batch first.
+
+    The function gets the tree, a tuple of arrays of shape (order + 1, ..., batch), a pytree of constants and static
+    arguments, and returns a pytree of arrays of the shape (order + 1, ..., batch). Results are NumPy arrays, or JAX
+    arrays under a transformation of JAX.
+    """
+
+    def __init__(self, function: Callable[..., Any]):
+        self.function = function
+        self.mapped = Mapped(
+            self._sample, rows=True, made_of=(Batched._sample, function), most_lines=MOST_LINES, widths=WIDTHS
+        )
+        update_wrapper(self, function)
+
+    @property
+    def jitted(self) -> Any:
+        """The function on a block of samples, as `jax.jit` returns it."""
+        return self.mapped.on_xla.jitted
+
+    @cached_property
+    def nested(self) -> Any:
+        """The function compiled on its own within transformations of JAX, which take no options of the compiler."""
+        return jax.jit(self._block, static_argnums=3)
+
+    def __call__(
+        self, robot: AbstractRobot, arrays: tuple[Any, ...], constants: Any = (), static: tuple[Any, ...] = ()
+    ) -> Any:
+        """Return results for arrays of derivatives, the first one of shape (batch..., order + 1, n)."""
+        check_process()
+        lead = arrays[0].shape[:-2]
+        axes, count = len(lead), math.prod(lead)
+        if is_traced((arrays, constants, robot.tree)):
+            flat = tuple(jnp.reshape(x, (count, *x.shape[axes:])) for x in arrays)
+            found = self.nested(robot.tree, flat, constants, static)
+            return jax.tree.map(lambda x: jnp.reshape(x, (*lead, *x.shape[1:])), found)
+        flat = tuple(np.reshape(np.asarray(x), (count, *x.shape[axes:])) for x in arrays)
+        program = self.mapped.program((robot.tree, constants), flat, static=static)
+        found = program(flat, max(1, min(thread_count(), count // LEAST_THREADED)))
+        return jax.tree.map(lambda x: np.reshape(x, (*lead, *x.shape[1:])), found)
+
+    def _sample(self, shared: tuple[Any, Any], arrays: tuple[Any, ...], *, static: tuple[Any, ...]) -> Any:
+        """Return plain derivatives for those of samples, which are along the last axis."""
+        tree, constants = shared
+        found = self.function(tree, tuple(map(taylor_coefficients, arrays)), constants, *static)
+        return jax.tree.map(plain_derivatives, found)
+
+    def _block(self, tree: Any, arrays: tuple[Any, ...], constants: Any, static: tuple[Any, ...]) -> Any:
+        last = tuple(jnp.moveaxis(jnp.asarray(x), 0, -1) for x in arrays)
+        found = self._sample((tree, constants), last, static=static)
+        return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), found)

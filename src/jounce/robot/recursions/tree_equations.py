@@ -1,0 +1,376 @@
+"""The equations of motion of a tree, written once on plain values: what its joints need for given accelerations.
+
+Vectors are in the axes of the base of the scene, and belong to the origins of the bodies. `jounce.jet.series` runs this
+program order after order, and all that is not a sum along branches is done for all bodies side by side.
+"""
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from jounce.jet import Jet, cross
+from jounce.jet.algebra import total
+from jounce.linear_algebra.linear import DenseFactor
+from jounce.modules import Module
+from jounce.rigid.spatial import body_axes, quaternion_spins
+from jounce.robot.model.tree import Frame, Tree
+from jounce.robot.recursions.articulated_bodies import ArticulatedBodies, RigidInertia
+from jounce.robot.recursions.newton_euler import Turn
+from jounce.robot.recursions.tree_scan import fill_slots, of_one_body, read_slot, to_coordinates, write_slot
+from jounce.robot.recursions.tree_sums import sums_at_parents, totals
+from jounce.shapes import Numbers
+
+Coordinates = Float[Numbers, "coordinate batch"]
+Wrenches = tuple[Float[Numbers, "6 batch"], ...]
+"""Force and torque of each wrench from outside."""
+
+
+class FreeBase(NamedTuple):
+    """Where a free base is and how it moves.
+
+    Attributes
+    ----------
+    position : array of shape (3, batch)
+        Of its origin, m.
+    quaternion : array of shape (4, batch)
+        Of unit length, scalar first.
+    axes : array of shape (3, 3, batch)
+        Its rotation matrix.
+    twist : array of shape (6, batch)
+        Velocity of its origin and angular velocity, in its own axes, m/s and rad/s.
+    """
+
+    position: Numbers
+    quaternion: Numbers
+    axes: Numbers
+    twist: Numbers
+
+
+class TreeState(NamedTuple):
+    """Where a tree is and how it moves.
+
+    Attributes
+    ----------
+    coordinates, rates : array of shape (coordinates, batch)
+        rad or m, and by s.
+    axes : array of shape (3, 3, bodies, batch)
+        Rotation matrices of the bodies.
+    arm : array of shape (3, bodies, batch)
+        From the origin of the parent of each body to its own, m.
+    base : FreeBase or None
+    """
+
+    coordinates: Numbers
+    rates: Numbers
+    axes: Numbers
+    arm: Numbers
+    base: FreeBase | None
+
+
+class Unknowns(NamedTuple):
+    """Accelerations: of the coordinates, and the rates of the components of the twist of a free base; or forces."""
+
+    joints: Float[Numbers, "coordinate batch"]
+    base: Float[Numbers, "6 batch"] | None
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class BaseBody:
+    """Mass, centre of mass and inertia about it of a free base, in its axes."""
+
+    mass: Any
+    center: Any
+    inertia: Any
+
+
+class TreeEquations(Module):
+    """The equations of motion of a tree.
+
+    Parameters
+    ----------
+    tree : Tree
+        Arrays of the robot.
+    driven : array of shape (coordinates,)
+        1 where the acceleration is given in the place of a force, else 0.
+    base : BaseBody, optional
+        Of a base that moves freely.
+    places : tuple of Frame
+        Where wrenches from outside act, and in which axes of the body they are given.
+    global_axes : tuple of bool
+        Whether they are in the axes of the scene.
+    drives : bool
+        Whether drives count, with armature, damping and friction.
+    """
+
+    tree: Tree
+    driven: Any
+    base: BaseBody | None = None
+    places: tuple[Frame, ...] = ()
+    global_axes: tuple[bool, ...] = eqx.field(static=True, default=())
+    drives: bool = eqx.field(static=True, default=False)
+
+    def motion(self, coordinates: Coordinates, rates: Coordinates, base: FreeBase | None = None) -> TreeState:
+        """Return where all bodies are, from the coordinates."""
+        tree, lanes = self.tree, coordinates.shape[-1]
+        joints = self._at_joints(coordinates) + (0.0 if tree.shape.direct else jnp.asarray(tree.offset)[:, None])
+        turn = Turn.of(tree, Jet([joints[:, None]]))
+
+        def outward(state: Any, entry: Any) -> tuple[Any, Any]:
+            slot, parent_slot, position, slides, turned, coordinate = entry
+            parent = read_slot(tree, state, parent_slot)
+            axes = jnp.stack(
+                [total(parent[:, k] * turned.matrix[k, j][None] for k in range(3)) for j in range(3)], axis=1
+            )
+            arm = total(parent[:, k] * position[k] for k in range(3)) + axes[:, 2] * (slides * coordinate)[None]
+            return write_slot(tree, state, slot, axes), (axes, arm)
+
+        start = jnp.broadcast_to(jnp.eye(3)[..., None], (3, 3, lanes)) if base is None else base.axes
+        each = (tree.slot, tree.parent_slot, tree.position, 1 - jnp.asarray(tree.turning))
+        bodies = (*map(jnp.asarray, each), turn, joints)
+        _, (axes, arm) = jax.lax.scan(outward, fill_slots(tree, start), bodies)
+        return TreeState(coordinates, rates, jnp.moveaxis(axes, 0, 2), jnp.moveaxis(arm, 0, 1), base)
+
+    def factored(self, motion: TreeState) -> "TreeFactor":
+        """Return what gives accelerations for forces, at this position; made once for all orders."""
+        tree = self.tree
+        armature = jnp.asarray(tree.armature) if self.drives else jnp.zeros(tree.shape.coordinates)
+        free = 1.0 - jnp.asarray(self.driven)
+        if tree.shape.direct:
+            inertia = _turned_inertia(motion.axes, tree.mass, tree.center, tree.inertia)
+            base = None
+            if self.base is not None and motion.base is not None:
+                base = _turned_inertia(motion.base.axes, self.base.mass, self.base.center, self.base.inertia)
+            bodies = ArticulatedBodies.of(tree, motion.axes[:, 2], motion.arm, inertia, armature, free, base)
+            return TreeFactor(bodies, None, free, motion.base)
+        return TreeFactor(None, self._coupled(motion, free), free, motion.base)
+
+    def _coupled(self, motion: TreeState, free: Any) -> tuple[DenseFactor, Any]:
+        """Return the factored mass matrix of a tree in which joints follow others, scaled, and the scales."""
+        lanes, count = motion.axes.shape[-1], self.tree.shape.coordinates
+        size = count + (6 if motion.base is not None else 0)
+        zero = Unknowns(jnp.zeros((count, lanes)), None if motion.base is None else jnp.zeros((6, lanes)))
+
+        def forces(unknowns: Unknowns) -> Unknowns:
+            return self.needed(motion, unknowns)
+
+        _, slope = jax.linearize(forces, zero)
+        units = jnp.broadcast_to(jnp.eye(size)[..., None], (size, size, lanes))
+        directions = Unknowns(units[:, :count], None if motion.base is None else units[:, count:])
+        matrix = jnp.concatenate([x for x in jax.vmap(slope)(directions) if x is not None], axis=1)
+        gives_way = jnp.concatenate([free, jnp.ones(size - count)])[:, None]
+        matrix = matrix * gives_way[:, None] * gives_way[None]
+        matrix = matrix + jnp.eye(size)[..., None] * (1.0 - gives_way[:, None])
+        scale = 1.0 / jnp.sqrt(jnp.stack([matrix[k, k] for k in range(size)]))
+        return DenseFactor.of(matrix * scale[:, None] * scale[None]), scale
+
+    def needed(self, motion: TreeState, unknowns: Unknowns, wrenches: Wrenches = ()) -> Unknowns:
+        """Return the forces that accelerations need: of the coordinates, and on a free base, in its axes."""
+        tree, lanes, base = self.tree, motion.axes.shape[-1], motion.base
+        turning = jnp.asarray(tree.turning)[None, :, None]
+        z, arm = motion.axes[:, 2], motion.arm
+        rates, accelerations = self._at_joints(motion.rates)[None], self._at_joints(unknowns.joints)[None]
+        fall = jnp.broadcast_to(-jnp.asarray(tree.gravity)[:, None], (3, lanes))
+        nothing = jnp.zeros((3, lanes))
+        spin0, spin_rate0, shift0 = nothing, nothing, fall
+        if base is not None and unknowns.base is not None:
+            v, w = base.twist[:3], base.twist[3:]
+            spin0, spin_rate0 = _combined(base.axes, w), _combined(base.axes, unknowns.base[3:])
+            shift0 = fall + _combined(base.axes, unknowns.base[:3] + cross(w, v))
+        turn = z * (turning * rates)
+        before = sums_at_parents(tree, turn, spin0)
+        arm_rate = cross(before, arm)
+        spin_rate = cross(before, turn) + z * (turning * accelerations)
+        spin_rate_before = sums_at_parents(tree, spin_rate, spin_rate0)
+        shift = cross(spin_rate_before, arm)
+        if tree.shape.sliding:
+            slide = z * ((1 - turning) * rates)
+            arm_rate = arm_rate + slide
+            shift = shift + cross(before, slide) + z * ((1 - turning) * accelerations)
+        shift = shift + cross(before, arm_rate)
+        acceleration = sums_at_parents(tree, shift, shift0) + shift
+        of_bodies = (tree.mass, tree.center, tree.inertia)
+        rate = spin_rate_before + spin_rate
+        force, moment = _of_inertia(motion.axes, of_bodies, before + turn, rate, acceleration)
+        pushed = self._pushed(motion, wrenches)
+        if pushed is not None:
+            force, moment = force - pushed[:3, :-1], moment - pushed[3:, :-1]
+        force, base_force = totals(tree, force)
+        moment, base_moment = totals(tree, moment, cross(arm, force))
+        along = jnp.sum(z * moment, axis=0)
+        if tree.shape.sliding:
+            along = turning[0] * along + (1 - turning[0]) * jnp.sum(z * force, axis=0)
+        found = to_coordinates(tree, along[None])[0]
+        if self.drives:
+            armature, damping, friction = (
+                jnp.asarray(x)[:, None] for x in (tree.armature, tree.damping, tree.friction)
+            )
+            found = found + armature * unknowns.joints + damping * motion.rates + friction * jnp.sign(motion.rates)
+        if base is None or self.base is None:
+            return Unknowns(found, None)
+        own = _of_inertia(base.axes, dataclasses.astuple(self.base), spin0, spin_rate0, shift0)
+        base_force, base_moment = base_force + own[0], base_moment + own[1]
+        if pushed is not None:
+            base_force, base_moment = base_force - pushed[:3, -1], base_moment - pushed[3:, -1]
+        return Unknowns(found, jnp.concatenate([_local(base.axes, x) for x in (base_force, base_moment)]))
+
+    def motion_rates(self, motion: TreeState, unknowns: Unknowns) -> TreeState:
+        """Return how all that a motion consists of changes."""
+        tree, base = self.tree, motion.base
+        turning = jnp.asarray(tree.turning)[None, :, None]
+        z, rates = motion.axes[:, 2], self._at_joints(motion.rates)[None]
+        moved, spin0 = None, jnp.zeros((3, motion.axes.shape[-1]))
+        if base is not None and unknowns.base is not None:
+            v, w = base.twist[:3], base.twist[3:]
+            spin0 = _combined(base.axes, w)
+            spins = quaternion_spins(base.quaternion)
+            quaternion = 0.5 * total(spin * w[k : k + 1] for k, spin in enumerate(spins))
+            moved = FreeBase(_combined(base.axes, v), quaternion, cross(spin0[:, None], base.axes), unknowns.base)
+        turn = z * (turning * rates)
+        before = sums_at_parents(tree, turn, spin0)
+        arm = cross(before, motion.arm)
+        if tree.shape.sliding:
+            arm = arm + z * ((1 - turning) * rates)
+        axes = cross((before + turn)[:, None], motion.axes)
+        return TreeState(motion.rates, unknowns.joints, axes, arm, moved)
+
+    def energy(self, motion: TreeState) -> tuple[Float[Numbers, " batch"], Float[Numbers, " batch"]]:
+        """Return kinetic energy, that of the armatures of drives included, and potential energy in gravity, J."""
+        tree, base = self.tree, motion.base
+        turning = jnp.asarray(tree.turning)[None, :, None]
+        nothing = jnp.zeros((3, motion.axes.shape[-1]))
+        place0, spin0, velocity0 = nothing, nothing, nothing
+        if base is not None:
+            place0, spin0 = base.position, _combined(base.axes, base.twist[3:])
+            velocity0 = _combined(base.axes, base.twist[:3])
+        z, rates = motion.axes[:, 2], self._at_joints(motion.rates)[None]
+        turn = z * (turning * rates)
+        before = sums_at_parents(tree, turn, spin0)
+        shift = cross(before, motion.arm) + z * ((1 - turning) * rates)
+        velocity = sums_at_parents(tree, shift, velocity0) + shift
+        place = sums_at_parents(tree, motion.arm, place0) + motion.arm
+        of_bodies = (tree.mass, tree.center, tree.inertia)
+        parts = [_energies(motion.axes, of_bodies, before + turn, velocity, place, tree.gravity)]
+        if base is not None and self.base is not None:
+            own = dataclasses.astuple(self.base)
+            parts.append(_energies(base.axes, own, spin0, velocity0, place0, tree.gravity))
+        kinetic, potential = (total(part[k] for part in parts) for k in (0, 1))
+        if self.drives:
+            armature = jnp.asarray(tree.armature)[:, None]
+            kinetic = kinetic + 0.5 * jnp.sum(armature * motion.rates * motion.rates, axis=0)
+        return kinetic, potential
+
+    def _at_joints(self, values: Coordinates) -> Float[Numbers, "body batch"]:
+        if self.tree.shape.direct:
+            return values
+        return jnp.take(values, jnp.asarray(self.tree.coordinate), axis=0) * jnp.asarray(self.tree.multiplier)[:, None]
+
+    def _pushed(self, motion: TreeState, wrenches: Wrenches) -> Any:
+        """Return forces and moments from outside about the origins of the bodies and, last, of the base."""
+        if not wrenches:
+            return None
+        axes = motion.axes
+        last = axes[:, :, :1] if motion.base is None else motion.base.axes[:, :, None]
+        axes = jnp.concatenate([axes, last], axis=2)
+        whole = jnp.zeros((6, *axes.shape[2:]))
+        for value, (body, point, rotation), in_scene in zip(wrenches, self.places, self.global_axes, strict=True):
+            own = jax.lax.dynamic_index_in_dim(axes, body, 2, keepdims=False)
+            force, torque = value[:3], value[3:]
+            if not in_scene:
+                turned = jnp.stack([total(own[:, k] * rotation[k, j] for k in range(3)) for j in range(3)], axis=1)
+                force, torque = _combined(turned, force), _combined(turned, torque)
+            arm = total(own[:, k] * point[k] for k in range(3))
+            whole = whole + of_one_body(jnp.concatenate([force, torque + cross(arm, force)]), body, whole.shape[1])
+        return whole
+
+
+class TreeFactor(Module):
+    """The factored inertia of a tree: by articulated bodies, or as a dense matrix where joints follow others."""
+
+    bodies: ArticulatedBodies | None
+    dense: tuple[DenseFactor, Any] | None
+    free: Any
+    base: FreeBase | None
+
+    @property
+    def margin(self) -> Float[Numbers, "joint batch"]:
+        """How far each joint, then a free base, or the whole, is from what nothing resists; see `ArticulatedBodies`."""
+        if self.bodies is None:
+            assert self.dense is not None
+            return self.dense[0].pivot_ratio()[None]
+        if self.bodies.base is None:
+            return self.bodies.margin
+        return jnp.concatenate([self.bodies.margin, self.bodies.base[0].pivot_ratio()[None]])
+
+    def solve(self, missing: Unknowns) -> Unknowns:
+        """Return the accelerations that bring up forces which are missing; none of joints that are driven."""
+        if self.bodies is None:
+            assert self.dense is not None
+            (factor, scale), count = self.dense, len(self.free)
+            given = [missing.joints * self.free[:, None]] + ([] if missing.base is None else [missing.base])
+            found = factor.solve(jnp.concatenate(given) * scale) * scale
+            return Unknowns(found[:count] * self.free[:, None], None if missing.base is None else found[count:])
+        if self.base is None or missing.base is None:
+            return Unknowns(self.bodies.solve(missing.joints)[0], None)
+        axes = self.base.axes
+        force, moment = _combined(axes, missing.base[:3]), _combined(axes, missing.base[3:])
+        joints, base = self.bodies.solve(missing.joints, jnp.concatenate([moment, force]))
+        assert base is not None
+        return Unknowns(joints, jnp.concatenate([_local(axes, base[3:]), _local(axes, base[:3])]))
+
+
+def free_base(position: Any, quaternion: Any, twist: Any) -> FreeBase:
+    """Return a free base from its pose, of a quaternion of unit length, and its twist."""
+    return FreeBase(position, quaternion, jnp.stack(body_axes(quaternion), axis=1), twist)
+
+
+def _combined(axes: Any, local: Any) -> Any:
+    """Return vectors in the axes of the scene, from those in the axes of each body."""
+    return total(axes[:, k] * local[k : k + 1] for k in range(3))
+
+
+def _local(axes: Any, vector: Any) -> Any:
+    return jnp.stack([jnp.sum(axes[:, k] * vector, axis=0) for k in range(3)])
+
+
+def _columns(values: tuple[Any, Any, Any], many: bool) -> tuple[Any, Any, Any]:
+    """Return mass, centre and tensor with components first and a batch of one last."""
+    mass, center, tensor = map(jnp.asarray, values)
+    if many:
+        return mass[None, :, None], jnp.moveaxis(center, 0, -1)[..., None], jnp.moveaxis(tensor, 0, -1)[..., None]
+    return mass[None, None], center[:, None], tensor[..., None]
+
+
+def _turned_inertia(axes: Any, mass: Any, center: Any, tensor: Any) -> RigidInertia:
+    mass, center, tensor = _columns((mass, center, tensor), axes.ndim > 3)
+    half = [total(axes[:, k] * tensor[k, j][None] for k in range(3)) for j in range(3)]
+    turned = total(half[j][:, None] * axes[None, :, j] for j in range(3))
+    return RigidInertia(mass[0], _combined(axes, center), turned)
+
+
+def _energies(
+    axes: Any, values: tuple[Any, ...], spin: Any, velocity: Any, place: Any, gravity: Any
+) -> tuple[Any, Any]:
+    """Return the kinetic energy of bodies, or of one, and the potential energy, summed."""
+    mass, center, tensor = _columns((values[0], values[1], values[2]), axes.ndim > 3)
+    arm, w = _combined(axes, center), _local(axes, spin)
+    moved, momentum = velocity + cross(spin, arm), total(tensor[:, k] * w[k : k + 1] for k in range(3))
+    down = jnp.reshape(jnp.asarray(gravity), (3,) + (1,) * (arm.ndim - 1))
+    kinetic = 0.5 * jnp.sum(mass * moved * moved + w * momentum, axis=0)
+    potential = -jnp.sum(mass * down * (place + arm), axis=0)
+    each = [jnp.sum(x.reshape(-1, x.shape[-1]), axis=0) for x in (kinetic, potential)]
+    return each[0], each[1]
+
+
+def _of_inertia(axes: Any, values: tuple[Any, ...], spin: Any, spin_rate: Any, acceleration: Any) -> tuple[Any, Any]:
+    """Return force and moment about the origin that bodies need for a motion."""
+    mass, center, tensor = _columns((values[0], values[1], values[2]), axes.ndim > 3)
+    arm = _combined(axes, center)
+    force = mass * (acceleration + cross(spin_rate, arm) + cross(spin, cross(spin, arm)))
+    w, rate = _local(axes, spin), _local(axes, spin_rate)
+    momentum, changed = (total(tensor[:, k] * x[k : k + 1] for k in range(3)) for x in (w, rate))
+    return force, _combined(axes, changed + cross(w, momentum)) + cross(arm, force)

@@ -1,0 +1,75 @@
+"""How a tree of bodies is scanned: what is carried from parents to children, and from coordinates to joints."""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from jounce.robot.model.tree import Tree
+from jounce.shapes import Numbers
+
+Series = Float[Numbers, "order coordinate batch"]
+"""Taylor coefficients of the coordinates of a robot, or of what belongs to them."""
+
+BodySeries = Float[Numbers, "order body batch"]
+"""Taylor coefficients of one number for each moving body, or for its joint."""
+
+
+def joint_coordinates(tree: Tree, q: Series) -> BodySeries:
+    """Return the coordinates of the joints of the bodies."""
+    if tree.shape.direct:
+        return q
+    q = jnp.take(q, jnp.asarray(tree.coordinate), axis=1) * jnp.asarray(tree.multiplier)[None, :, None]
+    return jnp.concatenate([q[:1] + jnp.asarray(tree.offset)[None, :, None], q[1:]])
+
+
+def to_coordinates(tree: Tree, forces: BodySeries) -> Series:
+    """Return generalised forces from those at the joints of the bodies."""
+    if tree.shape.direct:
+        return forces
+    shape = (forces.shape[0], tree.shape.coordinates, forces.shape[2])
+    weighted = forces * jnp.asarray(tree.multiplier)[None, :, None]
+    return jnp.zeros(shape).at[:, jnp.asarray(tree.coordinate)].add(weighted)
+
+
+def entries(tree: Tree) -> Tree:
+    """Return the arrays that have one entry for each body, which a scan takes apart."""
+    fields = ("armature", "damping", "friction", "gravity", "ancestors")
+    return dataclasses.replace(jax.tree.map(jnp.asarray, tree), **dict.fromkeys(fields))
+
+
+def fill_slots(tree: Tree, state: Any) -> Any:
+    """Return the places where states of parents are kept, all holding the given one."""
+    if tree.shape.slots == 1:
+        return state
+    return jax.tree.map(lambda x: jnp.broadcast_to(x, (tree.shape.slots, *x.shape)), state)
+
+
+def read_slot(tree: Tree, state: Any, slot: Any) -> Any:
+    """Return the state kept in a place; a chain has one place only."""
+    if tree.shape.slots == 1:
+        return state
+    return jax.tree.map(lambda x: jax.lax.dynamic_index_in_dim(x, slot, keepdims=False), state)
+
+
+def write_slot(tree: Tree, state: Any, slot: Any, value: Any) -> Any:
+    """Return the places with a new state in one of them."""
+    if tree.shape.slots == 1:
+        return value
+    return jax.tree.map(lambda x, y: jax.lax.dynamic_update_index_in_dim(x, y, slot, 0), state, value)
+
+
+def of_one_body(value: Any, body: Any, count: int) -> Any:
+    """Return values of one of many bodies as those of all, along the second axis: zero for the others.
+
+    Places are compared, and not one of them indexed: machine code has no place that is not known beforehand.
+    """
+    here = jnp.reshape(jnp.arange(count) == body, (1, count) + (1,) * (value.ndim - 1))
+    return jnp.where(here, value[:, None], 0.0)
+
+
+def materialised(value: Any) -> Any:
+    """Return a value as it is, kept by XLA, which otherwise computes it again for every use: this halves the time."""
+    return jax.lax.optimization_barrier(value)

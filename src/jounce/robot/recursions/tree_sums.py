@@ -1,0 +1,61 @@
+"""Sums along the branches of a tree: from the base outwards to each body, and from its branches inwards."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from jounce.robot.model.tree import Tree
+from jounce.robot.recursions.tree_scan import fill_slots, read_slot, write_slot
+from jounce.shapes import Numbers
+
+BodyVectors = Float[Numbers, "component body batch"]
+"""One vector for each moving body."""
+BaseVector = Float[Numbers, "component batch"]
+
+
+def sums_at_parents(tree: Tree, own: BodyVectors, base: BaseVector) -> BodyVectors:
+    """Return the sum over all bodies from the base to the parent of each body, that of the base included.
+
+    Only sums and moves are used, so that `jounce.jet.series` runs the loop over the bodies as it is at every order.
+    """
+
+    def outward(state: Any, entry: Any) -> tuple[Any, Any]:
+        slot, parent_slot, part = entry
+        before = read_slot(tree, state, parent_slot)
+        return write_slot(tree, state, slot, before + part), before
+
+    bodies = (jnp.asarray(tree.slot), jnp.asarray(tree.parent_slot), jnp.moveaxis(own, 1, 0))
+    _, found = jax.lax.scan(outward, fill_slots(tree, base), bodies)
+    return jnp.moveaxis(found, 0, 1)
+
+
+def totals(tree: Tree, own: BodyVectors, passed: BodyVectors | None = None) -> tuple[BodyVectors, BaseVector]:
+    """Return what each body and all that it carries add up to, and the same for what the base carries.
+
+    Parameters
+    ----------
+    tree : Tree
+        Arrays of the robot.
+    own : array of shape (components, bodies, batch)
+        What each body adds.
+    passed : array, optional
+        Of the same shape: what each adds to its parent besides its total.
+    """
+    rows = (own,) if passed is None else (own, passed)
+
+    def inward(state: Any, entry: Any) -> tuple[Any, Any]:
+        slot, parent_slot, part, *more = entry
+        from_children = read_slot(tree, state, slot)
+        whole = part + from_children
+        sent = whole + more[0] if more else whole
+        if tree.shape.slots > 1:
+            state = write_slot(tree, state, slot, jnp.zeros_like(from_children))
+            sent = sent + read_slot(tree, state, parent_slot)
+        return write_slot(tree, state, parent_slot, sent), whole
+
+    bodies = (jnp.asarray(tree.slot), jnp.asarray(tree.parent_slot), *(jnp.moveaxis(x, 1, 0) for x in rows))
+    nothing = jnp.zeros((own.shape[0], own.shape[2]))
+    state, found = jax.lax.scan(inward, fill_slots(tree, nothing), bodies, reverse=True)
+    return jnp.moveaxis(found, 0, 1), state if tree.shape.slots == 1 else state[0]

@@ -1,0 +1,170 @@
+"""Live solving: one worker, which takes the newest values and drops those that came before."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import Protocol, runtime_checkable
+
+from jounce.errors import JounceError
+from jounce.settings import under_own_settings
+from jounce.viewer.shapes.recording import Parameter, Recording
+
+__all__ = ["Session", "Subject"]
+
+
+@runtime_checkable
+class Subject(Protocol):
+    """What is looked at: something with parameters that has a motion.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    loaded : bool
+        Whether there are forces to be shown.
+    parameters : tuple of Parameter
+        What sliders may set.
+    no_sliders : str
+        What is said where there are none.
+    """
+
+    name: str
+    loaded: bool
+    parameters: tuple[Parameter, ...]
+    no_sliders: str
+
+    def solve(self, values: Mapping[str, float], order: int) -> Recording:
+        """Return the motion for some values, or raise JounceError."""
+        ...
+
+
+class Session:
+    """The motion that is shown, solved again when parameters change.
+
+    One thread solves. A request that arrives while it works waits; one that arrives after it takes its place, so that
+    the newest values win and no time is spent on values that nobody wants any more. What fails leaves the last motion
+    as it was.
+
+    Parameters
+    ----------
+    subject : Subject
+        What is looked at.
+    order : int
+        Highest derivative.
+    on_recording : callable, optional
+        Called in the worker with each new `Recording`, before it is shown.
+    on_failure : callable, optional
+        Called in the worker with the error of a solve that failed.
+    on_busy : callable, optional
+        Called in the worker with True when it begins to work and False when nothing is left to do.
+
+    Attributes
+    ----------
+    recording : Recording
+        The last good motion.
+    error : JounceError or None
+        Why the newest values have no motion.
+    solved : int
+        How many solves were made, the first included.
+    elapsed : float
+        How long the last solve took, s, with what `on_recording` prepared.
+    """
+
+    def __init__(
+        self,
+        subject: Subject,
+        order: int,
+        on_recording: Callable[[Recording], object] = lambda _: None,
+        on_failure: Callable[[JounceError], object] = lambda _: None,
+        on_busy: Callable[[bool], object] = lambda _: None,
+    ):
+        self.subject, self.order = subject, order
+        self.on_recording, self.on_failure, self.on_busy = on_recording, on_failure, on_busy
+        self.values: dict[str, float] = {p.name: p.value for p in subject.parameters if not p.derived}
+        self.error: JounceError | None = None
+        self.recording = subject.solve(self.values, order)
+        self.solved, self.elapsed = 1, 0.0
+        self._wanted: tuple[dict[str, float], int] | None = None
+        self._jobs: list[Callable[[], object]] = []
+        self._closed = self._working = False
+        self._news = threading.Condition()
+        self._worker = threading.Thread(target=under_own_settings(self._work), name="jounce-view-solver", daemon=True)
+        self._worker.start()
+
+    def request(self, values: Mapping[str, float] | None = None, order: int | None = None) -> None:
+        """Ask for a motion with other values of some parameters, or of another order; returns at once."""
+        with self._news:
+            self.values.update(values or {})
+            self.order = self.order if order is None else order
+            self._wanted = (dict(self.values), self.order)
+            self._news.notify_all()
+
+    def later(self, job: Callable[[], object]) -> None:
+        """Let the worker do something between two solves, such as reactions, which take a moment."""
+        with self._news:
+            self._jobs.append(job)
+            self._news.notify_all()
+
+    def wait(self, timeout: float = 60.0) -> bool:
+        """Wait until nothing is left to do; return whether that is so."""
+        with self._news:
+            return self._news.wait_for(lambda: self._closed or not self._pending, timeout)
+
+    def close(self) -> None:
+        """End the worker after the solve that it is at."""
+        with self._news:
+            self._closed = True
+            self._news.notify_all()
+        self._worker.join(timeout=10.0)
+
+    @property
+    def _pending(self) -> bool:
+        return self._wanted is not None or bool(self._jobs) or self._working
+
+    def _work(self) -> None:
+        while True:
+            with self._news:
+                self._working = False
+                self._news.notify_all()
+                idle = not self._pending
+            if idle:
+                self.on_busy(False)
+            with self._news:
+                self._news.wait_for(lambda: self._closed or self._pending)
+                if self._closed:
+                    return
+                self._working = True
+                jobs, self._jobs = self._jobs, []
+                wanted, self._wanted = self._wanted, None
+            self.on_busy(True)
+            for job in jobs:
+                self._guarded(job)
+            if wanted is not None:
+                self._guarded(lambda wanted=wanted: self._solve(*wanted))
+
+    def _guarded(self, job: Callable[[], object]) -> None:
+        """Do something; what goes wrong is told, and the worker lives on."""
+        try:
+            job()
+        except JounceError as error:
+            self._failed(error)
+        except Exception as error:  # noqa: BLE001 - a worker that dies would leave a page that does nothing
+            from jounce.reporting.terminal import unexpected
+
+            self._failed(JounceError(unexpected(error)))
+
+    def _failed(self, error: JounceError) -> None:
+        self.error = error
+        self.on_failure(error)
+
+    def _solve(self, values: dict[str, float], order: int) -> None:
+        started = time.perf_counter()
+        self.solved += 1
+        recording = self.subject.solve(values, order)
+        if recording.notice and not self.recording.notice:  # a part of a motion does not take the place of a whole one
+            raise JounceError(recording.notice)
+        self.on_recording(recording)
+        self.recording, self.error = recording, None
+        self.elapsed = time.perf_counter() - started

@@ -1,0 +1,190 @@
+"""Meshes of mechanisms: planar bodies as plates in layers, seen from the front, spatial ones as round bars."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from jaxtyping import Float
+from shapely.geometry import Polygon
+from trimesh import Trimesh
+
+from jounce.kinematics import Motion
+from jounce.mechanism.mechanism import GROUND
+from jounce.plot.frames import frames, points_at, within
+from jounce.plot.geometry import Point, Skeleton, Symbol, Wheel
+from jounce.viewer.shapes.appearance import DARK, GREY, Colour
+from jounce.viewer.shapes.meshes import (
+    box,
+    capsule,
+    cylinder,
+    extruded,
+    merged,
+    plate,
+    rotation_to,
+    sleeve,
+    sphere,
+    tube,
+    wheel,
+)
+
+__all__ = ["THICKNESS", "planar_meshes", "spatial_meshes"]
+
+Pieces = Iterator[tuple[str, Trimesh, Colour]]  # of which body, in its frame
+
+STAND = (104, 110, 120)
+THICKNESS, WIDTH, PIN = 0.02, 0.017, 0.011  # of plates, and radius of pins, in sizes of the mechanism
+BAR = 0.013  # radius of spatial bars
+THREADS = 15  # turns of a screw that are drawn
+
+
+def planar_meshes(motion: Motion, skeleton: Skeleton, colours: Mapping[str, Colour]) -> Pieces:
+    """Give the meshes of planar bodies, each body in a layer of its own."""
+    size = skeleton.size
+    layer = {body: (k - 1) * THICKNESS * size for k, body in enumerate(skeleton.links)}
+    yield from _plates_and_wheels(skeleton, layer, colours)
+    for symbol in skeleton.symbols:
+        if symbol.kind in ("revolute", "rod", "slot"):
+            yield from _pins(symbol, layer, size)
+        if symbol.kind in ("prismatic", "slot"):
+            yield from _planar_slide(motion, symbol, layer, size)
+    for symbol in skeleton.drivers:
+        if symbol.kind == "slide":
+            yield from _planar_slide(motion, symbol, layer, size)
+
+
+def _plates_and_wheels(skeleton: Skeleton, layer: Mapping[str, float], colours: Mapping[str, Colour]) -> Pieces:
+    size = skeleton.size
+    for body, link in skeleton.links.items():
+        low, high = layer[body], layer[body] + 0.8 * THICKNESS * size
+        if body == GROUND:
+            for point, names in zip(link.points, link.names, strict=True):
+                if names:
+                    yield body, _pedestal(point, size, low), STAND
+            continue
+        wheels = sorted((w for w in skeleton.wheels if w.body == body), key=lambda w: -w.radius)
+        for step, its_wheel in enumerate(wheels):
+            yield from _wheel(its_wheel, low, high + 0.2 * step * (high - low), colours[body])
+        if len(link.points) > 1:
+            yield body, plate(link.points, WIDTH * size, low, high), colours[body]
+        elif not wheels:
+            yield body, wheel(1.6 * WIDTH * size, low, high, link.points[0]), colours[body]
+
+
+def _wheel(its: Wheel, low: float, high: float, colour: Colour) -> Pieces:
+    """Give a wheel with its teeth, and a mark that shows how it turns."""
+    radius, (x, y) = its.radius, its.center.tolist()
+    module = 0.0 if its.partner is None else min(radius, its.partner) / 9
+    if its.internal:
+        yield its.body, wheel(radius, low, high, its.center, module=module, outside=1.16 * radius), colour
+        mark, long = 1.09 * radius, 0.12 * radius
+    else:
+        red, green, blue = (int(c + 0.35 * (255 - c)) for c in colour)
+        yield its.body, wheel(radius, low, high, its.center, module=module), colour
+        yield its.body, wheel(0.62 * radius, low, high + 0.1 * (high - low), its.center), (red, green, blue)
+        mark, long = 0.5 * radius, 0.9 * radius
+    yield its.body, box([long, 0.1 * radius, 0.2 * (high - low)], [x + mark, y, high]), DARK
+
+
+def _pedestal(point: Point, size: float, low: float) -> Trimesh:
+    """Return the triangle with a base that stands for the ground, its tip in a point."""
+    high, width, radius = 0.06 * size, 0.034 * size, 1.3 * PIN * size
+    bottom, top = low - 0.5 * THICKNESS * size, low + 0.7 * THICKNESS * size
+    angle = np.linspace(0.12 * np.pi, 0.88 * np.pi, 12)
+    tip = point + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    stand = extruded(Polygon(np.concatenate([tip, point + np.array([[-width, -high], [width, -high]])])), bottom, top)
+    foot = box([3.1 * width, 0.16 * high, top - bottom], [point[0], point[1] - 1.08 * high, 0.5 * (bottom + top)])
+    return merged([stand, foot])
+
+
+def _pins(symbol: Symbol, layer: Mapping[str, float], size: float) -> Pieces:
+    """Give the pin of a joint through the layers of its bodies, or those at both ends of a rod."""
+    rod = symbol.kind == "rod"
+    for k in (0, 1) if rod else (1,):
+        levels = [layer[body] for body in ((symbol.bodies[k],) if rod else symbol.bodies)]
+        low, high = min(levels) - 0.15 * THICKNESS * size, max(levels) + 1.1 * THICKNESS * size
+        center = [*symbol.points[k], 0.5 * (low + high)]
+        yield symbol.bodies[k], cylinder(PIN * size, high - low, center=center), DARK
+
+
+def _planar_slide(motion: Motion, symbol: Symbol, layer: Mapping[str, float], size: float) -> Pieces:
+    """Give a rail on the first body, as long as what slides travels, and the block of a prismatic joint."""
+    first, second = symbol.bodies[:2]
+    middle, length = _rail(motion, symbol, 0.06 * size)
+    thick = THICKNESS * size
+    depth = layer[first] - (0.6 if first == GROUND else -0.2) * thick
+    yield first, box([length, 0.022 * size, 0.3 * thick], [*middle, depth], _turned_to(symbol.axis_on(0))), GREY
+    if symbol.kind == "prismatic":
+        center = [*symbol.points[1], layer[second] + 0.2 * thick]
+        yield second, box([0.085 * size, 0.05 * size, 0.9 * thick], center, _turned_to(symbol.axis_on(1))), DARK
+
+
+def _turned_to(axis: Point) -> Float[np.ndarray, "3 3"]:
+    """Return the rotation about z that turns x to an axis in the plane."""
+    x, y = axis / np.linalg.norm(axis)
+    return np.array([[x, -y, 0], [y, x, 0], [0, 0, 1.0]])
+
+
+def _rail(motion: Motion, symbol: Symbol, margin: float) -> tuple[Point, float]:
+    """Return middle and length of the line on the first body along which the point on the second travels, m."""
+    whole, axis = frames(motion), symbol.axis_on(0) / np.linalg.norm(symbol.axis_on(0))
+    place = points_at(whole[symbol.bodies[1]], symbol.points[1])
+    along = (within(whole[symbol.bodies[0]], place) - symbol.points[0]) @ axis
+    low, high = float(np.nanmin(along)), float(np.nanmax(along))
+    return symbol.points[0] + axis * 0.5 * (low + high), high - low + 2 * margin
+
+
+def spatial_meshes(motion: Motion, skeleton: Skeleton, colours: Mapping[str, Colour]) -> Pieces:
+    """Give the meshes of spatial bodies, with hinges, balls, crosses, slides and screws."""
+    radius = BAR * skeleton.size
+    for body, link in skeleton.links.items():
+        if body == GROUND:
+            for point, names in zip(link.points, link.names, strict=True):
+                if names:
+                    yield body, sphere(1.3 * radius, point), DARK
+        elif link.edges:
+            bars = [capsule(link.points[i], link.points[j], radius) for i, j in link.edges]
+            yield body, merged(bars), colours[body]
+        else:
+            yield body, sphere(1.8 * radius, link.points[0]), colours[body]
+    for symbol in skeleton.symbols:
+        if symbol.kind in ("prismatic", "cylindrical", "screw"):
+            yield from _spatial_slide(motion, symbol, skeleton.size)
+        else:
+            yield from _spatial_joint(symbol, skeleton.size)
+
+
+def _spatial_joint(symbol: Symbol, size: float) -> Pieces:
+    first, second, radius = symbol.bodies[0], symbol.bodies[-1], BAR * size
+    points, kind = symbol.points, symbol.kind
+    if kind == "revolute":
+        yield first, cylinder(1.75 * radius, 0.085 * size, symbol.axis_on(0), points[0]), DARK
+        yield second, cylinder(0.9 * radius, 0.11 * size, symbol.axis_on(1), points[1]), GREY
+    elif kind in ("spherical", "rod"):
+        yield second, sphere(1.9 * radius, points[1]), DARK
+        if kind == "rod":
+            yield first, sphere(1.9 * radius, points[0]), DARK
+    elif kind == "universal":
+        yield first, cylinder(0.75 * radius, 0.1 * size, symbol.axis_on(0), points[0]), DARK
+        yield second, cylinder(0.75 * radius, 0.1 * size, symbol.axis_on(1), points[1]), DARK
+        yield second, sphere(1.3 * radius, points[1]), GREY
+    elif kind == "plane":
+        yield second, sphere(1.3 * radius, points[1]), DARK
+
+
+def _spatial_slide(motion: Motion, symbol: Symbol, size: float) -> Pieces:
+    """Give a rail on the first body, as long as the second travels, and what slides on it."""
+    first, second = symbol.bodies[:2]
+    middle, length = _rail(motion, symbol, 0.08 * size)
+    axis, other, thin = symbol.axis_on(0), symbol.axis_on(1), 0.7 * BAR * size
+    if symbol.kind == "prismatic":
+        yield first, box([1.6 * thin, 1.6 * thin, length], middle, rotation_to(axis)), GREY
+        yield second, box([0.05 * size, 0.05 * size, 0.09 * size], symbol.points[1], rotation_to(other)), DARK
+        return
+    yield first, cylinder(thin, length, axis, middle), GREY
+    if symbol.kind == "screw":
+        share = np.linspace(0.0, 1.0, THREADS * 16)
+        angle = 2 * np.pi * THREADS * share
+        helix = np.stack([thin * np.cos(angle), thin * np.sin(angle), (share - 0.5) * length], axis=1)
+        yield first, tube(helix @ rotation_to(axis).T + middle, 0.35 * thin), GREY
+    yield second, sleeve(0.85 * BAR * size, 1.7 * BAR * size, 0.08 * size, other, symbol.points[1]), DARK

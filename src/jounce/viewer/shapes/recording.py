@@ -1,0 +1,225 @@
+"""A solved motion prepared for display: poses of all bodies at all instants, quantities over time, loads."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+from xarray import Dataset
+
+from jounce.kinematics import Motion
+from jounce.mechanism.time import nearest_instants
+from jounce.viewer.shapes.appearance import Appearance, BodyPoint, Place
+
+__all__ = ["Load", "Parameter", "Quantity", "Recording", "Vectors", "poses", "rotated", "spatial_vectors"]
+
+Vectors = Float[np.ndarray, "time 3"]
+Positions = Float[np.ndarray, "time body 3"]
+Quaternions = Float[np.ndarray, "time body 4"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """A number that a slider of the page sets.
+
+    Parameters
+    ----------
+    name : str
+    value : float
+        SI, as the file gives it.
+    low, high : float
+        Ends of the slider.
+    group : str, default ""
+        Heading under which it stands.
+    derived : bool, default False
+        It follows from others, by an expression, and is shown only.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    group: str = ""
+    derived: bool = False
+
+
+@dataclasses.dataclass(frozen=True)
+class Quantity:
+    """A quantity over time with its derivatives, for plots.
+
+    Parameters
+    ----------
+    unit : str
+        Of derivative 0.
+    values : numpy.ndarray of shape (time, order, component)
+    words : tuple of str
+        What each derivative is called.
+    labels : tuple of str
+        What each component is called, where there are several.
+    """
+
+    unit: str
+    values: Float[np.ndarray, "time order component"]
+    words: tuple[str, ...]
+    labels: tuple[str, ...] = ("x", "y", "z")
+
+
+@dataclasses.dataclass(frozen=True)
+class Load:
+    """What a joint, a driver or an applied force does to a body, over time.
+
+    Parameters
+    ----------
+    name : str
+    kind : {"reaction", "driver", "applied"}
+    place : numpy.ndarray of shape (time, 3)
+        Where it acts, m.
+    force : numpy.ndarray of shape (time, 3) or None
+        N, global.
+    torque : numpy.ndarray of shape (time, 3) or None
+        N m, global.
+    """
+
+    name: str
+    kind: str
+    place: Vectors
+    force: Vectors | None = None
+    torque: Vectors | None = None
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Recording(abc.ABC):
+    """One solved motion as the page shows it; everything in three components, planar ones with zero z.
+
+    Parameters
+    ----------
+    title : str
+    planar : bool
+    time : numpy.ndarray of shape (time,)
+        s; only instants that were solved.
+    order : int
+        Highest derivative.
+    bodies : tuple of str
+        Names, ``ground`` or the base of a robot first.
+    position : numpy.ndarray of shape (time, body, 3)
+        Origins of the bodies, m.
+    quaternion : numpy.ndarray of shape (time, body, 4)
+        Their attitudes, scalar part first.
+    values : mapping
+        Values of the parameters that it was solved with.
+    appearance : Appearance
+        Shapes of the bodies.
+    notice : str, default ""
+        What is to be said of it: instants that could not be solved.
+    """
+
+    title: str
+    planar: bool
+    time: Float[np.ndarray, " time"]
+    order: int
+    bodies: tuple[str, ...]
+    position: Positions
+    quaternion: Quaternions
+    values: Mapping[str, float]
+    appearance: Appearance
+    notice: str = ""
+
+    @abc.abstractmethod
+    def quantities(self) -> Mapping[str, Quantity]:
+        """Return what is plotted, by name."""
+
+    @abc.abstractmethod
+    def derivatives(self, body: str, point: Place) -> Float[np.ndarray, "time derivative 3"]:
+        """Return position and derivatives of a point of a body."""
+
+    @abc.abstractmethod
+    def all_loads(self) -> list[Load]:
+        """Return what joints, drivers and applied forces do to the bodies; empty where nothing has a mass."""
+
+    @abc.abstractmethod
+    def dataset(self) -> Dataset:
+        """Return what an export writes."""
+
+    @cached_property
+    def outputs(self) -> Mapping[str, Quantity]:
+        """What is plotted, by name; computed once."""
+        return self.quantities()
+
+    @cached_property
+    def loads(self) -> list[Load]:
+        """What joints, drivers and applied forces do to the bodies; computed once."""
+        return self.all_loads()
+
+    @cached_property
+    def _motions(self) -> dict[BodyPoint, np.ndarray]:
+        return {}
+
+    def motion(self, point: BodyPoint) -> Float[np.ndarray, "time derivative 3"]:
+        """Return the position of a point and its derivatives, m by s; computed once."""
+        if point not in self._motions:
+            self._motions[point] = self.derivatives(point.body, point.point)
+        return self._motions[point]
+
+    def frame_at(self, instant: float) -> int:
+        """Return the index of the instant nearest to a time."""
+        return int(nearest_instants(self.time, np.array([instant]))[0])
+
+    def placed(self, body: str, point: Place) -> Vectors:
+        """Return where a point of a body is at all instants, m."""
+        index = self.bodies.index(body)
+        return self.position[:, index] + rotated(self.quaternion[:, index], spatial_vectors(np.asarray(point, float)))
+
+    @cached_property
+    def box(self) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        """Corners of the box that holds all that moves, at all instants, m."""
+        corners = [self.placed(body, corner) for body, box in self.appearance.corners().items() for corner in box]
+        every = np.concatenate([self.position.reshape(-1, 3), *corners])
+        return every.min(axis=0), every.max(axis=0)
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal of the box, m; 1 where it is a point."""
+        low, high = self.box
+        return float(np.linalg.norm(high - low)) or 1.0
+
+
+def poses(motion: Motion) -> tuple[Positions, Quaternions]:
+    """Return origins and quaternions of all bodies, the ground first."""
+    _, coordinates = motion.poses
+    values = {name: np.asarray(derivatives[0]).T for name, derivatives in coordinates.items()}  # time, body, component
+    position = spatial_vectors(values["position"])
+    if "angle" in values:
+        half = 0.5 * values["angle"]
+        zero = np.zeros_like(half)
+        quaternion = np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
+    else:
+        quaternion = values["quaternion"]
+    shape = (len(motion.time), max(position.shape[1], quaternion.shape[1]))
+    return np.broadcast_to(position, (*shape, 3)), np.broadcast_to(quaternion, (*shape, 4))
+
+
+def rotated(
+    quaternion: Float[np.ndarray, "*batch 4"], vector: Float[np.ndarray, "*local 3"]
+) -> Float[np.ndarray, "*batch 3"]:
+    """Turn vectors by quaternions, scalar part first.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> rotated(np.array([0.5, 0.5, 0.5, 0.5]), np.array([1.0, 0.0, 0.0])).tolist()
+    [0.0, 1.0, 0.0]
+    """
+    scalar, axis = quaternion[..., :1], quaternion[..., 1:]
+    axis, vector = np.broadcast_arrays(axis, vector)
+    once = np.cross(axis, vector)
+    return vector + 2 * (scalar * once + np.cross(axis, once))
+
+
+def spatial_vectors(values: Float[np.ndarray, "*batch components"]) -> Float[np.ndarray, "*batch 3"]:
+    """Return vectors, components last, with a third component, zero where there are only two."""
+    missing = 3 - values.shape[-1]
+    return np.concatenate([values, np.zeros((*values.shape[:-1], missing))], axis=-1) if missing else values

@@ -1,0 +1,123 @@
+"""What robots look like: the shapes of their files, or bars from joint to joint where there are none."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Iterator
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.robot.closed_loops.mechanism_parts import on_body
+from jounce.robot.robot import Robot
+from jounce.viewer.shapes.appearance import BODY_COLOURS, DARK, GREY, Appearance, BodyPoint, ColouredMesh, upward
+from jounce.viewer.shapes.meshes import box, capsule, cylinder, merged, placed, rotation_to, sphere
+from jounce.viewer.shapes.robot_shapes import file_shapes
+from jounce.viewer.shapes.shapes import Shapes
+
+__all__ = ["robot_appearance"]
+
+Vector = Float[np.ndarray, "3"]
+Rotation = Float[np.ndarray, "3 3"]
+
+
+def robot_appearance(robot: Robot, path: Path | None = None, allow: Iterable[str | PathLike[str]] = ()) -> Appearance:
+    """Return what a robot looks like.
+
+    Parameters
+    ----------
+    robot : Robot
+    path : Path, optional
+        Its file; shapes in it are shown, and bars in the place of those that cannot be read.
+    allow
+        Folders besides that of the file that meshes may be below.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.viewer.shapes.robot_appearance import robot_appearance
+    >>> robot = jn.load_robot("examples/robots/scara.urdf")
+    >>> found = robot_appearance(robot)
+    >>> all(found.meshes[link] for link in robot.moving_links)
+    True
+    """
+    links = (robot.base, *robot.moving_links)
+    size = _size(robot)
+    found: Shapes = {link: [] for link in links}
+    for link, shapes in (file_shapes(path, allow) if path is not None else {}).items():
+        if link in robot.frames:
+            body, position, rotation = _body_of(robot, link)
+            found[body] += [dataclasses.replace(each, mesh=placed(each.mesh, position, rotation)) for each in shapes]
+    bars = _bars(robot, size)
+    bare = not any(found.values())
+    for link in links:  # a base without shapes stands on nothing, as in its file, unless all is bars
+        if not found[link] and (bare or link != robot.base):
+            found[link] = bars[link]
+    return Appearance(found, (), list(_points(robot)), size, upward(robot.gravity))
+
+
+def _body_of(robot: Robot, link: str) -> tuple[str, Vector, Rotation]:
+    """Return the moving link that a link is part of, or the base, and its pose there."""
+    if robot.frames[link].body < 0:
+        base, frame = robot.frames[robot.base], robot.frames[link]
+        return robot.base, base.rotation.T @ (frame.position - base.position), base.rotation.T @ frame.rotation
+    return on_body(robot, link)
+
+
+def _size(robot: Robot) -> float:
+    """Return the reach of the longest branch, m."""
+    reach = {robot.base: 0.0}
+    for joint in robot.joints.values():
+        reach[joint.child] = reach[joint.parent] + float(np.linalg.norm(joint.position))
+    return max(reach.values()) or 1.0
+
+
+def _ends(robot: Robot) -> dict[str, list[Vector]]:
+    """Return for each body the points where other things are: the next joints, closures, frames fixed to it."""
+    ends: dict[str, list[Vector]] = {link: [] for link in (robot.base, *robot.moving_links)}
+    touched = [(joint.parent, joint.position) for joint in robot.joints.values()]
+    for closure in robot.closures.values():
+        touched += zip(closure.links, closure.points, strict=True)
+    for link, point in touched:
+        body, position, rotation = _body_of(robot, link)
+        ends[body].append(position + rotation @ point)
+    for link in robot.moving_links:  # the last of a branch ends in its centre of mass
+        inertia = robot.links[link].inertia
+        if not any(np.linalg.norm(end) > 1e-6 for end in ends[link]) and inertia is not None:
+            ends[link].append(2.0 * np.asarray(inertia.center_of_mass))
+    return ends
+
+
+def _bars(robot: Robot, size: float) -> Shapes:
+    """Return bars from each joint to the next, and the joints as cylinders and boxes."""
+    thin = 0.016 * size
+    colours = {link: BODY_COLOURS[k % len(BODY_COLOURS)] for k, link in enumerate(robot.moving_links)}
+    colours[robot.base] = DARK
+    found: Shapes = {}
+    for body, ends in _ends(robot).items():
+        bars = [capsule(np.zeros(3), end, thin) for end in ends if np.linalg.norm(end) > 1e-3 * size]
+        found[body] = [ColouredMesh(merged(bars), colours[body])] if bars else []
+        if body == robot.base:
+            found[body].append(ColouredMesh(cylinder(0.06 * size, 0.02 * size, upward(robot.gravity)), DARK))
+        elif not bars:
+            found[body].append(ColouredMesh(sphere(1.4 * thin), colours[body]))
+    for joint in robot.joints.values():
+        if joint.moving and joint.turning:
+            found[joint.child].append(ColouredMesh(cylinder(1.35 * thin, 4.2 * thin, joint.axis), DARK))
+        elif joint.moving:
+            block = box([3 * thin, 3 * thin, 5 * thin], rotation=rotation_to(joint.axis))
+            found[joint.child].append(ColouredMesh(block, DARK))
+            found[joint.child].append(ColouredMesh(cylinder(0.6 * thin, 10 * thin, joint.axis), GREY))
+    return found
+
+
+def _points(robot: Robot) -> Iterator[BodyPoint]:
+    """Give the tips of the branches, then all other links, as points."""
+    parents = {joint.parent for joint in robot.joints.values()}
+    moving = [link for link in robot.links if robot.frames[link].body >= 0]
+    tips = [link for link in moving if link not in parents]
+    for link in [*reversed(tips), *(link for link in moving if link in parents)]:
+        body, position, _ = _body_of(robot, link)
+        yield BodyPoint(body, tuple(position.tolist()), link)

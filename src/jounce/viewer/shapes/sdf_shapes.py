@@ -1,0 +1,102 @@
+"""Shapes of robots from SDF files: what the elements ``<visual>`` show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+
+from shapely.geometry import Polygon
+from trimesh import Trimesh
+
+from jounce.errors import RobotFileError
+from jounce.io.robots.sdf import model_frames
+from jounce.io.robots.sdf_poses import Frames, Place, number_of, pose_of, text_of
+from jounce.io.robots.xml_elements import Element
+from jounce.viewer.shapes.appearance import ColouredMesh
+from jounce.viewer.shapes.mesh_files import MeshFiles, Rgba
+from jounce.viewer.shapes.meshes import box, cylinder, extruded, placed, sphere
+from jounce.viewer.shapes.shapes import Shapes, coloured, upright_capsule, words_as_numbers
+
+__all__ = ["sdf_shapes"]
+
+
+def sdf_shapes(root: Element, files: MeshFiles) -> Shapes:
+    """Return the shapes of an SDF file by link, in its frame; planes, height maps and what cannot be read are left out.
+
+    Parameters
+    ----------
+    root : Element
+        The element ``<sdf>`` of a file that describes a robot.
+    files : MeshFiles
+        Where it lies.
+    """
+    frames = model_frames(root)[0]
+    found: Shapes = {}
+    for name, link in frames.elements.items():
+        shown = found.setdefault(name, []) if link.tag == "link" else []
+        for visual in link.every("visual") if link.tag == "link" else ():
+            with suppress(RobotFileError, ValueError):  # words where numbers should be: a bar is shown instead
+                shown += _visual(visual, name, frames, files)
+    return found
+
+
+def _visual(visual: Element, link: str, frames: Frames, files: MeshFiles) -> list[ColouredMesh]:
+    geometry = visual.first("geometry")
+    if geometry is None or len(geometry.children) != 1:
+        return []
+    place, rgba = _place(visual, link, frames), _rgba(visual)
+    return [coloured(placed(mesh, *place), rgba or colour) for mesh, colour in _meshes(geometry.children[0], files)]
+
+
+def _place(visual: Element, link: str, frames: Frames) -> Place:
+    """Return where a visual is in the frame of its link; its pose may be relative to another frame."""
+    pose = visual.first("pose")
+    reference = "" if pose is None else pose.attributes.get("relative_to", "")
+    if reference and reference not in frames.elements:
+        raise visual.error("is placed relative to a frame that there is not", "visual", value=reference)
+    return frames.place(reference or link).then(pose_of(visual)).seen_from(frames.place(link))
+
+
+def _rgba(visual: Element) -> Rgba | None:
+    """Return the colour in diffuse light, or the ambient one, with the transparency."""
+    material = visual.first("material")
+    given = None if material is None else material.first("diffuse") or material.first("ambient")
+    if given is None:
+        return None
+    red, green, blue, *opacity = words_as_numbers(given.content)
+    clear = number_of(visual, "transparency", "visual", default=0.0)
+    return red, green, blue, (opacity[0] if opacity else 1.0) * (1.0 - clear)
+
+
+def _meshes(shape: Element, files: MeshFiles) -> list[tuple[Trimesh, Rgba | None]]:
+    """Return the meshes of a shape, with a colour where a mesh brings its own."""
+    if shape.tag == "mesh":
+        scale = _vector(shape, "scale")
+        return [(mesh.apply_scale(scale), colour) for mesh, colour in files.read(text_of(shape, "uri", "mesh"))]
+    solid = _SOLIDS.get(shape.tag)
+    return [] if solid is None else [(solid(shape), None)]
+
+
+def _length(shape: Element, tag: str) -> float:
+    return number_of(shape, tag, shape.tag, default=1.0)
+
+
+def _vector(shape: Element, tag: str) -> list[float]:
+    given = shape.first(tag)
+    return [1.0, 1.0, 1.0] if given is None else given.content_numbers(3, shape.tag, tag)
+
+
+def _polyline(shape: Element) -> Trimesh:
+    """Return a flat shape drawn out along z."""
+    corners = [point.content_numbers(2, shape.tag, "point") for point in shape.every("point")]
+    return extruded(Polygon(corners), 0.0, _length(shape, "height"))
+
+
+_SOLIDS: dict[str, Callable[[Element], Trimesh]] = {
+    "box": lambda shape: box(_vector(shape, "size")),
+    "sphere": lambda shape: sphere(_length(shape, "radius")),
+    "cylinder": lambda shape: cylinder(_length(shape, "radius"), _length(shape, "length")),
+    "capsule": lambda shape: upright_capsule(_length(shape, "radius"), _length(shape, "length")),
+    "ellipsoid": lambda shape: sphere(1.0).apply_scale(_vector(shape, "radii")),
+    "polyline": _polyline,
+}

@@ -1,0 +1,1 @@
+"""What the view can show, each with its controls."""

@@ -1,0 +1,93 @@
+"""What joints, drivers and applied forces do to the bodies of a mechanism, as forces and torques at points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.dynamics import applied_force, joint_reaction
+from jounce.errors import JounceError
+from jounce.kinematics import Motion
+from jounce.mechanism import Mechanism
+from jounce.plot.frames import Frame, frames, points_at
+from jounce.plot.geometry import Symbol, skeleton
+from jounce.viewer.shapes.recording import Load, Vectors, spatial_vectors
+
+__all__ = ["has_loads", "mechanism_loads"]
+
+
+def has_loads(mechanism: Mechanism) -> bool:
+    """Tell whether there are masses or applied forces, so that joints carry something."""
+    return bool(mechanism.forces) or any(body.mass is not None for body in mechanism.bodies.values())
+
+
+def mechanism_loads(motion: Motion, solved: Bool[np.ndarray, " all"]) -> list[Load]:
+    """Return what joints, drivers and applied forces do to the last of their bodies, at the instants that were solved.
+
+    Raises
+    ------
+    JounceError
+        The order of the motion is too low for forces.
+    """
+    if not has_loads(motion.mechanism):
+        return []
+    if motion.order < 2:
+        raise JounceError("forces need accelerations; set the order to 2 or more", name="order", value=motion.order)
+    seen = skeleton(motion.mechanism)
+    whole = {body: frame[solved] for body, frame in frames(motion).items()}
+    found = [_reaction(motion, solved, whole, symbol, "reaction") for symbol in seen.symbols]
+    found += [_reaction(motion, solved, whole, symbol, "driver") for symbol in seen.drivers]
+    for symbol in seen.forces:
+        force, size = motion.mechanism.forces[symbol.name], applied_force(motion, symbol.name).values[solved][:, 0]
+        places = [points_at(whole[body], point) for body, point in zip(symbol.bodies, symbol.points, strict=True)]
+        vector = _applied(force, symbol, size, whole, places)
+        if vector is not None:
+            pair = {"force" if force.unit == "N" else "torque": vector}
+            found.append(Load(symbol.name, "applied", spatial_vectors(places[-1]), **pair))
+    return found
+
+
+def _reaction(
+    motion: Motion, solved: Bool[np.ndarray, " all"], whole: dict[str, Frame], symbol: Symbol, kind: str
+) -> Load:
+    """Return what a joint or a driver does to its last body of two."""
+    slot = min(1, len(symbol.bodies) - 1)
+    reaction = joint_reaction(motion, symbol.name, point=symbol.points[slot])
+    force, torque = reaction.force.values[solved][:, 0], reaction.torque.values[solved]
+    if torque.ndim == 2:  # planar: about z
+        torque = _about_z(torque[:, 0])
+    else:
+        torque = torque[:, 0]
+    place = points_at(whole[symbol.bodies[slot]], symbol.points[slot])
+    return Load(symbol.name, kind, spatial_vectors(place), spatial_vectors(force), torque)
+
+
+def _about_z(size: Float[np.ndarray, " time"]) -> Vectors:
+    return np.array([0.0, 0.0, 1.0]) * size[:, None]
+
+
+def _applied(
+    force: Any,
+    symbol: Symbol,
+    size: Float[np.ndarray, "time *component"],
+    whole: dict[str, Frame],
+    places: list[Float[np.ndarray, "time component"]],
+) -> Vectors | None:
+    """Return a force or a torque as a global vector; None for a law of no direction that is known here."""
+    if size.ndim == 2:  # by components
+        if getattr(force, "frame", "global") == "body":
+            size = np.einsum("tck,tk->tc", whole[symbol.bodies[-1]][:, :, 1:], size)
+        return spatial_vectors(size)
+    axis = symbol.axes[0]
+    if axis is not None and (force.unit == "N" or len(axis) == 3):
+        along = whole[symbol.bodies[0]][:, :, 1:] @ (axis / np.linalg.norm(axis))
+        return spatial_vectors(along) * size[:, None]
+    if force.unit != "N":
+        return _about_z(size)
+    if len(places) == 2 and hasattr(force, "point_i"):
+        line = places[1] - places[0]
+        length = np.linalg.norm(line, axis=1, keepdims=True)
+        return spatial_vectors(line / np.where(length > 0, length, 1.0)) * size[:, None]
+    return None

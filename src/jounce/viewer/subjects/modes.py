@@ -1,0 +1,85 @@
+"""Modes as the view sees them: a slider chooses one, others change the parameters of the mechanism."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from jounce.dynamics import equilibrium, linearise
+from jounce.mechanism import Mechanism
+from jounce.mechanism.mechanism import GROUND
+from jounce.robot import Robot
+from jounce.viewer.shapes.appearance import Appearance
+from jounce.viewer.shapes.recording import Parameter, Recording
+from jounce.viewer.subjects.mechanisms import mechanism_parameters, recorded
+
+__all__ = ["ModesSubject"]
+
+SWING = 2.0  # s, that one takes on the page, however fast it is
+MODE, AMPLITUDE = "mode", "amplitude"
+GROUP = "Mode"
+LARGEST = 0.5  # rad or sizes of the mechanism
+
+
+class ModesSubject:
+    """The modes of a mechanism or a robot about its equilibrium, one at a time, in swings of two seconds.
+
+    Parameters
+    ----------
+    subject : Mechanism or Robot
+        With masses.
+    settings
+        For `jounce.equilibrium`: drivers that are left out, or joints of a robot that are held.
+    appearance : Appearance, optional
+        Shapes of the bodies; from joints unless given.
+
+    Raises
+    ------
+    JounceError
+        If it has no equilibrium, or nothing can move about it.
+    """
+
+    no_sliders = ""
+    loaded = False  # a mode is a shape: its size is free, and so are its forces
+
+    def __init__(self, subject: Mechanism | Robot, settings: Mapping[str, Any], appearance: Appearance | None = None):
+        self.subject, self.settings, self.appearance = subject, settings, appearance
+        robot = isinstance(subject, Robot)
+        self.title, self.ground = (subject.name, subject.base) if robot else (subject.title, GROUND)
+        self.name = f"Modes: {self.title or 'mechanism'}"
+        count = len(linearise(equilibrium(subject, **settings)).modes)
+        own = () if robot else mechanism_parameters(subject)
+        taken = {parameter.name for parameter in own}
+        self._keys = _unused(taken, MODE), _unused(taken, AMPLITUDE)
+        chosen = Parameter(self._keys[0], 1.0, 1.0, max(float(count), 1.0 + 1e-9), GROUP)
+        grouped = (dataclasses.replace(each, group="Parameters") for each in own)
+        self.parameters = (chosen, Parameter(self._keys[1], 0.1, 0.01, LARGEST, GROUP), *grouped)
+
+    def solve(self, values: Mapping[str, float], _order: int) -> Recording:
+        """Return a mode for some values of the parameters.
+
+        Raises
+        ------
+        JounceError
+            If there is no equilibrium for these values, or joints cannot be closed so far from it.
+        """
+        own = {name: value for name, value in values.items() if name not in self._keys}
+        mode, amplitude = (values[key] for key in self._keys)
+        subject = self.subject.with_parameters(**own) if isinstance(self.subject, Mechanism) else self.subject
+        rest = equilibrium(subject, **self.settings)
+        modes = linearise(rest).modes
+        number = min(max(round(mode), 1), len(modes))
+        motion = modes.motion(number, amplitude, duration=SWING)
+        found = recorded(motion, self.appearance, self.title, self.ground)
+        row = modes.rows[number - 1]
+        swings = f"{row['frequency']:.4g} Hz, damping ratio {row['damping_ratio']:.3g}"
+        told = swings if row["damped_frequency"] else row["kind"]
+        notice = f"mode {number} of {len(modes)}: {told}; the equilibrium is {rest.stability}"
+        return dataclasses.replace(found, notice=notice, values={**found.values, **values})
+
+
+def _unused(taken: Collection[str], name: str) -> str:
+    while name in taken:
+        name += "_"
+    return name

@@ -1,0 +1,235 @@
+"""Robots as the view sees them: a trajectory, or joints that swing within their limits."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+from xarray import Dataset
+
+from jounce.dynamics.limits.trajectories import check_measures
+from jounce.errors import RobotError, SampleWarning, check_name
+from jounce.reporting.peaks import derivative_name
+from jounce.rigid.euler_parameters import from_rotation_matrices
+from jounce.robot import forward_kinematics, inverse_dynamics, joint_wrenches
+from jounce.robot.model.links_and_joints import Joint
+from jounce.robot.robot import Robot
+from jounce.trajectory import JointTrajectory
+from jounce.units.shown_units import time_axes
+from jounce.viewer.shapes.appearance import Appearance, Place
+from jounce.viewer.shapes.recording import Load, Parameter, Quantity, Recording, rotated
+
+__all__ = ["RobotRecording", "RobotSubject", "swing_of", "swing_parameters"]
+
+FRAMES = 181
+SWING = 4.0  # s, of one swing, unless a limit of velocity is slower
+REACH = {True: np.pi / 4, False: 0.1}  # of joints without limits, rad and m: half a swing
+TORQUES = ("torque", "yank", "second rate", "third rate", "fourth rate")
+
+Times = Float[np.ndarray, " time"]
+Coordinates = Float[np.ndarray, "time derivative joint"]
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class RobotRecording(Recording):
+    """The motion of a tree of links as the page shows it.
+
+    Parameters
+    ----------
+    robot : Robot
+    q : numpy.ndarray of shape (time, order + 1, n)
+        Coordinates and their derivatives.
+    """
+
+    robot: Robot
+    q: Coordinates
+
+    @cached_property
+    def torques(self) -> Float[np.ndarray, "time derivative joint"] | None:
+        """Torques and forces of the joints with their rates; None where nothing tells them."""
+        if self.order < 2 or not has_masses(self.robot):
+            return None
+        return np.asarray(inverse_dynamics(self.robot, self.q))
+
+    def quantities(self) -> dict[str, Quantity]:
+        """Return coordinates and torques of the joints."""
+        words = tuple(derivative_name(k) for k in range(self.order + 1))
+        rates = (*TORQUES, *(f"{derivative_name(k)} rate" for k in range(5, 40)))
+        coordinates, torques = {}, {}
+        for k, name in enumerate(self.robot.joint_names):
+            turning, values = self.robot.joints[name].turning, self.q[..., k : k + 1]
+            unit, first = ("rad", "angle") if turning else ("m", "position")
+            coordinates[name] = Quantity(unit, values, (first, *words[1:]))
+            if self.torques is not None:
+                unit, first = ("N*m", "torque") if turning else ("N", "force")
+                values = self.torques[..., k : k + 1]
+                torques[f"{first} of {name}"] = Quantity(unit, values, (first, *rates[1 : values.shape[1]]))
+        return coordinates | torques
+
+    def derivatives(self, body: str, point: Place) -> Float[np.ndarray, "time derivative 3"]:
+        """Return position and derivatives of a point."""
+        return np.asarray(forward_kinematics(self.robot, self.q, body, np.asarray(point, float)).position)
+
+    def all_loads(self) -> list[Load]:
+        """Return what the joints carry, and what their drives exert."""
+        if self.torques is None:
+            return []
+        carried = np.asarray(joint_wrenches(self.robot, self.q, frame="base"))[:, 0]
+        found = []
+        for k, joint in enumerate(joint for joint in self.robot.joints.values() if joint.moving):
+            place = self.position[:, k + 1]
+            found.append(Load(joint.name, "reaction", place, carried[:, k, :3], carried[:, k, 3:]))
+            if joint.name in self.robot.joint_names:
+                axis = rotated(self.quaternion[:, k + 1], np.asarray(joint.axis, float))
+                effort = axis * self.torques[:, 0, self.robot.joint_names.index(joint.name), None]
+                found.append(Load(joint.name, "driver", place, **{"torque" if joint.turning else "force": effort}))
+        return found
+
+    def dataset(self) -> Dataset:
+        """Return coordinates and torques, for a table."""
+        variables = {}
+        for name, quantity in self.outputs.items():
+            padded = np.full(self.q.shape[:2], np.nan)
+            padded[:, : quantity.values.shape[1]] = quantity.values[..., 0]
+            key = name.replace("torque of ", "torque_").replace("force of ", "force_")
+            variables[key] = (("time", "derivative"), padded, {"units": quantity.unit})
+        axes = time_axes(self.time, self.order + 1)
+        return Dataset(variables, coords=axes, attrs={"title": self.robot.name, "source": "jounce"})
+
+
+class RobotSubject:
+    """A robot whose joints follow a trajectory, or swing.
+
+    Parameters
+    ----------
+    robot : Robot
+        A tree.
+    appearance : Appearance
+        Shapes of its moving links and its base.
+    trajectory : JointTrajectory, optional
+        Without, each joint swings about a middle, by an amount; both are sliders.
+
+    Raises
+    ------
+    RobotError
+        If the robot has no moving joint, or the trajectory names others.
+    """
+
+    no_sliders = "The robot follows a trajectory. Without one, each joint swings, and has sliders here."
+
+    def __init__(self, robot: Robot, appearance: Appearance, trajectory: JointTrajectory | None = None):
+        if not robot.joint_names:
+            raise RobotError("nothing moves: the robot has no moving joint", name=robot.name)
+        for name in trajectory.names if trajectory is not None else ():
+            check_name("moving joint", name, robot.joint_names, RobotError, name="trajectory")
+        if trajectory is not None:
+            check_measures(robot, trajectory)
+        self.robot, self.appearance, self.trajectory = robot, appearance, trajectory
+        self.name, self.loaded = robot.name, has_masses(robot)
+        self.driven, share = self.joints_driven()
+        self.parameters = () if trajectory is not None else swing_parameters(robot, self.driven, share)
+
+    def joints_driven(self) -> tuple[tuple[str, ...], float]:
+        """Return the joints that move by themselves, and the share of their swings that there is room for."""
+        return self.robot.joint_names, 1.0
+
+    def laws(self, values: Mapping[str, float]) -> tuple[JointTrajectory, Times]:
+        """Return the trajectory, or that on which joints swing, and the instants that are shown."""
+        if self.trajectory is not None:
+            return self.trajectory, np.asarray(self.trajectory.times)
+        laws = swinging(values, self.driven)
+        return laws, np.linspace(laws.start, laws.stop, FRAMES)
+
+    def solve(self, values: Mapping[str, float], order: int) -> Recording:
+        """Return the motion for some swings.
+
+        Raises
+        ------
+        JounceError
+            If the trajectory does not fit, or the period is not above zero.
+        """
+        robot, (laws, time) = self.robot, self.laws(values)
+        q = coordinates(robot, laws, time, max(order, 1))
+        links = (robot.base, *robot.moving_links)
+        frames = [forward_kinematics(robot, q[:, :1], link) for link in links]
+        rotations = [from_rotation_matrices(np.asarray(frame.rotation)[:, 0]) for frame in frames]
+        return RobotRecording(
+            robot=robot,
+            q=q,
+            title=robot.name,
+            planar=False,
+            time=time,
+            order=max(order, 1),
+            bodies=links,
+            position=np.stack([np.asarray(frame.position)[:, 0] for frame in frames], axis=1),
+            quaternion=np.stack(rotations, axis=1),
+            values=dict(values),
+            appearance=self.appearance,
+        )
+
+
+def has_masses(robot: Robot) -> bool:
+    """Tell whether links have a mass."""
+    return any(link.inertia is not None for link in robot.links.values())
+
+
+def swing_of(joint: Joint) -> tuple[float, float, float, float]:
+    """Return limits of a joint, the middle of its swing and its size, rad or m; without limits, some near zero."""
+    low, high, reach = joint.limits.lower, joint.limits.upper, REACH[joint.turning]
+    if low is None or high is None or not high > low:
+        middle = low if low is not None and low == high else 0.0
+        low, high = middle - 2 * reach, middle + 2 * reach
+    return low, high, 0.5 * (low + high), min(0.2 * (high - low), reach)
+
+
+def swing_parameters(robot: Robot, names: tuple[str, ...], share: float) -> tuple[Parameter, ...]:
+    """Return the period, and the swing, or a share of it, and the middle of each joint."""
+    swings, middles = [], []
+    for joint in (robot.joints[name] for name in names):
+        low, high, middle, swing = swing_of(joint)
+        swings.append(Parameter(f"{joint.name} swing", share * swing, 0.0, 0.5 * (high - low), "Swings (rad or m)"))
+        middles.append(Parameter(f"{joint.name} middle", middle, low, high, "Middles (rad or m)"))
+    return (Parameter("period", _period(robot), 1.0, 20.0), *swings, *middles)
+
+
+def _period(robot: Robot) -> float:
+    """Return a period at which no joint has to be faster than it can."""
+    slowest = SWING
+    for joint in (robot.joints[name] for name in robot.joint_names):
+        if joint.limits.velocity:
+            slowest = max(slowest, 2 * np.pi * swing_of(joint)[3] / joint.limits.velocity)
+    return float(np.ceil(slowest))
+
+
+def swinging(values: Mapping[str, float], names: tuple[str, ...]) -> JointTrajectory:
+    """Return the trajectory on which each joint swings, one after the other by a part of the period.
+
+    Raises
+    ------
+    RobotError
+        If the period is not above zero.
+    """
+    period = float(values["period"])
+    if not period > 0:
+        raise RobotError("must be greater than zero", name="period", value=period)
+    laws = {
+        name: f"{values[f'{name} middle']!r} + {values[f'{name} swing']!r}"
+        f"*sin(2*pi*t/{period!r} + {2 * np.pi * k / len(names)!r})"
+        for k, name in enumerate(names)
+    }
+    return JointTrajectory(laws, 0.0, period)
+
+
+def coordinates(robot: Robot, trajectory: JointTrajectory, time: Times, order: int) -> Coordinates:
+    """Return the coordinates of all joints with their derivatives; those without a law stay at zero."""
+    q = np.zeros((len(time), order + 1, len(robot.joint_names)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SampleWarning)  # the page shows how rough they are
+        found = trajectory.derivatives(time, order)
+    for k, name in enumerate(trajectory.names):
+        q[..., robot.joint_names.index(name)] = found[..., k]
+    return q

@@ -1,0 +1,163 @@
+"""How a peak changes with each parameter: exact, for the sliders of the page."""
+
+from __future__ import annotations
+
+import dataclasses
+import html
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jounce.errors import JounceError, check_name
+from jounce.kinematics import Motion, solve
+from jounce.reporting.peaks import derivative_name, peaks, scalar_outputs
+from jounce.settings import under_own_settings
+from jounce.trajectory import Expression
+from jounce.units.dimensions import ANGLE, LENGTH
+from jounce.viewer.page.page import Observer, Page
+from jounce.viewer.shapes.recording import Recording
+from jounce.viewer.subjects.mechanisms import MechanismSubject
+
+__all__ = ["PeakSlopes", "SlopesFolder", "can_be_differentiated", "peak_slopes"]
+
+STEPS = {LENGTH: (1e-3, "1 mm"), ANGLE: (np.pi / 180, "1 deg")}
+NONE = "none"
+
+
+@dataclasses.dataclass(frozen=True)
+class PeakSlopes:
+    """The largest magnitude of a derivative of an output, and its derivative by each parameter.
+
+    Parameters
+    ----------
+    peak : float
+        In the unit; without sign.
+    unit : str
+    instant : float
+        Where it is reached, s.
+    slopes : dict of str to float
+        Units of the peak per SI unit of the parameter.
+    """
+
+    peak: float
+    unit: str
+    instant: float
+    slopes: dict[str, float]
+
+
+@under_own_settings
+def peak_slopes(motion: Motion, name: str, order: int) -> PeakSlopes:
+    """Return the peak of a derivative of an output, between the instants too, and its slopes.
+
+    The slope of a peak is that of the value at its instant, as the value does not change with the instant there; where
+    it is reached at an end of the motion, the end stays where it is.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a driven mechanism with parameters.
+    name : str
+        Output, with its component where it has some: ``C_x``.
+    order : int
+        Of the derivative, up to that of the motion.
+
+    Raises
+    ------
+    JounceError
+        If there is no such output, or the motion cannot be differentiated.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> found = peak_slopes(jn.solve(jn.load("examples/four_bar.yaml"), order=2), "psi", 1)
+    >>> round(found.peak, 4), round(found.slopes["BC"], 2)  # rad/s, and for each metre of the coupler
+    (1.5179, -10.69)
+    """
+    scalars = scalar_outputs(motion)
+    check_name("output", name, scalars, JounceError, name="output")
+    stem, _ = scalars[name]
+    its = [peak for peak in peaks(motion) if peak.output == name][order]
+    low = abs(its.minimum) > abs(its.maximum)
+    instant, sign = (its.minimum_at, np.sign(its.minimum)) if low else (its.maximum_at, np.sign(its.maximum))
+    mechanism, first = motion.mechanism, float(motion.time[0])
+    times = [first] if instant == first else [first, instant]
+    alike = [column for column, (output, _) in scalars.items() if output == stem]
+    component = slice(None) if motion.outputs[stem].ndim == 2 else alike.index(name)
+
+    def height(parameters: dict[str, Any]) -> Any:
+        moved = solve(mechanism.with_parameters(**parameters), times, order=order).outputs[stem]
+        return sign * jnp.reshape(moved[-1, order], -1)[component].sum()
+
+    given = {k: x for k, x in mechanism.parameters.items() if not isinstance(x, str | Expression)}
+    found = jax.grad(height)({name: jnp.asarray(mechanism.parameter_values[name], float) for name in given})
+    unit, factor = mechanism.shown_units.of(its.unit, stem)
+    slopes = {name: float(slope) * factor for name, slope in found.items()}
+    return PeakSlopes(abs(its.minimum if low else its.maximum) * factor, unit, instant, slopes)
+
+
+def can_be_differentiated(subject: Any) -> bool:
+    """Tell whether a subject is a driven mechanism with parameters and outputs."""
+    if not isinstance(subject, MechanismSubject) or not subject.parameters:
+        return False
+    return bool(subject.mechanism.outputs) and not subject.mechanism.initial
+
+
+class SlopesFolder(Observer):
+    """Says for a chosen peak what a step of each slider makes of it, and follows the sliders.
+
+    Parameters
+    ----------
+    page : Page
+        In whose GUI it is made, in the container of now.
+    """
+
+    def __init__(self, page: Page):
+        self.page = page
+        recording: Any = page.recording
+        orders = tuple(derivative_name(k) for k in range(recording.order + 1))
+        with page.server.gui.add_folder("Slopes of a peak", expand_by_default=False):
+            names = (NONE, *scalar_outputs(recording.solution))
+            self.output = page.server.gui.add_dropdown("output", names, initial_value=NONE)
+            self.order = page.server.gui.add_dropdown("derivative", orders, initial_value=orders[-1])
+            self.text = page.server.gui.add_html("")
+        for control in (self.output, self.order):
+            control.on_update(lambda _: self._ask())
+
+    def on_recording(self, recording: Recording) -> None:
+        """Follow a new motion, which may have other orders."""
+        orders = tuple(derivative_name(k) for k in range(recording.order + 1))
+        if self.order.options != orders:
+            self.order.options = orders
+        self._ask()
+
+    def _ask(self) -> None:
+        """Have the worker find the slopes; a motion that came since has its own."""
+        if self.output.value == NONE:
+            self.text.content = ""
+            return
+        recording, name, order = self.page.recording, self.output.value, self.order.options.index(self.order.value)
+
+        def job() -> None:
+            if recording is self.page.recording:
+                self.text.content = told(recording, name, order)
+
+        self.text.content = "<em>finding slopes ...</em>"
+        self.page.session.later(job)
+
+
+def told(recording: Any, name: str, order: int) -> str:
+    """Return the peak and what a step of each parameter makes of it, as lines of HTML."""
+    motion = recording.solution
+    try:
+        found = peak_slopes(motion, name, order)
+    except JounceError as error:
+        return html.escape(f"No slopes: {error}")
+    lines = [f"peak {found.peak:.4g} {found.unit} at {found.instant:.4g} s"]
+    for parameter, slope in found.slopes.items():
+        allowed = motion.mechanism.dimensions.get(parameter, ())
+        percent = 0.01 * float(motion.mechanism.parameter_values[parameter]), "1 %"
+        step, words = STEPS.get(allowed[0], percent) if allowed else percent
+        lines.append(f"{parameter} +{words}: {slope * step:+.3g} {found.unit}")
+    return "<br>".join(map(html.escape, lines))

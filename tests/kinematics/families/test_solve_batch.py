@@ -1,0 +1,146 @@
+"""Families of designs beside the same designs solved one by one."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from tests.problems.mechanisms import example
+
+FOUR_BAR = jn.load(example("four_bar"))
+TIME = np.linspace(0.0, 2.0, 9)
+
+
+def check(mechanism, parameters, family, time, order, error=1e-12):
+    """Compare a family with its designs one by one: every output, derivative and status."""
+    for k in range(family.sizes["design"]):
+        values = {name: float(given[k]) for name, given in parameters.items()}
+        alone = jn.solve(mechanism.with_parameters(**values), time, order=order, strict=False)
+        np.testing.assert_array_equal(family["status"].values[k], alone.status)
+        for name, wanted in alone.outputs.items():
+            found = family[name].values[k].reshape(wanted.shape)
+            others = tuple(k for k in range(wanted.ndim) if k != 1)
+            size = np.nan_to_num(np.abs(wanted)).max(axis=others, keepdims=True)  # of each derivative
+            np.testing.assert_allclose(found / (size + 1e-300), wanted / (size + 1e-300), atol=error, rtol=0)
+
+
+@pytest.mark.slow
+def test_designs_are_those_solved_alone():
+    parameters = {"BC": np.linspace(0.125, 0.16, 5), "tau": np.linspace(1.8, 2.2, 5)}
+    family = jn.solve_batch(FOUR_BAR, parameters, TIME, order=2)
+    check(FOUR_BAR, parameters, family, TIME, 2)
+    assert dict(family["C"].sizes) == {"design": 5, "time": 9, "derivative": 3, "component": 2}
+    np.testing.assert_array_equal(family["tau"], parameters["tau"])
+    assert family["psi"].attrs["units"] == "rad"
+    assert family["tau"].dims == ("design",)
+
+
+@pytest.mark.slow
+def test_no_array_takes_the_name_of_another():
+    parameters = {**FOUR_BAR.parameters, "psi": 1.0, "time": 2.0}
+    named = dataclasses.replace(FOUR_BAR, parameters=parameters)
+    family = jn.solve_batch(named, {"psi": [1.0, 3.0], "time": [2.0, 4.0], "BC": [0.14, 0.15]}, [0.0], order=0)
+    assert family["psi"].dims == ("design", "time", "derivative")
+    np.testing.assert_array_equal(family["parameter_psi"], [1.0, 3.0])
+    np.testing.assert_array_equal(family["parameter_time"], [2.0, 4.0])
+    np.testing.assert_array_equal(family["time"], [0.0])
+    for name in ("status", "design"):
+        other = dataclasses.replace(FOUR_BAR, outputs={name: FOUR_BAR.outputs["psi"]})
+        with pytest.raises(jn.MechanismError, match=f"name '{name}' is that of an array of a family"):
+            jn.solve_batch(other, {"BC": [0.14, 0.15]}, [0.0], order=0)
+
+
+@pytest.mark.slow
+def test_one_that_locks_or_cannot_be_assembled_stops_no_other():
+    parameters = {"AB": np.array([0.04, 0.1, 0.05, 0.9])}
+    family = jn.solve_batch(FOUR_BAR, parameters, TIME, order=2)
+    check(FOUR_BAR, {"AB": parameters["AB"][:3]}, family.isel(design=slice(3)), TIME, 2)
+    status = family["status"].values
+    assert not status[[0, 2]].any()
+    assert status[1].any()
+    assert not status[1].all()
+    assert (status[3] == jn.Status.NOT_ASSEMBLED).all()
+    assert np.isnan(family["psi"].values[3]).all()
+
+
+@pytest.mark.slow
+def test_bad_designs_are_told():
+    with pytest.raises(jn.MechanismError, match=r"greater than zero.*design 1: BC = -0\.14"):
+        jn.solve_batch(FOUR_BAR, {"BC": [0.14, -0.14]}, TIME, order=2)
+    with pytest.raises(jn.MechanismError, match="one for each design"):
+        jn.solve_batch(FOUR_BAR, {"BC": [0.14, np.nan]}, TIME)
+    with pytest.raises(jn.MechanismError, match="no parameter has this name"):
+        jn.solve_batch(FOUR_BAR, {"BCD": [0.14]}, TIME)
+    with pytest.raises(jn.MechanismError, match="one value for each design, 2 as"):
+        jn.solve_batch(FOUR_BAR, {"BC": [0.14, 0.15], "AB": [0.04]}, TIME)
+
+
+@pytest.mark.slow
+def test_one_instant_and_one_design():
+    family = jn.solve_batch(FOUR_BAR, {"BC": [0.14]}, [0.3], order=2)
+    check(FOUR_BAR, {"BC": [0.14]}, family, [0.3], 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name, parameter",
+    [
+        ("gear_pair", "AB"),  # offsets that follow from a guess that differs
+        ("six_bar_watt", None),
+        ("rsur", "BC"),  # angles about axes
+    ],
+)
+def test_kinds_of_mechanisms(name, parameter):
+    mechanism = jn.load(example(name))
+    numbers = {key: value for key, value in mechanism.parameters.items() if not isinstance(value, str)}
+    key = parameter or next(iter(numbers))
+    parameters = {key: mechanism.parameter_values[key] * np.linspace(0.995, 1.005, 4)}
+    time = np.linspace(0.0, 1.5, 7)
+    check(mechanism, parameters, jn.solve_batch(mechanism, parameters, time, order=2), time, 2, 1e-11)
+
+
+@pytest.mark.slow
+def test_a_change_point_on_the_way_is_passed_as_alone():
+    mechanism = jn.load(example("four_bar"))
+    parameters = {"AB": np.array([0.04, 0.0713])}  # AB + CD = AD + BC: the bars come to lie in one line
+    time = np.linspace(0.0, 2.0, 41)
+    check(mechanism, parameters, jn.solve_batch(mechanism, parameters, time, order=2), time, 2, 1e-9)
+
+
+@pytest.mark.slow
+def test_more_designs_than_go_side_by_side(monkeypatch):
+    monkeypatch.setattr("jounce.kinematics.families.design_paths.WIDEST", 16)
+    parameters = {"BC": np.linspace(0.125, 0.16, 37)}
+    family = jn.solve_batch(FOUR_BAR, parameters, TIME, order=1, threads=1)
+    check(FOUR_BAR, parameters, family, TIME, 1)
+    again = jn.solve_batch(FOUR_BAR, parameters, TIME, order=1, threads=2)
+    assert family.identical(again)
+
+
+@pytest.mark.slow
+def test_forces_and_energies_are_those_of_designs_alone():
+    arm = jn.Mechanism(
+        space="planar",
+        gravity=[0, -10.0],
+        parameters={"m": 2.0, "c": 0.5},
+        bodies={"arm": jn.Body([0, 0], mass="m", center_of_mass=["c", 0])},
+        joints={"O": jn.planar.Revolute(("ground", "arm"), [0, 0], [0, 0])},
+        drivers={"turn": jn.drivers.CoordinateDriver(("ground", "arm"), "angle", motion="3*t")},
+        outputs={"torque": jn.DriverTorqueOutput("turn"), "angle": jn.AngleOutput("arm")},
+    )
+    family = jn.solve_batch(arm, {"m": [1.0, 2.0, 3.0], "c": [0.1, 0.2, 0.3]}, [0.0, 0.2], order=1)
+    m, c = family["m"].values[:, None], family["c"].values[:, None]
+    expected = m * c * 10.0 * np.cos(3 * family["time"].values)
+    np.testing.assert_allclose(family["torque"].values[..., 0], expected, rtol=1e-12)
+
+
+@pytest.mark.slow
+def test_redundant_constraints_and_assemblies_are_those_of_designs_alone():
+    bennett = jn.load(example("bennett"))
+    bennett = dataclasses.replace(bennett, outputs={"C": bennett.outputs["C"]})  # none of forces
+    crossed = dataclasses.replace(FOUR_BAR, assembly=2)
+    for mechanism, parameters in ((bennett, {"a": np.array([0.1, 0.12])}), (crossed, {"BC": np.array([0.14, 0.15])})):
+        family = jn.solve_batch(mechanism, parameters, TIME[:3], order=1)
+        assert not family["status"].values.any()
+        check(mechanism, parameters, family, TIME[:3], 1)
