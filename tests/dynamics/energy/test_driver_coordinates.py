@@ -106,7 +106,7 @@ def test_a_closed_loop_agrees_with_the_force_of_its_driver():
 
 @pytest.mark.slow
 def test_a_loop_in_space_agrees_with_the_force_of_its_driver():
-    from tests.dynamics.test_energies import with_masses
+    from tests.dynamics.energy.test_energies import with_masses
 
     masses = {"coupler": {"mass": 0.8, "inertia": [0.02, 0.03, 0.04], "center_of_mass": [0.02, 0.05, 0.01]}}
     masses["rocker"] = {"mass": 0.6, "inertia": 0.03, "center_of_mass": [0.05, 0.0, 0.01]}

@@ -4,9 +4,9 @@ import functools
 
 import numpy as np
 import pytest
-from tests.dynamics.test_energies import TIMES, close, four_bar, with_masses
 
 import jounce as jn
+from tests.dynamics.energy.test_energies import TIMES, close, four_bar, with_masses
 from tests.oracles import negrean_energies
 from tests.problems.robots import random_robot
 
