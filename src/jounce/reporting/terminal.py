@@ -11,7 +11,15 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jounce.errors import AssemblyWarning, DamageWarning, MachineCodeWarning, RobotWarning, SampleWarning, UnitWarning
+from jounce.errors import (
+    AssemblyWarning,
+    DamageWarning,
+    MachineCodeWarning,
+    RobotWarning,
+    SampleWarning,
+    UnitWarning,
+    shortened,
+)
 from jounce.interrupts import undoing
 
 if TYPE_CHECKING:
@@ -250,6 +258,7 @@ def unexpected(error: Exception) -> str:
     """Word an error that no check foresaw, with the innermost line that is the user's or this package's own."""
     import traceback
 
-    words = f"unexpected {type(error).__name__}: {str(error).strip().partition(chr(10))[0]}".rstrip(": ")
+    said = shortened(str(error).strip().partition("\n")[0])
+    words = f"unexpected {type(error).__name__}: {said}".rstrip(": ")
     frames = [f for f in traceback.extract_tb(error.__traceback__) if "site-packages" not in f.filename]
     return f"{words} ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else words

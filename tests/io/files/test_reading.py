@@ -282,3 +282,9 @@ def test_names_that_no_system_takes():
             read_file(named_file(name, "cam.yaml"))
     with pytest.raises(OutputError):
         read("a\0b.csv")
+
+
+def test_a_name_that_no_file_can_have():
+    with pytest.raises(MechanismFileError, match="given by its extension") as caught:
+        jn.load("n" * 100_000)
+    assert len(str(caught.value)) < 5000

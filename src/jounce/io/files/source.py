@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from os import PathLike, fspath
 from pathlib import Path
@@ -70,7 +71,7 @@ def read_source(
     if not name:
         raise error_type("the name of a file is needed", value=name)
     suffix = Path(name).suffix.lower()
-    if suffix not in DATA_FILES and not Path(name).is_dir():
+    if suffix not in DATA_FILES and not os.path.isdir(name):  # noqa: PTH112 - no error of a long name
         raise error_type(
             f"the kind of a {kind} file is given by its extension; valid: {', '.join(DATA_FILES)}", path=name
         )
