@@ -27,7 +27,8 @@ from tests.shares_of_tests import pytest_addoption, pytest_collection_modifyitem
 # Most of the time of the tests goes into compiling. It is halved without XLA's last optimisations, without its passes
 # over loops and reshapes, which go round some thirty times, and in one thread, of which the other worker has the next.
 # Its newer emitters, which the solver's programs leave out too, take twice as long for an operation alone; JAX 0.11 has
-# no others. The same is asked of the results; the examples, the study of branches and the benchmarks run as users do.
+# no others. The same is asked of the results; the examples, the study of branches and the benchmarks run as users do,
+# and so do tests with JOUNCE_TESTS_AS_USERS=1: all optimisations, all threads.
 _QUICK_TO_COMPILE = (
     "--xla_backend_optimization_level=0",
     *(["--xla_cpu_use_fusion_emitters=false"] if jax.__version_info__ < (0, 11) else []),
@@ -35,10 +36,13 @@ _QUICK_TO_COMPILE = (
     "--xla_disable_hlo_passes=simplify-while-loops,while-loop-invariant-code-motion,while-loop-constant-sinking"
     ",reshape-mover",
 )
-os.environ.setdefault("XLA_FLAGS", " ".join(_QUICK_TO_COMPILE))
+_as_users = os.environ.get("JOUNCE_TESTS_AS_USERS") == "1"
+if not _as_users:
+    os.environ.setdefault("XLA_FLAGS", " ".join(_QUICK_TO_COMPILE))
 # There is a worker for each core: threads beside it take a sixth more time of the processor, as two work on the same
 # memory and ask for the same lock. Tests of threads and of rehearsals ask for two; the examples run with all cores.
-os.environ.setdefault("JOUNCE_THREADS", "1")
+if not _as_users:
+    os.environ.setdefault("JOUNCE_THREADS", "1")
 # The lines of Python from which each operation comes, which only dumps of programs show, take a twelfth of the time.
 jax.config.update("jax_include_full_tracebacks_in_locations", False)
 jax.config.update("jax_traceback_in_locations_limit", 0)

@@ -10,6 +10,8 @@ import jounce as jn
 from jounce.mechanism.time import time_grid
 from jounce.reporting.peaks import peaks
 
+pytestmark = pytest.mark.slow  # `.ci/run` runs them all, as users do
+
 
 def pin(body_i, body_j, point_i, point_j):
     """Return a revolute joint."""

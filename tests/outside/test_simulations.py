@@ -13,6 +13,8 @@ import jounce as jn
 from jounce import jet
 from tests.problems.own_types import taken_back
 
+pytestmark = pytest.mark.slow  # `.ci/run` runs them all, as users do
+
 
 def block(law, x0=0.0, v0=0.0, guess=0.0):
     """Return a block of 1 kg on a slide along x, under a force along x, with its position as output."""

@@ -11,6 +11,8 @@ import pytest
 import jounce as jn
 from jounce.cli import main
 
+pytestmark = pytest.mark.slow  # `.ci/run` runs them all, as users do
+
 DISC = jn.Inertia(1.0, center_of_mass=[0, 0, 0], tensor=[0.1, 0.1, 0.1])
 LIMITS = jn.Limits(velocity=3.0, acceleration=4.0, jerk=200.0)
 URDF = (
