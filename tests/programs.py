@@ -7,7 +7,7 @@ import jounce.integrate  # noqa: F401 - the compiled functions of all rooms are 
 from jounce.execution.compilation import Compiled
 from jounce.execution.mapped import Mapped
 
-SOME = {"march", "leg", "exerted", "_balanced", "advance_instant"}
+SOME = {"march", "take_steps", "exerted", "_balanced", "advance_instant"}
 
 
 def functions() -> dict[str, Compiled | Mapped]:

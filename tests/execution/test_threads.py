@@ -58,8 +58,8 @@ def test_programs_of_long_grids_hold_no_lapack(monkeypatch, name):
     monkeypatch.setattr(Compiled, "__call__", told)
     monkeypatch.setenv("JOUNCE_NATIVE", "0")  # machine code calls no library of the kind
     jn.solve(jn.load(f"examples/{name}.yaml"), LONG[:1100], strict=False)
-    assert {"leg", "_in_rounds"} <= texts.keys()
-    assert "lapack" not in texts["leg"] + texts["_in_rounds"]
+    assert {"take_steps", "_in_rounds"} <= texts.keys()
+    assert "lapack" not in texts["take_steps"] + texts["_in_rounds"]
 
 
 def test_items_are_mapped_in_order_and_an_error_comes_through():

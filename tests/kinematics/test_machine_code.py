@@ -8,7 +8,7 @@ from jounce.execution.llvm import self_test
 from jounce.execution.llvm.programs import Program
 from jounce.execution.mapped import Mapped, OnLlvm
 from jounce.kinematics import Status
-from jounce.kinematics.continuation import continuation_steps as legs
+from jounce.kinematics.continuation import continuation_steps
 from jounce.kinematics.continuation.instant_program import advance_instant
 from jounce.mechanism.builder import build
 from tests.linear_algebra.test_frontal import chain
@@ -118,7 +118,7 @@ def test_a_leg_without_code_of_its_own_is_left_to_xla_whole(monkeypatch):
     def program(shared, lanes, static, **how):
         wanted.append(static["native"])
 
-    monkeypatch.setattr(legs.leg.machine_code, "program", program)
+    monkeypatch.setattr(continuation_steps.take_steps.machine_code, "program", program)
     found = jn.solve(four_bar(), grid)
     assert wanted
     assert None not in wanted

@@ -6,7 +6,6 @@ import pytest
 
 import jounce as jn
 from jounce.jet import Jet
-from jounce.kinematics.continuation.continuation_steps import leg
 from jounce.kinematics.continuation.instant_program import advance_instant
 from jounce.mechanism import build
 from tests.problems.small import crank, four_bar, law, screw, slider_crank, spindle

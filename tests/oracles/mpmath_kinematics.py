@@ -1,7 +1,7 @@
 """Independent judge: kinematics of a mechanism file in fifty digits, to any order.
 
 Positions by Newton's method, then the Taylor coefficients one order after another. The Jacobian is the derivative of
-the residuals along each coordinate, taken by the series themselves. Continuation from the starting guess runs in
+the residuals along each coordinate, taken by the series themselves. TakenSteps from the starting guess runs in
 floats; only the instants asked for are carried to full precision. Nothing here imports the library.
 """
 

@@ -6,8 +6,8 @@ import pytest
 import jounce as jn
 from jounce.execution.llvm.self_test import is_usable
 from jounce.kinematics import Status
-from jounce.kinematics.position_analysis import grid, grid_blocks as spans, grid_storage as long_grids
-from jounce.kinematics.position_analysis.grid_blocks import rounds, spans_of
+from jounce.kinematics.position_analysis import grid, grid_blocks, grid_storage
+from jounce.kinematics.position_analysis.grid_blocks import blocks_of, rounds
 from tests.problems.small import four_bar, slider_crank
 
 needs_machine_code = pytest.mark.skipif(
@@ -26,7 +26,7 @@ def _wanted(monkeypatch):
 @pytest.mark.parametrize("full", [False, True])
 def test_each_instant_comes_after_what_it_starts_from(count, stride, width, full):
     solved = np.zeros(count, bool)
-    for span in spans_of(0, count, stride, width, full=full):
+    for span in blocks_of(0, count, stride, width, full=full):
         seen = np.zeros(count, bool)  # what other spans solve, it cannot count on
         turns = rounds(span.count, span.stride, width)
         assert not full or turns.size < 2 * max(span.count, width)  # half of a round is in use at least
@@ -58,7 +58,7 @@ def assert_same(one, other):
 def in_turn(monkeypatch, mechanism, time, **given):
     """The motion without rounds."""
     with monkeypatch.context() as patch:
-        patch.setattr(grid.GridSolver, "_in_spans", lambda self, left, *_: left)
+        patch.setattr(grid.GridSolver, "_in_blocks", lambda self, left, *_: left)
         return jn.solve(mechanism, time, **given, strict=False, threads=1)
 
 
@@ -109,7 +109,7 @@ def test_instants_that_start_from_failures_are_solved_again(monkeypatch):
     """Where it is told that some instants failed, they and what starts from them are solved once more."""
     time, again = np.linspace(0, 2, 3001), []
     expected = jn.solve(four_bar(), time)
-    in_spans, solve = grid.GridSolver._in_spans, spans._Room.solve
+    in_spans, solve = grid.GridSolver._in_blocks, grid_blocks._Room.solve
 
     def spoiling(room):
         solve(room)
@@ -120,8 +120,8 @@ def test_instants_that_start_from_failures_are_solved_again(monkeypatch):
         again.append(in_spans(self, *given))
         return again[-1]
 
-    monkeypatch.setattr(spans._Room, "solve", spoiling)
-    monkeypatch.setattr(grid.GridSolver, "_in_spans", told)
+    monkeypatch.setattr(grid_blocks._Room, "solve", spoiling)
+    monkeypatch.setattr(grid.GridSolver, "_in_blocks", told)
     assert_same(jn.solve(four_bar(), time, threads=1), expected)
     np.testing.assert_array_equal(np.flatnonzero(again[0]), np.arange(64, 96))
 
@@ -146,7 +146,7 @@ def test_stretches_solved_at_once_are_those_solved_one_after_another(monkeypatch
     with monkeypatch.context() as patch:
         patch.setattr(long_grids, "_solved_at_once", lambda *_: frozenset())
         expected = jn.solve(mechanism, time, order=3, keep=keep, strict=False)
-    at_once = long_grids._solved_at_once
+    at_once = grid_storage._solved_at_once
     monkeypatch.setattr(long_grids, "_solved_at_once", lambda *given: solved.append(at_once(*given)) or solved[-1])
     assert_same(jn.solve(mechanism, time, order=3, keep=keep, strict=False, threads=2), expected)
     firsts = range(0, 4400, 1100)  # the last stretch is a short grid
@@ -162,7 +162,7 @@ def test_a_stretch_in_which_some_instant_fails_is_solved_again(monkeypatch, alwa
     time, told, spoiled = np.linspace(0, 2, 4400), [], []
     monkeypatch.setattr(long_grids, "STRETCH", 1100)
     expected = jn.solve(four_bar(), time, keep=keep)
-    solve = spans._Room.solve
+    solve = grid_blocks._Room.solve
 
     def spoiling(room):
         solve(room)
@@ -171,7 +171,7 @@ def test_a_stretch_in_which_some_instant_fails_is_solved_again(monkeypatch, alwa
             room.state[1][0][..., 5] = 1e308  # 24 times that is no number
             spoiled.append(True)
 
-    monkeypatch.setattr(spans._Room, "solve", spoiling)
+    monkeypatch.setattr(grid_blocks._Room, "solve", spoiling)
     found = jn.solve(four_bar(), time, threads=1, keep=keep, progress=lambda *x: told.append(x))
     assert len(spoiled) == 1 + always
     assert_same(found, expected)

@@ -16,7 +16,7 @@ from jounce.errors import SolveError
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.kinematics import Status
-from jounce.kinematics.assembly.gauss_newton import put_together
+from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism, Model
@@ -185,7 +185,7 @@ def _moved(place: Place, step: Float[np.ndarray, " column"]) -> Place | None:
     moved = displaced(coordinates, change[:shifts], change[shifts:], model.pose_type)
     coordinates = {name: np.asarray(x) for name, x in moved.items()}
     if model.rows:
-        trial = put_together(model, instant, TOLERANCE, coordinates)
+        trial = assemble_from_guess(model, instant, TOLERANCE, coordinates)
         if not trial.closed:
             return None
         coordinates = trial.coordinates

@@ -10,7 +10,7 @@ from jounce.dynamics.statics.independent_coordinates import Place
 from jounce.dynamics.statics.static_equilibrium import Equilibrium, as_mechanism, at_rest_from, told
 from jounce.errors import MechanismError, whole_number
 from jounce.kinematics.assembly.axis_directions import senses
-from jounce.kinematics.assembly.gauss_newton import put_together
+from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.mechanism import Mechanism, build
 from jounce.mechanism.preconditions import concrete
@@ -125,7 +125,7 @@ def _closed(start: Place, coordinates: Coordinates) -> Place | None:
     """Return the mechanism put together from a position; None where that does not go, or turns a part over."""
     model, instant = start.model, float(start.clock[0, 0, 0])
     if model.rows:
-        trial = put_together(model, instant, TOLERANCE, coordinates)
+        trial = assemble_from_guess(model, instant, TOLERANCE, coordinates)
         drawn = {name: x[0] for name, x in start.coordinates.items()}
         if not trial.closed or not np.array_equal(senses(model.system, trial.coordinates), senses(model.system, drawn)):
             return None

@@ -11,7 +11,7 @@ from jounce.dynamics.statics.equilibrium_search import displaced
 from jounce.dynamics.statics.independent_coordinates import Reduction
 from jounce.errors import MechanismError, SolveError
 from jounce.kinematics import Motion, Status
-from jounce.kinematics.assembly.gauss_newton import put_together
+from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.results.pose_outputs import output_values
 
 
@@ -56,7 +56,7 @@ def mode_motion(
         found = displaced(still, change[:shifts], change[shifts:], model.pose_type)
         coordinates = {key: np.asarray(x) for key, x in found.items()}
         if model.rows:
-            trial = put_together(model, instant, TOLERANCE, coordinates)
+            trial = assemble_from_guess(model, instant, TOLERANCE, coordinates)
             if not trial.closed:
                 message = f"{name} cannot be shown with an amplitude of {amplitude:g}: joints stay open; choose less"
                 raise SolveError(message, status=Status.NOT_ASSEMBLED)

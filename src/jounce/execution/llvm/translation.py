@@ -103,7 +103,7 @@ def _give_back(code: Code, arrays: Sequence[Array]) -> None:
     """Give back the memory of arrays that nobody reads any more, where nobody reads it by another one."""
     for region in _regions(arrays):
         if code.is_unshared(region):
-            code.give_back(region)
+            code.release(region)
 
 
 def _give_back_but(code: Code, taken: Sequence[Region], arrays: Sequence[Array]) -> None:
@@ -111,7 +111,7 @@ def _give_back_but(code: Code, taken: Sequence[Region], arrays: Sequence[Array])
     wanted = _regions(arrays)
     for region in dict.fromkeys(taken):
         if region not in wanted:
-            code.give_back(region)
+            code.release(region)
 
 
 def _results(code: Code, equation: Any, given: Sequence[Array], *, delayed: bool) -> Sequence[Array]:

@@ -11,7 +11,7 @@ from jounce.errors import AssemblyError, AssemblyWarning, MobilityError
 from jounce.execution.device import resident
 from jounce.jet import Jet
 from jounce.kinematics.assembly.axis_directions import drawn_senses, pair_names, senses, senses_to_seek, starts_with
-from jounce.kinematics.assembly.gauss_newton import Displacements, Trial, put_together
+from jounce.kinematics.assembly.gauss_newton import AssemblyAttempt, Displacements, assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import (
     Coordinates,
     DriverLag,
@@ -75,15 +75,15 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     return model, found.coordinates
 
 
-def _exact(model: Model, found: Trial, instant: float, tolerance: float) -> Trial:
+def _exact(model: Model, found: AssemblyAttempt, instant: float, tolerance: float) -> AssemblyAttempt:
     """Return bodies that were put together loosely, next to a singular position, put together to rounding."""
     if tolerance <= TIGHT or not found.jacobian.smallest[1].size:
         return found
-    exact = put_together(model, instant, TIGHT, found.coordinates)
+    exact = assemble_from_guess(model, instant, TIGHT, found.coordinates)
     return exact if exact.closed else found
 
 
-def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
+def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, AssemblyAttempt]:
     """Put the bodies together with no part turned over in its joint, if that goes, and count angles from there.
 
     A guess in which directions that joints hold parallel are far from it may lead to a part that lies turned over, or
@@ -107,7 +107,7 @@ def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Tria
     return best
 
 
-def _nearby(model: Model, instant: float, tolerance: float) -> tuple[Model, Trial]:
+def _nearby(model: Model, instant: float, tolerance: float) -> tuple[Model, AssemblyAttempt]:
     """Put the bodies together from the starting guess, and count the angles about axes from the position found.
 
     Where the axes were tilted against each other in the guess, the angles in the position found are others than those
@@ -118,15 +118,15 @@ def _nearby(model: Model, instant: float, tolerance: float) -> tuple[Model, Tria
     lag = driver_lag(model, instant, residual)
     model, start = _turned(model, instant, tolerance, lag)
     if start is not None:
-        found = put_together(model, instant, tolerance, start)
+        found = assemble_from_guess(model, instant, tolerance, start)
     elif found is None:
-        found = put_together(model, instant, tolerance, known=known or moved.at(model.guess))
+        found = assemble_from_guess(model, instant, tolerance, known=known or moved.at(model.guess))
     if not found.closed and any(map(measures_angle, model.system.groups)):
         # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
-        begin = found if lag is None else put_together(model, instant, tolerance, lag=lag)
+        begin = found if lag is None else assemble_from_guess(model, instant, tolerance, lag=lag)
         if begin.closed:
             model, _ = with_reference(model, begin.coordinates, instant, told)
-            found = put_together(model, instant, tolerance, begin.coordinates)
+            found = assemble_from_guess(model, instant, tolerance, begin.coordinates)
     if "angle" in found.coordinates and start is None and found.closed:
         found = nearest_to_guess(model, found, instant)
     for _ in range(MAX_DATUMS):
@@ -135,11 +135,11 @@ def _nearby(model: Model, instant: float, tolerance: float) -> tuple[Model, Tria
         model, away = with_reference(model, found.coordinates, instant, told)
         if away <= SETTLED:
             return model, found
-        found = put_together(model, instant, tolerance, found.coordinates)
+        found = assemble_from_guess(model, instant, tolerance, found.coordinates)
     return with_reference(model, found.coordinates, instant, told, keep=True)[0], found
 
 
-def warn_of_parts_turned_over(model: Model, found: Trial) -> None:
+def warn_of_parts_turned_over(model: Model, found: AssemblyAttempt) -> None:
     """Warn of joints whose parts are held the other way round than the starting guess means."""
     there = senses(model.system, found.coordinates)
     if there.all() or not (odd := there != drawn_senses(model)).any():
@@ -161,7 +161,7 @@ def _turned(model: Model, instant: float, tolerance: float, lag: DriverLag | Non
     """
     if lag is None or not np.pi < lag.angle < np.inf:
         return model, None
-    begin = put_together(model, instant, tolerance, lag=lag)
+    begin = assemble_from_guess(model, instant, tolerance, lag=lag)
     if not begin.closed:
         return model, None
     found = turned_to_laws(model, lag, begin.coordinates, Displacements(model, instant))
@@ -178,7 +178,7 @@ def _turned(model: Model, instant: float, tolerance: float, lag: DriverLag | Non
     return model, coordinates
 
 
-def nearest_to_guess(model: Model, found: Trial, instant: float) -> Trial:
+def nearest_to_guess(model: Model, found: AssemblyAttempt, instant: float) -> AssemblyAttempt:
     """Return planar bodies put together, with every angle shifted by whole turns to be nearest to the guess."""
     moved = Displacements(model, instant)
 
@@ -188,7 +188,7 @@ def nearest_to_guess(model: Model, found: Trial, instant: float) -> Trial:
     return found._replace(coordinates=nearest_turns(model.guess, found.coordinates, residual_at))
 
 
-def check_assembled(model: Model, found: Trial, instant: float, *, free: bool = False) -> None:
+def check_assembled(model: Model, found: AssemblyAttempt, instant: float, *, free: bool = False) -> None:
     """Raise AssemblyError, with the joints concerned and by how much they stay open, where gaps are not closed.
 
     What is missing for every motion to be prescribed is told too, unless degrees of freedom may be left (`free`).
@@ -224,7 +224,7 @@ def check_assembled(model: Model, found: Trial, instant: float, *, free: bool = 
     raise AssemblyError(message, status=Status.NOT_ASSEMBLED)
 
 
-def _structural_excess(model: Model, found: Trial, instant: float) -> int:
+def _structural_excess(model: Model, found: AssemblyAttempt, instant: float) -> int:
     """Return how many equations are dependent wherever the bodies are, so that they may contradict each other.
 
     Bodies that do not reach each other come to rest where equations depend on each other too, but only there.
@@ -234,7 +234,7 @@ def _structural_excess(model: Model, found: Trial, instant: float) -> int:
     return len(model.rows) - jacobian.scaled(jacobian.row_scale).rank if jacobian.finite().all() else 0
 
 
-def _widths(model: Model, found: Trial, instant: float) -> dict[str, str]:
+def _widths(model: Model, found: AssemblyAttempt, instant: float) -> dict[str, str]:
     """Return by how much each joint and driver is open, as a length or as an angle, whichever it closes."""
     shifts, entries = model.pose_type.shifts, np.abs(found.jacobian.blocks)
     by_shift, by_turn = (np.max(part, axis=(1, 2)) for part in (entries[:, :, :shifts], entries[:, :, shifts:]))
@@ -270,7 +270,7 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
     return found
 
 
-def redundancy_of(model: Model, found: Trial, instant: float) -> tuple[Model, Redundancy]:
+def redundancy_of(model: Model, found: AssemblyAttempt, instant: float) -> tuple[Model, Redundancy]:
     """Return a model that was put together with its rows scaled, and which of them follow from others."""
     system = resident(with_fields(model.system, row_scale=found.scale[:, None], rank=None))
     model = dataclasses.replace(model, system=system)

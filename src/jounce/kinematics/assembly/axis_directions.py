@@ -15,7 +15,7 @@ from jounce.constraints.angles import perpendiculars
 from jounce.constraints.base import rows
 from jounce.constraints.facts import facts_of
 from jounce.jet import Jet
-from jounce.kinematics.assembly.gauss_newton import Trial, put_together
+from jounce.kinematics.assembly.gauss_newton import AssemblyAttempt, assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import turned
@@ -73,7 +73,7 @@ def pair_names(model: Model) -> list[str]:
     return [name for group, _ in _pairs(model.system) for name in names[id(group)][: group.instances]]
 
 
-def senses_to_seek(model: Model, found: Trial) -> list[Senses]:
+def senses_to_seek(model: Model, found: AssemblyAttempt) -> list[Senses]:
     """Return the senses with which parts should be put together anew, the most likely first; none where all is well.
 
     That is where parts lie turned over, and where they were not put together at all from a guess in which directions
@@ -99,11 +99,11 @@ def starts_with(model: Model, wanted: Senses, instant: float, tolerance: float) 
     Drivers hold in the first as well. The attitudes alone come first in a part of them: what is far away else draws
     parts round.
     """
-    turned = put_together(_directed(model, wanted, alone=True), instant, tolerance)
+    turned = assemble_from_guess(_directed(model, wanted, alone=True), instant, tolerance)
     for driven in (True, False):
         directed = _directed(model, wanted, driven=driven)
         for start in (model.guess, turned.coordinates)[: 1 + turned.closed]:
-            found = put_together(directed, instant, tolerance, start)
+            found = assemble_from_guess(directed, instant, tolerance, start)
             if found.closed:
                 yield found.coordinates
 

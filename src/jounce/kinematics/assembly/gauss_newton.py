@@ -53,7 +53,7 @@ def _moved(
     """Return the coordinates after an increment, with residual and entries of the Jacobian.
 
     With a pattern, by which a square Jacobian is a dense matrix, some steps may follow, as long as those of
-    Newton-Raphson are those of `put_together`: short, from regular positions, and with residuals that fall. The
+    Newton-Raphson are those of `assemble_from_guess`: short, from regular positions, and with residuals that fall. The
     residual before them is returned too, and whether they closed it.
     """
     time = Jet([instant[None, None]])
@@ -88,7 +88,7 @@ def _moved(
     return end.coordinates, end.residual, end.entries, end.begun, end.closed
 
 
-class Trial(NamedTuple):
+class AssemblyAttempt(NamedTuple):
     """How far bodies could be put together.
 
     Attributes
@@ -129,7 +129,7 @@ class Displacements:
 
     def closed(
         self, start: Coordinates, tolerance: float
-    ) -> tuple[Float[np.ndarray, " row"], Trial | None, Place | None]:
+    ) -> tuple[Float[np.ndarray, " row"], AssemblyAttempt | None, Place | None]:
         """Return the residual at some coordinates, and the bodies put together from there if no step needs a check.
 
         The place with those coordinates comes last, where none of its steps was tried: the one to go on from.
@@ -160,7 +160,7 @@ class Displacements:
         return with_fields(self._model.system, outputs=(), forces=(), fronts=None, pattern=pattern)
 
 
-def put_together(
+def assemble_from_guess(
     model: Model,
     instant: float,
     tolerance: float,
@@ -168,7 +168,7 @@ def put_together(
     *,
     lag: DriverLag | None = None,
     known: Place | None = None,
-) -> Trial:
+) -> AssemblyAttempt:
     """Return how far the bodies can be put together at one instant; nothing is refused.
 
     Parameters
@@ -228,7 +228,7 @@ def _trial(
     jacobian: HostJacobian,
     scale: Float[np.ndarray, " row"],
     tolerance: float,
-) -> Trial:
+) -> AssemblyAttempt:
     gaps = np.where(jacobian.finite(), scale * residual, np.nan)
     closed = bool(np.all(np.abs(gaps) <= max(1e3 * tolerance, 1e-9)))
-    return Trial(coordinates, scale, gaps, jacobian.scaled(scale), closed)
+    return AssemblyAttempt(coordinates, scale, gaps, jacobian.scaled(scale), closed)

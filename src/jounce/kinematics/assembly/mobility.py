@@ -14,7 +14,7 @@ from jaxtyping import Float
 from jounce.errors import MechanismError, whole_number
 from jounce.kinematics.assembly.assemble import check_assembled, redundancy_of, settled
 from jounce.kinematics.assembly.constraint_series import SINGULAR, ReducedConstraints
-from jounce.kinematics.assembly.gauss_newton import Displacements, Trial, put_together
+from jounce.kinematics.assembly.gauss_newton import AssemblyAttempt, Displacements, assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates, Mover
 from jounce.kinematics.assembly.redundancy import Repetition, closed_nearby
 from jounce.kinematics.assembly.tangent_cone import LocalCurve, curves
@@ -186,7 +186,7 @@ def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -
     return dataclasses.replace(_analysed(constraints, Displacements(model, time)), repetitions=told.repetitions)
 
 
-def _released(mechanism: Mechanism, time: float) -> tuple[Model, Coordinates, Trial]:
+def _released(mechanism: Mechanism, time: float) -> tuple[Model, Coordinates, AssemblyAttempt]:
     """Return the model of the joints alone, where drivers hold it, with rows of one size."""
     held = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={}, outputs={})
     model = build(held)
@@ -198,9 +198,9 @@ def _released(mechanism: Mechanism, time: float) -> tuple[Model, Coordinates, Tr
     model = build(dataclasses.replace(held, drivers={}, forces={}))
     if not model.rows:
         nothing = HostJacobian.of(model.system.pattern, np.zeros(model.system.pattern.entry_count))
-        return model, coordinates, Trial(coordinates, np.ones(0), np.zeros(0), nothing, True)
+        return model, coordinates, AssemblyAttempt(coordinates, np.ones(0), np.zeros(0), nothing, True)
     model, _ = with_reference(model, coordinates, time)
-    found = put_together(model, time, TOLERANCE, coordinates)
+    found = assemble_from_guess(model, time, TOLERANCE, coordinates)
     system = with_fields(model.system, row_scale=found.scale[:, None])
     return dataclasses.replace(model, system=system), found.coordinates, found
 

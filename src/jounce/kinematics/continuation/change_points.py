@@ -13,7 +13,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jounce.kinematics.continuation.path_following import Anchor, FollowedPath, Passage, follow
+from jounce.kinematics.continuation.path_following import Anchor, ChangePoint, FollowedPath, follow
 from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.status import Status
 
@@ -24,18 +24,20 @@ TRUNCATION = 1e-3  # of the highest derivative by interpolation over a width of 
 LARGEST_DISAGREEMENT = 1e-7  # of an interpolated position with a solved one, rad or m
 
 
-def half_width(point: Passage, order: int) -> float:
+def half_width(point: ChangePoint, order: int) -> float:
     """Return how far from a change point interpolation is as good as the jets that it starts from, s."""
     balance = (ROUNDING * math.factorial(order) / TRUNCATION) ** (1 / (2 * order + 3))
     return point.radius * min(LARGEST_WIDTH, balance)
 
 
-def spoiled_width(point: Passage, order: int) -> float:
+def spoiled_width(point: ChangePoint, order: int) -> float:
     """Return within what distance of a change point a derivative of an order is mostly rounding, s."""
     return point.radius * (ROUNDING * math.factorial(order) / LARGEST_NOISE) ** (1 / (order + 1))
 
 
-def spoiled(points: Iterable[Passage], instants: Float[np.ndarray, " time"], order: int) -> Bool[np.ndarray, " time"]:
+def spoiled(
+    points: Iterable[ChangePoint], instants: Float[np.ndarray, " time"], order: int
+) -> Bool[np.ndarray, " time"]:
     """Tell at which instants what follows from the factored Jacobian is mostly rounding at an order."""
     found = np.zeros(len(instants), bool)
     for point in points:
@@ -44,7 +46,7 @@ def spoiled(points: Iterable[Passage], instants: Float[np.ndarray, " time"], ord
 
 
 def bridged(
-    solver: Solver, path: FollowedPath, point: Passage, instants: Float[np.ndarray, " time"]
+    solver: Solver, path: FollowedPath, point: ChangePoint, instants: Float[np.ndarray, " time"]
 ) -> tuple[dict[str, np.ndarray], tuple[np.ndarray, ...]] | None:
     """Return the jets of coordinates and outputs next to a change point, time last; None where they cannot be had.
 
@@ -54,7 +56,7 @@ def bridged(
         What solved the path.
     path : FollowedPath
         The motion followed, through the change point.
-    point : Passage
+    point : ChangePoint
         One of the path.
     instants : array of shape (time,)
         Within the half width around it, s.

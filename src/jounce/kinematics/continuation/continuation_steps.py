@@ -1,9 +1,9 @@
-"""A leg of a motion in one compiled program: many steps from anchor to anchor, and the instants of a grid between them.
+"""Many continuation steps of a motion in one compiled program, anchor to anchor, and the instants of a grid between.
 
 Two things limit a step. The Taylor series must carry it: no term moves a body far. And the Jacobian must not come near
 a singular one on the way, where branches meet and a series that looks smooth may lead over to another: `advance` tells
 where its determinant vanishes next, to first order, and a step goes only part of that way. A step that is refused is
-halved until it is not, or is too small to be halved. What is out of the ordinary ends the leg and is decided outside.
+halved until it is not, or is too small to be halved. What is out of the ordinary ends the run and is decided outside.
 
 The first lane of a batch makes the step; the others solve the next instants of the grid up to its end. Those that do
 not fit into it are solved from the same anchor, in more batches, or from the next one if they are few.
@@ -22,8 +22,8 @@ from jounce.execution.compilation import compiled
 from jounce.execution.mapped import called
 from jounce.kinematics.continuation.correct_and_differentiate import (
     SAFE_FRACTION,
-    Arrival,
     SolvedState,
+    StepResult,
     advance,
     predictor,
 )
@@ -44,8 +44,8 @@ GROWTH = 4.0  # of a step over the last one
 Number = Float[Numbers, ""]
 
 
-class Ending(enum.IntEnum):
-    """Why a leg ended."""
+class StopReason(enum.IntEnum):
+    """Why a run ended."""
 
     UNFINISHED = 0  # it has made as many steps as it may
     ARRIVED = 1
@@ -64,7 +64,7 @@ class Settings(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where a motion has come to: the instant, s, and how far it may be followed from there; see `Arrival`."""
+    """Where a motion has come to: the instant, s, and how far it may be followed from there; see `StepResult`."""
 
     instant: Number
     safe_step: Number
@@ -78,16 +78,16 @@ class Place(NamedTuple):
         return jnp.where(rate > 0, 1 / jnp.where(rate > 0, rate, 1.0), jnp.inf)
 
 
-class LegLimits(NamedTuple):
-    """Where a leg goes to, s; what step is too small to be halved, s; and the most batches that it may solve."""
+class StepLimits(NamedTuple):
+    """Where a run goes to, s; what step is too small to be halved, s; and the most batches that it may solve."""
 
     stop: Number
     smallest: Number
     batches: Int[Numbers, ""]
 
 
-class Way(NamedTuple):
-    """How a leg stands between two batches."""
+class StepState(NamedTuple):
+    """How a run stands between two batches."""
 
     known: SolvedState  # what a prediction needs of the last anchor, in all lanes
     place: Place  # of the last anchor
@@ -95,12 +95,12 @@ class Way(NamedTuple):
     away: Float[Numbers, " batch"]  # time from the last anchor that each lane is solved at, s
     instant: Float[Numbers, " batch"]  # when that is, s
     planned: Bool[Numbers, ""]  # whether they are decided
-    may_pass: Bool[Numbers, ""]  # whether a singular position just ahead ends the leg
+    may_pass: Bool[Numbers, ""]  # whether a singular position just ahead ends the run
     next_up: Int[Numbers, ""]  # among the instants of the grid
     largest: Number  # step that the last one allows, s
     crawled: Int[Numbers, ""]  # steps in sequence that were too short
     refused: Number  # instant at which a law had no permitted value, s; NaN if none
-    ending: Int[Numbers, ""]  # see Ending
+    ending: Int[Numbers, ""]  # see StopReason
 
 
 class Records(NamedTuple):
@@ -115,12 +115,12 @@ class Records(NamedTuple):
     taken: Bool[Numbers, " step"]  # whether the first lane is the next anchor
 
 
-class Leg(NamedTuple):
-    """What came of a leg."""
+class TakenSteps(NamedTuple):
+    """What came of a run."""
 
-    way: Way
+    way: StepState
     records: Records
-    last: Arrival  # the last batch
+    last: StepResult  # the last batch
     count: Int[Numbers, ""]  # of batches solved
 
 
@@ -136,27 +136,27 @@ def _calls_code(*_: Any, native: str | None, **__: Any) -> bool:
     *("pose_type", "order", "batches", "native"),
     narrow=True,
     alone=_calls_code,
-    otherwise={"native": None},  # where there is no code for a leg, XLA has none to call
+    otherwise={"native": None},  # where there is no code for a run, XLA has none to call
 )
-def leg(
+def take_steps(
     system: System,
-    way: Way,
+    way: StepState,
     grid: Float[Numbers, " time"],
-    limits: LegLimits,
+    limits: StepLimits,
     settings: Settings,
     *,
     pose_type: type[Pose],
     order: int,
     batches: int,
     native: str | None = None,
-) -> Leg:
+) -> TakenSteps:
     """Go on along a way until it arrives, something is out of the ordinary, or enough batches are solved.
 
     Parameters
     ----------
     system : System
         The mechanism.
-    way : Way
+    way : StepState
         Where to go on from.
     grid : array of shape (time,)
         The next instants of the grid, s; infinite beyond the last. At least one batch more than can be solved.
@@ -167,10 +167,10 @@ def leg(
     batches : int
         As many as there is room for.
     native : str, optional
-        Name of the machine code that solves a batch, see `advance_instant`; unless it is given, the leg does.
+        Name of the machine code that solves a batch, see `advance_instant`; unless it is given, the run does.
     """
 
-    def solved(way: Way) -> Any:
+    def solved(way: StepState) -> Any:
         if native is not None:
             tolerance, refine, survey, wanted = settings
             first = np.arange(len(way.instant)) == 0
@@ -182,16 +182,16 @@ def leg(
             return arrival._replace(turnover=jax.lax.cond(survey, there, lambda: jnp.zeros(1)))
         return _batch(system, *way.known, way.away, way.instant, *settings, pose_type=pose_type, order=order)
 
-    def going(state: Leg) -> Any:
-        return (state.way.ending == int(Ending.UNFINISHED)) & (state.count < limits.batches)
+    def going(state: TakenSteps) -> Any:
+        return (state.way.ending == int(StopReason.UNFINISHED)) & (state.count < limits.batches)
 
-    def go_on(state: Leg) -> Leg:
+    def go_on(state: TakenSteps) -> TakenSteps:
         arrival = _typed(solved(state.way), blank)
         known = predictor(system, pose_type, (arrival.coordinates, arrival.outputs, arrival.sign))
         way, found = _after(state.way, arrival, known, grid, limits)
         put = jax.lax.dynamic_update_index_in_dim
         records = jax.tree.map(lambda xs, x: put(xs, x, state.count, 0), state.records, _typed(found, state.records))
-        return Leg(_typed(way, state.way), records, arrival, state.count + 1)
+        return TakenSteps(_typed(way, state.way), records, arrival, state.count + 1)
 
     shapes = jax.eval_shape(solved, way)
     blank = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes)
@@ -200,7 +200,7 @@ def leg(
     records = jax.tree.map(lambda x: jnp.zeros((batches, *x.shape), x.dtype), once)
     way = _typed(way, way)
     way = jax.lax.cond(way.planned, lambda: way, lambda: _typed(_planned(way, grid, limits), way))
-    return jax.lax.while_loop(going, go_on, Leg(way, records, blank, jnp.zeros((), int)))
+    return jax.lax.while_loop(going, go_on, TakenSteps(way, records, blank, jnp.zeros((), int)))
 
 
 def _typed(values: Any, like: Any) -> Any:
@@ -208,7 +208,7 @@ def _typed(values: Any, like: Any) -> Any:
     return jax.tree.map(lambda x, y: jax.lax.convert_element_type(x, np.result_type(y)), values, like)
 
 
-def _planned(way: Way, grid: Float[Numbers, " time"], limits: LegLimits) -> Way:
+def _planned(way: StepState, grid: Float[Numbers, " time"], limits: StepLimits) -> StepState:
     """Return the way with its next step, or why there is none."""
     place = way.place
     left = limits.stop - place.instant
@@ -216,33 +216,37 @@ def _planned(way: Way, grid: Float[Numbers, " time"], limits: LegLimits) -> Way:
     crawled = jnp.where(step < CRAWLING * left, way.crawled + 1, 0)
     singular = way.may_pass & (place.turnover < 0) & (place.reach < PASSAGE * place.radius)
     endings = (
-        ((crawled > LONGEST_CRAWL) | (place.instant + step == place.instant), Ending.COLLAPSED),
-        (singular, Ending.PASSAGE),
-        (~(left > 0), Ending.ARRIVED),
+        ((crawled > LONGEST_CRAWL) | (place.instant + step == place.instant), StopReason.COLLAPSED),
+        (singular, StopReason.PASSAGE),
+        (~(left > 0), StopReason.ARRIVED),
     )
-    ending = jnp.full((), int(Ending.UNFINISHED))
+    ending = jnp.full((), int(StopReason.UNFINISHED))
     for happened, why in endings:
         ending = jnp.where(happened, int(why), ending)
     step = jnp.where(left - step < SLIVER * step, left, step)
     target = jnp.where(step == left, limits.stop, place.instant + step)
-    crawled = jnp.where(ending == Ending.PASSAGE, way.crawled, crawled)  # the step is planned again
+    crawled = jnp.where(ending == StopReason.PASSAGE, way.crawled, crawled)  # the step is planned again
     way = way._replace(ending=ending, crawled=crawled, refused=jnp.full((), jnp.nan))
     return _aimed(way, step, target, grid)
 
 
-def _aimed(way: Way, step: Number, target: Number, grid: Float[Numbers, " time"]) -> Way:
+def _aimed(way: StepState, step: Number, target: Number, grid: Float[Numbers, " time"]) -> StepState:
     """Return the way with a step to try, and in the other lanes the next instants of the grid within it."""
     instant = jnp.concatenate([target[None], jnp.minimum(_next_up(way, grid), target)])
     return way._replace(step=step, instant=instant, away=instant - way.place.instant, planned=jnp.ones((), bool))
 
 
-def _next_up(way: Way, grid: Float[Numbers, " time"]) -> Float[Numbers, " lane"]:
+def _next_up(way: StepState, grid: Float[Numbers, " time"]) -> Float[Numbers, " lane"]:
     return jax.lax.dynamic_slice_in_dim(grid, way.next_up, len(way.instant) - 1)
 
 
 def _after(
-    way: Way, arrival: Arrival, known: SolvedState, grid: Float[Numbers, " time"], limits: LegLimits
-) -> tuple[Way, Records]:
+    way: StepState,
+    arrival: StepResult,
+    known: SolvedState,
+    grid: Float[Numbers, " time"],
+    limits: StepLimits,
+) -> tuple[StepState, Records]:
     """Return how the way stands after a batch, and what is recorded of it; `known` is of the arrival."""
     target, status, lanes = way.instant[0], arrival.status[0], len(way.instant) - 1
     there = Place(target, arrival.safe_step[0], arrival.radius[0], arrival.turnover[0])
@@ -257,7 +261,7 @@ def _after(
     stuck = ~accepted & ((way.step < limits.smallest) | (target <= way.place.instant))
     inadmissible = ~accepted & (status == int(Status.INADMISSIBLE)) & jnp.isnan(way.refused)
     way = way._replace(
-        ending=jnp.where(stuck, int(Ending.REFUSED), int(Ending.UNFINISHED)),
+        ending=jnp.where(stuck, int(StopReason.REFUSED), int(StopReason.UNFINISHED)),
         refused=jnp.where(inadmissible, target, way.refused),
     )
     arrived = way._replace(

@@ -47,7 +47,7 @@ GAP_TOLERANCES = 1e3
 LARGEST_CONTRADICTION = 1e-6  # of derivatives in redundant rows, as a part of what the motion's own could be
 
 
-class Arrival(NamedTuple):
+class StepResult(NamedTuple):
     """What is known of the instants of a batch; every array has the batch last."""
 
     coordinates: dict[str, Numbers]  # jets of the pose, by name, shape (order + 1, ...)
@@ -232,7 +232,7 @@ def advance(
     pose_type: type[Pose],
     order: int,
     with_turnover: bool = True,
-) -> Arrival:
+) -> StepResult:
     """Solve a batch of instants, each from a neighbour solved before.
 
     Parameters
@@ -284,7 +284,7 @@ def solved_batch(
     *,
     pose_type: type[Pose],
     order: int,
-) -> tuple[Arrival, Factor, dict[str, Jet]]:
+) -> tuple[StepResult, Factor, dict[str, Jet]]:
     """Return what `advance` does but for the turnover, with the factored Jacobian and the jets of the pose."""
     # what a law makes infinite, such as the third derivative of t**2.5 at t = 0, is of no use to a prediction
     moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in coordinates.items()}
@@ -311,7 +311,7 @@ def solved_batch(
     gaps = _gaps(system, pose, time, terms, tolerance)
     consistent = jnp.all(gaps[1] <= 1.0, axis=0)
     status = _status(correction.last, predictable, pivot_ratio, admitted, defined, consistent, tolerance)
-    arrival = Arrival(
+    arrival = StepResult(
         coordinates,
         outputs,
         status,

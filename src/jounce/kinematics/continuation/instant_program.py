@@ -7,7 +7,7 @@ import jax.numpy as jnp
 
 from jounce.execution.device import on_processor
 from jounce.execution.mapped import GPU_WIDTH, mapped
-from jounce.kinematics.continuation.correct_and_differentiate import Arrival, advance, solved_batch
+from jounce.kinematics.continuation.correct_and_differentiate import StepResult, advance, solved_batch
 from jounce.mechanism.system import System
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
@@ -28,7 +28,7 @@ def round_width(system: System) -> int:
     return max(least, min(most, 2 ** int(math.log2(max(1, CACHED_ENTRIES // max(1, entries))))))
 
 
-def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> Arrival:
+def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
     """Solve many instants as `advance_instant` does one; nothing is surveyed."""
     (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, _) = shared, instants
     given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
@@ -37,7 +37,7 @@ def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -
 
 
 @mapped(by_xla=_of_many)
-def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> Arrival:
+def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
     """Solve an instant from a neighbour solved before.
 
     Parameters

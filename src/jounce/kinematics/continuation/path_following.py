@@ -1,9 +1,9 @@
 """Following a motion from anchor to anchor: steps that no singular position hides in, checked one by one.
 
-A leg makes the steps that are in the ordinary (see `legs`). Towards a dead point steps become shorter and shorter, and
-the motion ends there; a near miss is followed through its sharp turn. Where the steps shrink while the motion itself
-stays smooth, two branches cross: a change point. It is passed on the series that leads through it, if that arrives on
-the other side to rounding, and is told.
+A run makes the steps that are in the ordinary (see `continuation_steps`). Towards a dead point steps become shorter and
+shorter, and the motion ends there; a near miss is followed through its sharp turn. Where the steps shrink while the
+motion itself stays smooth, two branches cross: a change point. It is passed on the series that leads through it, if
+that arrives on the other side to rounding, and is told.
 """
 
 import bisect
@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.execution.backends import backend_of
-from jounce.kinematics.continuation.continuation_steps import Ending, Leg, Way
-from jounce.kinematics.continuation.correct_and_differentiate import Arrival, SolvedState
+from jounce.kinematics.continuation.continuation_steps import StepState, StopReason, TakenSteps
+from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult
 from jounce.kinematics.continuation.solver import NO_GRID, Solver
 from jounce.kinematics.status import Status
 from jounce.mechanism.axis_angles import AttitudeHistory
@@ -58,14 +58,14 @@ class Anchor:
     status: Status
 
     @classmethod
-    def of(cls, arrival: Arrival, instant: float) -> "Anchor":
+    def of(cls, arrival: StepResult, instant: float) -> "Anchor":
         """Build the anchor from the first lane of a batch that was surveyed."""
         safe_step, radius, turnover = (float(x[0]) for x in (arrival.safe_step, arrival.radius, arrival.turnover))
         return cls(float(instant), arrival.state(slice(1)), safe_step, radius, turnover, Status(int(arrival.status[0])))
 
     @property
     def place(self) -> tuple[float, float, float, float]:
-        """Instant, safe step, radius and turnover, as a leg wants them."""
+        """Instant, safe step, radius and turnover, as a run wants them."""
         return self.instant, self.safe_step, self.radius, self.turnover
 
     @property
@@ -79,7 +79,7 @@ def _instant(anchor: Anchor) -> float:
 
 
 @dataclasses.dataclass(frozen=True)
-class Passage:
+class ChangePoint:
     """A singular position that a motion passes smoothly: when, s, and the radius of its Taylor series there, s."""
 
     instant: float
@@ -95,14 +95,14 @@ class FollowedPath:
 
     anchors: list[Anchor]
     on_the_way: list[tuple[Int[np.ndarray, " lane"], SolvedState]] = dataclasses.field(default_factory=list)
-    change_points: list[Passage] = dataclasses.field(default_factory=list)
+    change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
     status: Status = Status.OK
     ended_at: float = np.inf
     fault: str = ""
     backends: set[str] = dataclasses.field(default_factory=set)
 
-    def add(self, done: Leg, first: int) -> None:
-        """Add the anchors of a leg, and the instants of the grid that it solved, which begin with the first."""
+    def add(self, done: TakenSteps, first: int) -> None:
+        """Add the anchors of a run, and the instants of the grid that it solved, which begin with the first."""
         self.backends.add(backend_of(done.records.status))
         count = int(done.count)
         records = jax.tree.map(lambda x: np.asarray(x)[:count], done.records)
@@ -140,15 +140,15 @@ class FollowedPath:
         self.status, self.ended_at, self.fault = status, instant, fault
         return self
 
-    def singular_positions_outside(self) -> list[Passage]:
+    def singular_positions_outside(self) -> list[ChangePoint]:
         """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
         first = self.anchors[0]
         found = self._just_ahead() if self.status == Status.OK else []
         if first.turnover > 0 and first.reach < NEARBY * first.radius:
-            found.append(Passage(first.instant - first.reach, first.radius))
+            found.append(ChangePoint(first.instant - first.reach, first.radius))
         return found
 
-    def _just_ahead(self) -> list[Passage]:
+    def _just_ahead(self) -> list[ChangePoint]:
         """Return the singular position that the motion was nearing when it ended.
 
         Where it ends next to it, or just beyond, rounding spoils what is known there: it is told from farther off.
@@ -158,12 +158,12 @@ class FollowedPath:
         nearing = [x for x in since if x.turnover < 0 and x.reach < NEARBY * x.radius]
         ahead = [x for x in nearing if end - (x.instant + x.reach) < LEAST_PASSAGE * x.reach]
         largest = max((x.radius for x in ahead), default=0.0)
-        return [Passage(x.instant + x.reach, x.radius) for x in ahead if x.radius >= 0.5 * largest][:1]
+        return [ChangePoint(x.instant + x.reach, x.radius) for x in ahead if x.radius >= 0.5 * largest][:1]
 
 
 def follow(
     solver: Solver,
-    start: Anchor | Way,
+    start: Anchor | StepState,
     stop: float,
     span: float,
     first_step: float = np.inf,
@@ -175,7 +175,7 @@ def follow(
     ----------
     solver : Solver
         What solves an instant from another.
-    start : Anchor or Way
+    start : Anchor or StepState
         Where to begin: a solved instant, or the way that begins with solving one; no anchor is found if that fails.
     stop : float
         Instant to arrive at, s.
@@ -192,7 +192,7 @@ def follow(
         path, way = FollowedPath([]), start
     first = 0
     while not path.anchors or path.anchors[-1].instant < stop:
-        done = solver.leg(way, grid[first:], stop, SMALLEST_STEP * span)
+        done = solver.take_steps(way, grid[first:], stop, SMALLEST_STEP * span)
         path.add(done, first)
         way = jax.tree.map(np.asarray, done.way)
         if not path.anchors:
@@ -201,26 +201,26 @@ def follow(
         here = path.anchors[-1]
         ending = int(way.ending)
         first += int(way.next_up)
-        if ending == Ending.PASSAGE:
+        if ending == StopReason.PASSAGE:
             passed = _passed(solver, here, stop)
             if passed is None:
                 no = np.zeros((), bool)
-                way = way._replace(planned=no, may_pass=no, ending=np.asarray(int(Ending.UNFINISHED)))
+                way = way._replace(planned=no, may_pass=no, ending=np.asarray(int(StopReason.UNFINISHED)))
                 continue
             far_side, change_point = passed
             path.anchors.append(far_side)
             path.change_points.append(change_point)
             way = solver.way(far_side.state, far_side.place, float(way.largest), int(way.crawled))
             first = int(np.searchsorted(grid, far_side.instant, side="right"))
-        elif ending == Ending.COLLAPSED:
+        elif ending == StopReason.COLLAPSED:
             beyond = float(np.nextafter(here.instant, np.inf))
             return path.ended(Status.COLLAPSED, beyond, ", ".join(solver.model.drivers))
-        elif ending == Ending.REFUSED:
+        elif ending == StopReason.REFUSED:
             return _ended(solver, path, done, span)
     return path
 
 
-def _ended(solver: Solver, path: FollowedPath, done: Leg, span: float) -> FollowedPath:
+def _ended(solver: Solver, path: FollowedPath, done: TakenSteps, span: float) -> FollowedPath:
     """Return the path that cannot be followed any further: where a law was first refused, if it was."""
     here, refused = path.anchors[-1], float(done.way.refused)
     if np.isnan(refused):
@@ -234,7 +234,7 @@ def _ended(solver: Solver, path: FollowedPath, done: Leg, span: float) -> Follow
     return path.ended(status, target, solver.fault(arrival, 0))
 
 
-def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, Passage] | None:
+def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePoint] | None:
     """Return the anchor beyond a change point just ahead, as far from it as this one is, if there is one to pass.
 
     The far side must lie on the series that leads there, to rounding, and the Jacobian must leave the singular position
@@ -254,7 +254,7 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, Passage]
     if not (beyond.turnover > 0 and abs(beyond.reach - (target - middle)) <= 0.5 * (target - middle)):
         return None
     located = 0.5 * (middle + target - beyond.reach)  # what each side errs by cancels to the second order
-    return beyond, Passage(located, min(here.radius, beyond.radius))
+    return beyond, ChangePoint(located, min(here.radius, beyond.radius))
 
 
 def attitudes_between(

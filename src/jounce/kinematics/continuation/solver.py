@@ -11,15 +11,22 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from jounce.execution.mapped import OnLlvm, OnXla, Rounds
-from jounce.kinematics.continuation.continuation_steps import Leg, LegLimits, Place, Settings, Way, leg
-from jounce.kinematics.continuation.correct_and_differentiate import LARGEST_GAP, Arrival, SolvedState, predictor
+from jounce.kinematics.continuation.continuation_steps import (
+    Place,
+    Settings,
+    StepLimits,
+    StepState,
+    TakenSteps,
+    take_steps,
+)
+from jounce.kinematics.continuation.correct_and_differentiate import LARGEST_GAP, SolvedState, StepResult, predictor
 from jounce.kinematics.continuation.instant_program import advance_instant, round_width
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 
 SMALL_BATCH = 16  # lanes; a batch width compiles once, so a short grid uses one, and so do anchors
 LONGEST_LEG = 32  # batches
-LEG_ENTRIES = 2**19  # of what a leg keeps: a large mechanism has shorter ones
+RUN_ENTRIES = 2**19  # of what a run keeps: a large mechanism has shorter ones
 SPAN_ENTRIES = 2**19  # of the coordinates of what a thread solves at once: the cache holds them
 XLA_SPAN_ENTRIES = 2**21  # the same by XLA, whose rounds have more instants, and whose calls take longer
 FEWEST_FROM_ANCHORS = 64  # instants of a long grid that machine code starts from anchors
@@ -49,7 +56,7 @@ class Solver:
         instant: Float[np.ndarray, " batch"],
         *,
         survey: bool = False,
-    ) -> Arrival:
+    ) -> StepResult:
         """Solve instants from what is `needed` of solved ones.
 
         Of a few instants, `survey` looks for singular positions.
@@ -58,7 +65,7 @@ class Solver:
         if lanes <= SMALL_BATCH:
             known, step, instant = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), (needed, step, instant))
             way = _way(known, (0.0,) * 4, away=step, instant=instant, planned=True)
-            arrival = self._leg(way, NO_GRID, _limits(0.0, 0.0, 1), survey=survey).last
+            arrival = self._take_steps(way, NO_GRID, _limits(0.0, 0.0, 1), survey=survey).last
         else:
             arrival = self.program((needed, step, instant, np.zeros(step.shape, bool)))
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
@@ -80,7 +87,7 @@ class Solver:
         Parameters
         ----------
         store : tuple
-            Jets of all instants, solved or to be solved, as an `Arrival` has them.
+            Jets of all instants, solved or to be solved, as an `StepResult` has them.
         step, instant : array of shape (time,)
             Time from the source, and the time arrived at, s.
         status : array of int, shape (time,)
@@ -89,26 +96,26 @@ class Solver:
             From which of the store each instant is predicted.
         """
         coordinates, outputs, sign = store
-        nothing: dict[str, Any] = dict.fromkeys(Arrival._fields)
+        nothing: dict[str, Any] = dict.fromkeys(StepResult._fields)
         wanted = {"coordinates": coordinates, "outputs": outputs, "status": status, "sign": sign}
         lanes = self.needed(store), (step, instant), np.zeros(1, bool)
-        return self.program.rounds(lanes, Arrival(**(nothing | wanted)), sources)
+        return self.program.rounds(lanes, StepResult(**(nothing | wanted)), sources)
 
-    def leg(self, way: Way, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> Leg:
-        """Go on along a way with the next instants of a grid, as far as they fit; see `legs.leg`."""
+    def take_steps(self, way: StepState, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> TakenSteps:
+        """Go on along a way with the next instants of a grid, as far as they fit; see `continuation_steps`."""
         way = way._replace(next_up=np.zeros((), int))
-        return self._leg(way, grid, _limits(stop, smallest, self._batches), survey=True)
+        return self._take_steps(way, grid, _limits(stop, smallest, self._batches), survey=True)
 
     def prepare(self, guess: SolvedState, instant: float) -> None:
-        """Have the program of legs compiled; nothing is solved."""
-        self._leg(self.beginning(guess, instant), NO_GRID, _limits(instant, 0.0, 0), survey=True)
+        """Have the program of runs compiled; nothing is solved."""
+        self._take_steps(self.beginning(guess, instant), NO_GRID, _limits(instant, 0.0, 0), survey=True)
 
-    def way(self, solved: SolvedState, place: Sequence[float], largest: float, crawled: int = 0) -> Way:
+    def way(self, solved: SolvedState, place: Sequence[float], largest: float, crawled: int = 0) -> StepState:
         """Return the way that begins at a solved instant, the place of an anchor, with a largest first step, s."""
         known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(solved))
         return _way(known, place, largest=largest, crawled=crawled)
 
-    def beginning(self, guess: SolvedState, instant: float) -> Way:
+    def beginning(self, guess: SolvedState, instant: float) -> StepState:
         """Return the way that begins with solving an instant, from a position put together there."""
         known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(guess))
         return _way(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant), planned=True)
@@ -138,7 +145,7 @@ class Solver:
     def together(self) -> int:
         """How many instants are solved in one call at most, where they are not solved in rounds."""
         if not self.is_compiled:
-            return SMALL_BATCH  # by the program of legs, which is there
+            return SMALL_BATCH  # by the program of runs, which is there
         return max(FEWEST_FROM_ANCHORS, min(MOST_SIDE_BY_SIDE, CALL_ENTRIES // self._entries))
 
     @cached_property
@@ -161,8 +168,8 @@ class Solver:
 
     @cached_property
     def _batches(self) -> int:
-        """How many batches a leg may have; static, so that each mechanism compiles one program."""
-        return min(LONGEST_LEG, max(1, LEG_ENTRIES // (SMALL_BATCH * self._entries)))
+        """How many batches a run may have; static, so that each mechanism compiles one program."""
+        return min(LONGEST_LEG, max(1, RUN_ENTRIES // (SMALL_BATCH * self._entries)))
 
     @cached_property
     def _entries(self) -> int:
@@ -173,12 +180,14 @@ class Solver:
     def _settings(self) -> Settings:
         return Settings(*map(np.asarray, (self.tolerance, self.refine, True, self.wanted)))
 
-    def _leg(self, way: Way, grid: Float[np.ndarray, " time"], limits: LegLimits, *, survey: bool) -> Leg:
+    def _take_steps(
+        self, way: StepState, grid: Float[np.ndarray, " time"], limits: StepLimits, *, survey: bool
+    ) -> TakenSteps:
         room = (self._batches + 1) * (SMALL_BATCH - 1)
         window = np.full(room, np.inf)
         window[: len(grid)] = grid[:room]
         settings, kind = self._settings._replace(survey=np.asarray(survey)), self.model.pose_type
-        return leg(
+        return take_steps(
             self.model.system,
             way,
             window,
@@ -190,7 +199,7 @@ class Solver:
             native=self.program.name if isinstance(self.program, OnLlvm) else None,
         )
 
-    def fault(self, arrival: Arrival, lane: int) -> str:
+    def fault(self, arrival: StepResult, lane: int) -> str:
         """Return where to look for the fault: a driver without a permitted value, an output, the farthest body."""
         refused = np.flatnonzero(~arrival.admissible[:, lane])
         if refused.size:
@@ -211,10 +220,10 @@ class Solver:
         return f"{', '.join(list(names)[:4])} ({told})"
 
 
-def _way(known: SolvedState, place: Sequence[float], **given: Any) -> Way:
+def _way(known: SolvedState, place: Sequence[float], **given: Any) -> StepState:
     """Return a way that begins; of one type whatever is given, so that it is compiled once."""
     lanes, nothing, no = np.zeros(SMALL_BATCH), np.zeros(()), np.zeros((), bool)
-    way = Way(
+    way = StepState(
         known,
         Place(*map(np.asarray, place)),
         step=nothing,
@@ -231,8 +240,8 @@ def _way(known: SolvedState, place: Sequence[float], **given: Any) -> Way:
     return way._replace(**{name: np.asarray(value) for name, value in given.items()})
 
 
-def _limits(stop: float, smallest: float, batches: int) -> LegLimits:
-    return LegLimits(*map(np.asarray, (stop, smallest, batches)))
+def _limits(stop: float, smallest: float, batches: int) -> StepLimits:
+    return StepLimits(*map(np.asarray, (stop, smallest, batches)))
 
 
 def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int, room: int = 0) -> Shaped[np.ndarray, "*rest room"]:

@@ -17,10 +17,10 @@ from jounce.kinematics.assembly.assemble import (
     settled,
 )
 from jounce.kinematics.assembly.axis_directions import drawn_senses, senses
-from jounce.kinematics.assembly.gauss_newton import put_together
+from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.curves.curve import Curve, posed
 from jounce.kinematics.curves.start import first_instant
-from jounce.kinematics.curves.starts import put_together_side_by_side
+from jounce.kinematics.curves.starts import assemble_side_by_side
 from jounce.kinematics.curves.tracing import check_number, traced
 from jounce.kinematics.curves.walker import Walker
 from jounce.mechanism import Mechanism, build, check_mechanism
@@ -248,7 +248,7 @@ class _Search:
     def _round(self, count: int, random: np.random.Generator) -> None:
         begun = self._random_poses(random)
         instant, kind = np.float64(self.instant), self.model.pose_type
-        found, gaps = put_together_side_by_side(self.system, begun, instant, pose_type=kind)
+        found, gaps = assemble_side_by_side(self.system, begun, instant, pose_type=kind)
         coordinates, gaps = {name: np.asarray(x) for name, x in found.items()}, np.asarray(gaps)
         for lane in range(count):
             self.starts += 1
@@ -299,7 +299,7 @@ class _Search:
     def _polished(self, coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Return an assembly to rounding, its planar angles with the whole turns that are nearest to the guess."""
         begun = {name: x[..., None] for name, x in coordinates.items()}
-        trial = put_together(self.first, self.instant, TOLERANCE, begun)
+        trial = assemble_from_guess(self.first, self.instant, TOLERANCE, begun)
         if not trial.closed:
             return coordinates  # next to a singular position, as good as it gets
         trial = nearest_to_guess(self.first, trial, self.instant) if "angle" in coordinates else trial

@@ -23,7 +23,7 @@ CLOSED = 1e-12  # of the residual: nothing is gained by going on
 
 
 @compiled("pose_type")
-def put_together_side_by_side(
+def assemble_side_by_side(
     system: System, coordinates: dict[str, Numbers], instant: Float[Numbers, ""], *, pose_type: type[Pose]
 ) -> tuple[dict[str, Numbers], Float[Numbers, " start"]]:
     """Return the coordinates to which starts lead, and the largest residual there, by Levenberg and Marquardt.

@@ -1,7 +1,7 @@
 """Many designs followed side by side, each in steps of its own, and all instants of a grid solved from their anchors.
 
-What decides about a step of one design alone decides here too, lane by lane; see `legs` and `advance`. A design that is
-out of the ordinary, as it comes to a singular position, is left to be solved alone.
+What decides about a step of one design alone decides here too, lane by lane; see `continuation_steps` and `advance`. A
+design that is out of the ordinary, as it comes to a singular position, is left to be solved alone.
 """
 
 import itertools
@@ -20,8 +20,8 @@ from jounce.jet.turns import brought_near
 from jounce.kinematics.continuation.continuation_steps import GROWTH, LARGEST_TURNOVER, PASSAGE, SLIVER
 from jounce.kinematics.continuation.correct_and_differentiate import (
     SAFE_FRACTION,
-    Arrival,
     SolvedState,
+    StepResult,
     predicts_turns,
     solved_batch,
 )
@@ -47,7 +47,7 @@ Indices = Int[np.ndarray, " lane"]
 
 
 class Places(NamedTuple):
-    """Where designs have come to, an entry for each; see `legs.Place`."""
+    """Where designs have come to, an entry for each; see `continuation_steps.Place`."""
 
     instant: Lanes
     safe_step: Lanes
@@ -66,7 +66,7 @@ def advance_designs(
     *,
     pose_type: type[Pose],
     order: int,
-) -> Arrival:
+) -> StepResult:
     """Solve an instant of each of many designs from one solved before, and survey all of them; see `advance`."""
     coordinates, angles, sign = known
     arrival, factor, reached = solved_batch(
@@ -290,7 +290,7 @@ class DesignPaths:
         angles = (np.zeros((levels, 1, groups[k].instances, count)) for k in self._turning)
         return still, tuple(angles), np.zeros(count)
 
-    def _advanced(self, known: SolvedState, step: Lanes, target: Lanes, lanes: Indices) -> Arrival:
+    def _advanced(self, known: SolvedState, step: Lanes, target: Lanes, lanes: Indices) -> StepResult:
         parts = []
         for k in range(0, len(lanes), self._width):
             lot = lanes[k : k + self._width]
@@ -309,7 +309,12 @@ class DesignPaths:
         return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., : len(lanes)], *parts)
 
     def _keep(
-        self, places: Places, known: SolvedState, arrived: Arrival, tried: tuple[Lanes, Lanes], taken: tuple[Any, Any]
+        self,
+        places: Places,
+        known: SolvedState,
+        arrived: StepResult,
+        tried: tuple[Lanes, Lanes],
+        taken: tuple[Any, Any],
     ) -> None:
         """Put designs where their steps led to, which become anchors; `taken` are designs and their lanes."""
         (step, target), (chosen, some) = tried, taken
@@ -328,7 +333,7 @@ class DesignPaths:
         self._anchors.append((chosen, found[0], state))
 
     def _planned(self, places: Places, lanes: Indices) -> tuple[Lanes, Lanes]:
-        """Return the next steps of designs and where they lead; see `legs`."""
+        """Return the next steps of designs and where they lead; see `continuation_steps`."""
         instant, safe_step, radius, turnover, largest = (part[lanes] for part in places)
         rate = np.abs(turnover)
         reach = np.where(rate > 0, 1 / np.where(rate > 0, rate, 1.0), np.inf)

@@ -143,7 +143,7 @@ class Trials(NamedTuple):
 
 
 @compiled("pose_type")
-def put_together(
+def assemble_from_guess(
     system: System,
     guess: Coordinates,
     instant: Float[Numbers, " design"],
@@ -151,7 +151,7 @@ def put_together(
     driven: Bool[Numbers, "row 1"],
     pose_type: type[Pose],
 ) -> Trials:
-    """Put designs together side by side, by the steps that each would take alone; see `assembly.put_together`.
+    """Put designs together side by side, by the steps that each would take alone; see `assembly.assemble_from_guess`.
 
     Parameters
     ----------

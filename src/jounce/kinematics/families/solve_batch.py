@@ -15,7 +15,7 @@ from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.families.design_paths import DesignPaths
 from jounce.kinematics.families.design_sides import Sides, sides_of_designs
-from jounce.kinematics.families.design_values import Designs, put_together
+from jounce.kinematics.families.design_values import Designs, assemble_from_guess
 from jounce.kinematics.position_analysis.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
@@ -302,7 +302,7 @@ class _Family:
         designs = Designs(self.held, model, self.names, self.rows)
         driven = np.array([[name.startswith("drivers.")] for name in model.rows])
         every = np.arange(count)
-        found = put_together(
+        found = assemble_from_guess(
             designs.system(every),
             designs.guess,
             np.full(count, first),

@@ -33,7 +33,7 @@ class Stretches:
         For the instants that failed so far, by index, as those of a `Motion`.
     change_points : numpy.ndarray of shape (points,)
         When the motion passes a singular position smoothly, s, as those of a `Motion`; known from the start.
-    passages : tuple of Passage
+    passages : tuple of ChangePoint
         The change points, with how far the motion carries as a Taylor series at each, as those of a `Motion`.
     backend : str
         Which arithmetic gives the numbers, as that of a `Motion`.

@@ -1,9 +1,9 @@
 """All instants of a time grid, solved from the anchors of a motion that was followed.
 
 A long grid is not solved one instant after another. Instants start from their nearest anchor, or from a neighbour
-solved before, so that most are predicted to rounding, and many are solved side by side (see `spans`). What fails there,
-and what starts from it, is solved once more, each after what it starts from; so are the few instants of a short grid
-that were not solved on the way. Between two anchors lies no singular position, so that the sign of the determinant
+solved before, so that most are predicted to rounding, and many are solved side by side (see `grid_blocks`). What fails
+there, and what starts from it, is solved once more, each after what it starts from; so are the few instants of a short
+grid that were not solved on the way. Between two anchors lies no singular position, so that the sign of the determinant
 tells an instant on another branch.
 """
 
@@ -17,15 +17,15 @@ from jaxtyping import Bool, Float, Int
 from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics.continuation.change_points import LARGEST_DISAGREEMENT, bridged, half_width, spoiled_width
-from jounce.kinematics.continuation.correct_and_differentiate import Arrival, SolvedState
+from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult
 from jounce.kinematics.continuation.path_following import (
     PASSABLE,
+    ChangePoint,
     FollowedPath,
-    Passage,
     follow,
 )
 from jounce.kinematics.continuation.solver import SMALL_BATCH, Solver
-from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, neighbours, solve_spans, spans_for, stride_of
+from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, blocks_for, neighbours, solve_blocks, stride_of
 from jounce.kinematics.status import Status
 from jounce.mechanism.time import nearest_instants
 
@@ -84,7 +84,7 @@ class GridSolver:
 
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
             if count > LONG_GRID:
-                left = self._in_spans(left, stride, pool, tell)
+                left = self._in_blocks(left, stride, pool, tell)
             if self.path.on_the_way or left.any() or not self._reached.all():
                 self._place_known()
             size = self.solver.together if count > LONG_GRID else SMALL_BATCH
@@ -103,7 +103,7 @@ class GridSolver:
         if progress is not None and done < count:
             progress(count, count)
 
-    def _in_spans(
+    def _in_blocks(
         self, left: Bool[np.ndarray, " time"], stride: int, pool: Threads, tell: Callable[[int], None]
     ) -> Bool[np.ndarray, " time"]:
         """Solve instants in rounds; return what is left: those that failed, and what starts from them.
@@ -116,8 +116,8 @@ class GridSolver:
             self._keep(place, state)
             self.status[place] = status
 
-        spans = spans_for(self.solver, 0, count, stride)
-        for solved in solve_spans(self.solver, self.path, self.time, spans, put, pool.map):
+        blocks = blocks_for(self.solver, 0, count, stride)
+        for solved in solve_blocks(self.solver, self.path, self.time, blocks, put, pool.map):
             tell(solved)
         failed = left & (self.status != Status.OK)
         if failed.any():
@@ -135,7 +135,7 @@ class GridSolver:
         nearer = np.abs(time - self._instants[neighbour]) <= np.abs(time - self._instants[nearest])
         return np.where(nearer & known, neighbour, nearest)
 
-    def _solved(self, batch: tuple[Indices, Indices]) -> Arrival:
+    def _solved(self, batch: tuple[Indices, Indices]) -> StepResult:
         """Return what comes of a batch of instants, with their sources; nothing is kept but the state at its lanes."""
         lanes, source = batch
         known = jax.tree.map(lambda x: x[..., source], self.solver.needed(self._store))
@@ -143,7 +143,7 @@ class GridSolver:
         self._keep(lanes, arrival.state(slice(None)))
         return arrival
 
-    def _take(self, lanes: Indices, arrival: Arrival) -> None:
+    def _take(self, lanes: Indices, arrival: StepResult) -> None:
         """Keep the outcome of a batch, and follow the motion to the instants that failed."""
         self.status[lanes] = arrival.status
         for k in np.flatnonzero(arrival.status != Status.OK).tolist():
@@ -182,7 +182,7 @@ class GridSolver:
             self.faults.pop(lane)
             self._keep(slice(lane, lane + 1), local.anchors[-1].state)
 
-    def _bridge(self, point: Passage) -> None:
+    def _bridge(self, point: ChangePoint) -> None:
         """Replace the instants next to a change point, and the one at it, by what the motion on both sides gives."""
         away = np.abs(self.time - point.instant)
         lanes = np.flatnonzero((away < half_width(point, self.solver.order)) & (self.time < self.path.ended_at))

@@ -1,8 +1,8 @@
-"""Spans of a long grid, each solved from the anchors of a motion alone: in any order, in any thread.
+"""Blocks of a long grid, each solved from the anchors of a motion alone: in any order, in any thread.
 
 An instant is predicted from the one whose index is its own with the last binary one set to zero, unless it is a
 multiple of a stride, a power of two, and starts from an anchor; or from the anchor, where that is nearer. So the
-instants from a multiple of the stride up to the next one start from nothing beyond it. A span is as many of these as a
+instants from a multiple of the stride up to the next one start from nothing beyond it. A block is as many of these as a
 round has instants: a vector of machine code, or what XLA solves side by side. They are solved round after round, in the
 memory of a thread, which stays in the cache; what is wanted of them is copied out of it.
 """
@@ -16,19 +16,19 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.execution.kept_memory import arrays_in, borrow, give_back, room_of
+from jounce.execution.buffer_pool import acquire, arrays_in, release, room_of
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.path_following import Anchor, FollowedPath
 from jounce.kinematics.continuation.solver import SMALL_BATCH, Solver
 from jounce.mechanism.time import nearest_instants
 
 Indices = Int[np.ndarray, " lane"]
-LONG_GRID = 1024  # instants: from here on in spans
+LONG_GRID = 1024  # instants: from here on in blocks
 FEW_BATCHES = 4  # of instants: they all start from anchors
 GROUP = 64  # instants that a lane takes up one after another, once all multiples of so many are solved
 
 
-class Span(NamedTuple):
+class Block(NamedTuple):
     """Instants of a grid that start from nothing but anchors and one another.
 
     Attributes
@@ -68,30 +68,30 @@ def stride_of(solver: Solver, left: int, count: int, anchors: int) -> int:
     return stride
 
 
-def spans_of(first: int, count: int, stride: int, width: int, *, full: bool = False) -> list[Span]:
-    """Return the spans of so many instants of a grid from an index on, for rounds of a width.
+def blocks_of(first: int, count: int, stride: int, width: int, *, full: bool = False) -> list[Block]:
+    """Return the blocks of so many instants of a grid from an index on, for rounds of a width.
 
-    To have `full` rounds, the last span has a stride of its own, so short that its instants fill them.
+    To have `full` rounds, the last block has a stride of its own, so short that its instants fill them.
     """
     size = stride * width
-    spans = [Span(first + k, min(size, count - k), stride) for k in range(0, count, size)]
-    if full and spans:
-        while stride > 1 and stride * width >= 2 * spans[-1].count:
+    blocks = [Block(first + k, min(size, count - k), stride) for k in range(0, count, size)]
+    if full and blocks:
+        while stride > 1 and stride * width >= 2 * blocks[-1].count:
             stride //= 2
-        spans[-1] = spans[-1]._replace(stride=stride)
-    return spans
+        blocks[-1] = blocks[-1]._replace(stride=stride)
+    return blocks
 
 
-def spans_for(solver: Solver, first: int, count: int, stride: int) -> list[Span]:
-    """Return the spans of so many instants for what solves them; a round of XLA is too wide to be left half empty."""
-    return spans_of(first, count, stride, solver.program.width, full=not solver.is_compiled)
+def blocks_for(solver: Solver, first: int, count: int, stride: int) -> list[Block]:
+    """Return the blocks of so many instants for what solves them; a round of XLA is too wide to be left half empty."""
+    return blocks_of(first, count, stride, solver.program.width, full=not solver.is_compiled)
 
 
 @lru_cache(maxsize=16)
 def rounds(count: int, stride: int, width: int) -> Int[np.ndarray, "round lane"]:
-    """Return the instants of a span in the order in which they are solved, by their indices in it.
+    """Return the instants of a block in the order in which they are solved, by their indices in it.
 
-    Multiples of `GROUP` come first, as what the others start from. Where lanes lie beyond the span, the first of their
+    Multiples of `GROUP` come first, as what the others start from. Where lanes lie beyond the block, the first of their
     round is solved again.
     """
     group = min(GROUP, stride)
@@ -113,12 +113,12 @@ def neighbours(lanes: Indices, stride: int) -> tuple[Indices, Bool[np.ndarray, "
 
 @lru_cache(maxsize=16)
 def _neighbours(count: int, stride: int) -> tuple[Indices, Bool[np.ndarray, " lane"]]:
-    """Return the neighbour of each instant of a span, and whether it is solved before."""
+    """Return the neighbour of each instant of a block, and whether it is solved before."""
     return neighbours(np.arange(count), stride)
 
 
 class _Room:
-    """The memory of a thread, for one span after another, with the anchors that they start from behind them.
+    """The memory of a thread, for one block after another, with the anchors that they start from behind them.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class _Room:
     def __init__(self, solver: Solver, like: Any, size: int, anchors: int):
         leaves, form = jax.tree.flatten(like)
         shapes = [*((*leaf.shape[:-1], size + anchors) for leaf in leaves), *[(size,)] * 4]
-        self.block, self._size = borrow(room_of(shapes)), size
+        self.block, self._size = acquire(room_of(shapes)), size
         kinds = [*[float] * (len(leaves) + 2), *[int] * 2]
         *state, self._time, self._step, self.status, self._source = arrays_in(self.block, shapes, kinds)
         self.state = jax.tree.unflatten(form, state)
@@ -143,7 +143,7 @@ class _Room:
         self._rounds = rounds(0, 1, self._width)
 
     def begin(self, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
-        """Take up the instants of a span, s, with the anchors around it."""
+        """Take up the instants of a block, s, with the anchors around it."""
         count = len(time)
         parts = zip(*(jax.tree.leaves(anchor.state) for anchor in anchors), strict=True)
         for whole, columns in zip(jax.tree.leaves(self.state), parts, strict=True):
@@ -174,7 +174,7 @@ class _Room:
         return jax.tree.map(lambda x: x[..., :count], self.state), self.status[:count]
 
 
-def prepare_spans(solver: Solver, like: SolvedState, count: int) -> None:
+def prepare_blocks(solver: Solver, like: SolvedState, count: int) -> None:
     """Compile what solves a grid of so many instants, unless it is there already, and solve one again and again."""
     if solver.is_compiled:
         return
@@ -183,18 +183,18 @@ def prepare_spans(solver: Solver, like: SolvedState, count: int) -> None:
     room = _Room(solver, like, size, 1)
     room.rest(like, size, stride)
     room.solve()
-    give_back(room.block)
+    release(room.block)
 
 
-def solve_spans(
+def solve_blocks(
     solver: Solver,
     path: FollowedPath,
     time: Float[np.ndarray, " time"],
-    spans: Sequence[Span],
+    blocks: Sequence[Block],
     put: Callable[[slice, Any, Int[np.ndarray, " lane"]], None],
-    each: Callable[[Callable[[Span], int], Iterable[Span]], Iterator[int]],
+    each: Callable[[Callable[[Block], int], Iterable[Block]], Iterator[int]],
 ) -> Iterator[int]:
-    """Solve spans of a grid, and yield how many instants each of them has.
+    """Solve blocks of a grid, and yield how many instants each of them has.
 
     Nothing is known of an instant that failed but that it did.
 
@@ -206,31 +206,31 @@ def solve_spans(
         The motion, followed to all these instants.
     time : array of shape (time,)
         All instants, s.
-    spans : sequence of Span
+    blocks : sequence of Block
         Those to solve.
     put : callable
-        Takes over the instants of a span by where they are among all: their states, as an anchor's, time last, and the
+        Takes over the instants of a block by where they are among all: their states, as an anchor's, time last, and the
         outcome of each. It may be called from several threads at once; the arrays are used again after it.
     each : callable
         In the manner of `map`; it may call from several threads at once.
     """
-    size = max(span.count for span in spans) if spans else 0
-    around = {span: path.anchors_around(time[span.first], time[span.first + span.count - 1]) for span in spans}
+    size = max(block.count for block in blocks) if blocks else 0
+    around = {block: path.anchors_around(time[block.first], time[block.first + block.count - 1]) for block in blocks}
     most = max(map(len, around.values()), default=0)
-    rooms: list[_Room] = []  # those of threads that are between two spans
+    rooms: list[_Room] = []  # those of threads that are between two blocks
     lock = threading.Lock()  # many short operations go faster one thread after another than in turns for Python's lock
 
-    def solve(span: Span) -> int:
+    def solve(block: Block) -> int:
         with lock:
             room = rooms.pop() if rooms else _Room(solver, path.anchors[0].state, size, most)
-            room.begin(time[span.place], around[span], span.stride)
+            room.begin(time[block.place], around[block], block.stride)
         room.solve()
-        put(span.place, *room.found(span.count))
+        put(block.place, *room.found(block.count))
         rooms.append(room)
-        return span.count
+        return block.count
 
     try:
-        yield from each(solve, spans)
+        yield from each(solve, blocks)
     finally:
         while rooms:  # one that a thread still uses is not among them
-            give_back(rooms.pop().block)
+            release(rooms.pop().block)

@@ -14,7 +14,7 @@ from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.path_following import FollowedPath
 from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.position_analysis.grid import GridSolver, room_for
-from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, solve_spans, spans_for, stride_of
+from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, blocks_for, solve_blocks, stride_of
 from jounce.kinematics.status import Status
 from jounce.mechanism.time import Instants
 
@@ -110,7 +110,7 @@ def _solved_at_once(
 
     Returns the first instants of those in which all are OK; the others are still to be solved, one after another.
     """
-    (store, status), spans = results, {}
+    (store, status), blocks = results, {}
     if path.on_the_way:
         return frozenset()
     points = [(point, half_width(point, solver.order)) for point in path.change_points]
@@ -121,19 +121,19 @@ def _solved_at_once(
         near = any(begin - width < point.instant < end + width for point, width in points)
         if count > LONG_GRID and end < path.ended_at and not near:
             stride = stride_of(solver, count, count, len(path.anchors_around(begin, end)))
-            spans[first] = spans_for(solver, first, count, stride)
-    done, wanted = 0, [*itertools.chain(*spans.values())]
+            blocks[first] = blocks_for(solver, first, count, stride)
+    done, wanted = 0, [*itertools.chain(*blocks.values())]
 
     def put(place: slice, state: SolvedState, outcome: Int[np.ndarray, " lane"]) -> None:
         store.put(place, *state[:2], series=True)
         status[place] = outcome
 
     with Threads(threads, compiled=solver.is_compiled) as pool:
-        for solved in solve_spans(solver, path, time, wanted, put, pool.map):
+        for solved in solve_blocks(solver, path, time, wanted, put, pool.map):
             done += solved
             if progress is not None:
                 progress(done, len(time))
-    return frozenset(first for first in spans if np.all(status[first : first + STRETCH] == Status.OK))
+    return frozenset(first for first in blocks if np.all(status[first : first + STRETCH] == Status.OK))
 
 
 class _Store:

@@ -22,7 +22,7 @@ from jounce.kinematics.continuation.solver import NO_GRID, Solver
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.position_analysis.chunked_motion import Stretches
 from jounce.kinematics.position_analysis.forces_at_rest import ask_forces_at_rest
-from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, prepare_spans
+from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, prepare_blocks
 from jounce.kinematics.position_analysis.grid_storage import solve_grid
 from jounce.kinematics.position_analysis.limit_position_messages import dead_end_words
 from jounce.kinematics.results.actuation import actuated
@@ -230,7 +230,7 @@ def _followed(
     guessed = build(chosen(with_outputs_held(mechanism), first))
     expect(len(instants))
     solver = Solver(guessed, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order, is_wanted_soon())
-    new = first_time("leg", guessed.system, solver.order, len(instants) > LONG_GRID)
+    new = first_time("take_steps", guessed.system, solver.order, len(instants) > LONG_GRID)
     beside = new and thread_count() > 1
     with rehearsed(partial(_prepare, solver, first), wanted=beside):
         try:
@@ -277,7 +277,7 @@ def _prepare(solver: Solver, instant: float) -> None:
 def _rehearse(mechanism: Mechanism, solver: Solver, still: SolvedState, instants: Instants) -> None:
     """Use the programs of long grids, and those of outputs that are forces, with the bodies at rest."""
     if len(instants) > LONG_GRID:
-        prepare_spans(solver, still, len(instants))
+        prepare_blocks(solver, still, len(instants))
     pose = {name: part[0] for name, part in still[0].items()}
     order = solver.order - lost_orders(mechanism)
     ask_forces_at_rest(mechanism, solver.model, pose, instants, order, solver.order + 1)

@@ -17,7 +17,7 @@ from jounce.execution.chunks import in_chunks
 from jounce.execution.on_demand import OnDemand
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
-from jounce.kinematics.continuation.path_following import Passage
+from jounce.kinematics.continuation.path_following import ChangePoint
 from jounce.kinematics.results.pose_outputs import output_series
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
@@ -98,7 +98,7 @@ class Motion(Displayed):
         When the motion passed a singular position smoothly, where assembly branches cross, s: there another motion
         could have branched off, and forces are not determined: they are NaN there, and so are their rates where
         rounding decides them.
-    passages : tuple of Passage
+    passages : tuple of ChangePoint
         The same, each with the radius of the Taylor series of the motion there.
     derived : dict
         What was computed of the motion and may be wanted again, by name: the forces, for one.
@@ -121,7 +121,7 @@ class Motion(Displayed):
         state: tuple[dict[str, Any] | Callable[[], dict[str, Any]], tuple[Any, ...]],
         status: Numbers,
         faults: dict[int, str],
-        passages: Sequence[Passage] = (),
+        passages: Sequence[ChangePoint] = (),
         history: AttitudeHistory | None = None,
         backend: str = "",
     ):

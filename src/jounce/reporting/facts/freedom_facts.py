@@ -18,7 +18,7 @@ from jounce.kinematics.assembly.assemble import (
     settled,
     warn_of_parts_turned_over,
 )
-from jounce.kinematics.assembly.gauss_newton import put_together
+from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.assembly.mobility import facts_of, independent, mobility
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Mechanism, Model, build
@@ -124,7 +124,7 @@ class StartingState:
         columns = int(model.system.shape[1])
         if place is not None:
             model, _ = with_reference(dataclasses.replace(model, guess=place), place, self.instant)
-        trial = put_together(model, self.instant, TOLERANCE) if model.rows else None
+        trial = assemble_from_guess(model, self.instant, TOLERANCE) if model.rows else None
         told = message = None
         pattern = model.system.pattern
         jacobian = HostJacobian.of(pattern, np.zeros(pattern.entry_count))

@@ -77,7 +77,7 @@ class Code(Scalars):
         self.taken.append(region)
         return region
 
-    def give_back(self, region: Region) -> None:
+    def release(self, region: Region) -> None:
         """Let memory be used again, if it can be given back."""
         if region not in self.held and (key := self._taken.pop(region, None)) is not None:
             self._rooms.setdefault(key, []).append(region)

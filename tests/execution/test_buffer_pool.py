@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.execution import kept_memory
 from jounce.execution.backends import is_wanted
-from jounce.execution.kept_memory import LINE, arrays_in, borrow, give_back, room_of
+from jounce.execution.buffer_pool import LINE, acquire, arrays_in, release, room_of
 from tests.problems.small import four_bar
 
 
@@ -20,22 +19,22 @@ def kept(monkeypatch):
 
 
 def test_what_was_given_back_is_lent_again(kept):
-    block = borrow(1000)
-    give_back(block)
-    assert borrow(900) is block
+    block = acquire(1000)
+    release(block)
+    assert acquire(900) is block
     assert not kept
 
 
 def test_a_block_that_is_too_small_makes_room_for_another(kept):
-    give_back(borrow(1000))
-    assert len(borrow(1001)) >= 1001
+    release(acquire(1000))
+    assert len(acquire(1001)) >= 1001
     assert not kept
 
 
 def test_no_more_is_kept_than_is_allowed(kept, monkeypatch):
     monkeypatch.setattr(kept_memory, "MOST", 1000)
-    for block in [borrow(600), borrow(401), borrow(300), borrow(200), borrow(100)]:
-        give_back(block)
+    for block in [acquire(600), acquire(401), acquire(300), acquire(200), acquire(100)]:
+        release(block)
     assert list(map(len, kept)) == [600, 300, 100]
 
 

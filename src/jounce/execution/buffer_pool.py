@@ -15,7 +15,7 @@ ENTRY = 8  # bytes of a number
 _kept: list[np.ndarray] = []
 
 
-def borrow(size: int) -> np.ndarray:
+def acquire(size: int) -> np.ndarray:
     """Return a block of so many bytes or more, whatever is in it."""
     try:
         block = _kept.pop()
@@ -24,7 +24,7 @@ def borrow(size: int) -> np.ndarray:
     return block if len(block) >= size else np.empty(size, np.uint8)
 
 
-def give_back(block: np.ndarray) -> None:
+def release(block: np.ndarray) -> None:
     """Keep a block for the next who borrows, unless there is enough; nobody may use it any more."""
     if sum(map(len, _kept)) + len(block) <= MOST:
         _kept.append(block)
