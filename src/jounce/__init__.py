@@ -42,7 +42,7 @@ def __getattr__(name: str) -> Any:
         else:
             value = getattr(importlib.import_module(room), name)
         if name == "AbstractConstraint":  # a joint of the user's own must not take the type of one of robots
-            from jounce import robot as robot
+            importlib.import_module(f"{__name__}.robot")
         if "jounce.settings" in sys.modules:
             from jounce.settings import cover_new_modules
 

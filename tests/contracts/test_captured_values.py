@@ -241,6 +241,7 @@ def test_law_of_a_force():
         assert rate_after_half(torque) == pytest.approx(np.exp(-5 * c), abs=1e-13)
 
 
+@pytest.mark.slow  # `.ci/run` runs it each time
 def test_law_of_time_of_a_force():
     wave = Wave()
     torque = jn.forces.Torque(GROUND, jn.FunctionMotion(lambda t: wave.amplitude * jnp.cos(t)))
@@ -255,6 +256,7 @@ def test_two_laws_of_one_form_are_two(monkeypatch):
         assert rate_after_half(*torques) == pytest.approx(np.exp(-5 * sum(values)), abs=1e-13)
 
 
+@pytest.mark.slow  # `.ci/run` runs it each time
 def test_class_and_methods_of_a_force(monkeypatch):
     drag = Drag(("rod",))
     for c in (0.1, 0.5):
@@ -270,6 +272,7 @@ def test_class_and_methods_of_a_force(monkeypatch):
         assert rate_after_half(Helped(GROUND, 0.2)) == pytest.approx(1 + share, abs=1e-13)
 
 
+@pytest.mark.slow  # `.ci/run` runs it each time
 def test_a_method_of_this_package_that_is_replaced(monkeypatch):
     torque = jn.forces.Torque(GROUND, 0.2)
     assert rate_after_half(torque) == pytest.approx(2, abs=1e-13)
@@ -309,6 +312,7 @@ class Scaling(jn.AbstractForce):
         return -self.part * self.size * velocity
 
 
+@pytest.mark.slow  # `.ci/run` runs it each time
 def test_batches_and_gradients_of_forces(monkeypatch):
     braked = dataclasses.replace(spun(Scaling(("rod",), size="size")), parameters={"size": 1.0})
 
@@ -386,6 +390,7 @@ def test_class_of_a_driver(monkeypatch):
         jn.solve(driven, [0.0, 0.5], order=1)
 
 
+@pytest.mark.slow  # `.ci/run` runs it each time
 def test_class_of_an_output_and_its_events_and_gradients(monkeypatch):
     shown = crank(outputs={"scaled": Scaled("rod")}, parameters={"rate": 1.0}, motion="rate*t")
 
@@ -425,6 +430,7 @@ class Halves(jn.Taylor):
         return start, self.part * step, allowed
 
 
+@pytest.mark.slow  # `.ci/run` runs it each time
 def test_own_integrators(monkeypatch):
     torque, method, steps = jn.forces.Torque(GROUND, lambda x, v, t: -0.5 * x), Halves(), []
     for part in (1.0, 0.25):
@@ -489,6 +495,7 @@ def test_controllers(name):
     assert abs(found[1] - found[0]) > 0.1
 
 
+@pytest.mark.slow  # `.ci/run` runs it each time
 def test_wrenches():
     controller = Controller()
     pushes = [jn.Wrench("rod", force=controller.force, point=[1.0, 0, 0]), jn.Wrench("rod", force=controller.of_state)]
@@ -610,6 +617,7 @@ def compilations(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
         jax.monitoring.unregister_event_duration_listener(listener)
 
 
+@pytest.mark.slow  # `.ci/run` runs it each time
 def test_two_hundred_gains_compile_once(monkeypatch):
     c = [0.1]
 
@@ -625,6 +633,7 @@ def test_two_hundred_gains_compile_once(monkeypatch):
     assert not found
 
 
+@pytest.mark.slow  # `.ci/run` runs it each time
 def test_two_hundred_controllers_compile_once(monkeypatch):
     controller = Controller()
 

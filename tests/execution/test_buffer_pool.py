@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.execution import buffer_pool
 from jounce.execution.backends import is_wanted
 from jounce.execution.buffer_pool import LINE, acquire, arrays_in, release, room_of
 from tests.problems.small import four_bar
@@ -14,7 +15,7 @@ from tests.problems.small import four_bar
 @pytest.fixture
 def kept(monkeypatch):
     blocks = []
-    monkeypatch.setattr(kept_memory, "_kept", blocks)
+    monkeypatch.setattr(buffer_pool, "_kept", blocks)
     return blocks
 
 
@@ -32,7 +33,7 @@ def test_a_block_that_is_too_small_makes_room_for_another(kept):
 
 
 def test_no_more_is_kept_than_is_allowed(kept, monkeypatch):
-    monkeypatch.setattr(kept_memory, "MOST", 1000)
+    monkeypatch.setattr(buffer_pool, "MOST", 1000)
     for block in [acquire(600), acquire(401), acquire(300), acquire(200), acquire(100)]:
         release(block)
     assert list(map(len, kept)) == [600, 300, 100]

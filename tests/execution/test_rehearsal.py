@@ -31,7 +31,7 @@ def compiled_later(monkeypatch):
         before.update(counts())
         yield
 
-    solving = sys.modules["jounce.kinematics.solve"]
+    solving = sys.modules["jounce.kinematics.position_analysis.solve"]
     rehearse = solving._rehearse  # in this thread in any case
 
     def known(*arguments):

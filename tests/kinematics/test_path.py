@@ -84,8 +84,8 @@ def test_one_instant():
 
 
 def test_negative_times():
-    motion = jn.solve(crank("t**2"), [-3.0, -1.0, 0.0, 5.0], order=2)
-    np.testing.assert_allclose(motion.outputs["angle"], [[9, -6, 2], [1, -2, 2], [0, 0, 2], [25, 10, 2]], atol=1e-13)
+    motion = jn.solve(crank("t**2"), [-3.0, -1.0, 0.0, 3.5], order=2)
+    np.testing.assert_allclose(motion.outputs["angle"], [[9, -6, 2], [1, -2, 2], [0, 0, 2], [12.25, 7, 2]], atol=1e-13)
 
 
 def test_whole_power_of_time_given_by_a_parameter_at_zero():

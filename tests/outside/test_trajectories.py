@@ -48,7 +48,8 @@ def test_one_joint_through_0_1_10_never_turns_back(axis):
 
     A joint alone has one way between two positions; the fastest motion stays within 0 and 10 and never turns back.
     """
-    found = positions(jn.retime(axis, {"j": [0.0, 1.0, 10.0]}, {"j": LIMITS}))
+    with pytest.warns(jn.UnitWarning, match="10 rad"):  # of a hinge
+        found = positions(jn.retime(axis, {"j": [0.0, 1.0, 10.0]}, {"j": LIMITS}))
     assert found.min() >= -1e-9
     assert found.max() <= 10 + 1e-9
     assert np.diff(found).min() >= -1e-9

@@ -178,7 +178,7 @@ def test_hinges_that_are_nearly_a_bennett_linkage_are_a_structure():
 
 
 def test_an_ordinary_mechanism_costs_no_series(monkeypatch):
-    monkeypatch.setattr(importlib.import_module("jounce.kinematics.mobility"), "ReducedConstraints", None)
+    monkeypatch.setattr(importlib.import_module("jounce.kinematics.assembly.mobility"), "ReducedConstraints", None)
     found = jn.mobility(jn.load("examples/four_bar.yaml"))
     assert (found.kind, found.count, found.instantaneous, found.finite, found.order) == ("regular", 1, 1, 1, None)
     free = jn.Mechanism(space="spatial", bodies={"stone": jn.Body([0, 0, 0])}, joints={})

@@ -142,12 +142,12 @@ def test_progress_never_goes_back_and_ends_with_all():
 @pytest.mark.parametrize("name", ["nothing", *FAILING])
 def test_stretches_solved_at_once_are_those_solved_one_after_another(monkeypatch, name, keep):
     mechanism, time, solved = FAILING.get(name, four_bar()), np.linspace(0, 2, 5000), []
-    monkeypatch.setattr(long_grids, "STRETCH", 1100)
+    monkeypatch.setattr(grid_storage, "STRETCH", 1100)
     with monkeypatch.context() as patch:
-        patch.setattr(long_grids, "_solved_at_once", lambda *_: frozenset())
+        patch.setattr(grid_storage, "_solved_at_once", lambda *_: frozenset())
         expected = jn.solve(mechanism, time, order=3, keep=keep, strict=False)
     at_once = grid_storage._solved_at_once
-    monkeypatch.setattr(long_grids, "_solved_at_once", lambda *given: solved.append(at_once(*given)) or solved[-1])
+    monkeypatch.setattr(grid_storage, "_solved_at_once", lambda *given: solved.append(at_once(*given)) or solved[-1])
     assert_same(jn.solve(mechanism, time, order=3, keep=keep, strict=False, threads=2), expected)
     firsts = range(0, 4400, 1100)  # the last stretch is a short grid
     fine = {first for first in firsts if np.all(expected.status[first : first + 1100] == Status.OK)}
@@ -160,7 +160,7 @@ def test_stretches_solved_at_once_are_those_solved_one_after_another(monkeypatch
 def test_a_stretch_in_which_some_instant_fails_is_solved_again(monkeypatch, always, keep):
     """Of what failed nothing is kept, of the stretches beside it everything, and progress does not go back."""
     time, told, spoiled = np.linspace(0, 2, 4400), [], []
-    monkeypatch.setattr(long_grids, "STRETCH", 1100)
+    monkeypatch.setattr(grid_storage, "STRETCH", 1100)
     expected = jn.solve(four_bar(), time, keep=keep)
     solve = grid_blocks._Room.solve
 

@@ -12,7 +12,7 @@ import jounce as jn
 from jounce.io.robots.loader import load_robot
 from tests.problems.robots import random_inertia, random_robot, robot_named
 
-ROBOTS = Path(__file__).parents[2] / "examples" / "robots"
+ROBOTS = Path(__file__).parents[3] / "examples" / "robots"
 HIGHEST = 6  # order of the rates of torque
 SAMPLES = 4
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from jounce.kinematics.continuation.path_following import FollowedPath
 from jounce.kinematics.continuation.solver import Solver
-from jounce.kinematics.position_analysis import grid_storage as long_grids
+from jounce.kinematics.position_analysis import grid_storage
 from jounce.kinematics.position_analysis.grid_storage import stretches
 from jounce.kinematics.results.actuation import actuated
 from jounce.kinematics.results.motion import Motion
@@ -79,4 +79,4 @@ def takes_stretches(mechanism: Mechanism) -> bool:
     """Tell whether the time grid of a mechanism is longer than one stretch."""
     if mechanism.time is None:
         return False  # which a solve complains of
-    return len(instants_of(mechanism.time, mechanism.parameter_values)) > long_grids.STRETCH
+    return len(instants_of(mechanism.time, mechanism.parameter_values)) > grid_storage.STRETCH
