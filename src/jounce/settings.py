@@ -55,7 +55,7 @@ class _Thread(threading.local):
 
 
 _states = [(getattr(config, name.removeprefix("jax_")), value) for name, value in OPTIONS.items()]
-_thread = _Thread()
+_thread, _double = _Thread(), config.enable_x64
 
 
 class _OwnSettings:
@@ -136,7 +136,7 @@ def own_settings() -> AbstractContextManager[Any]:
     ...     print(jnp.asarray(0.1).dtype)
     float64
     """
-    return nullcontext() if _thread.computing and config.enable_x64.value else _OwnSettings()
+    return nullcontext() if _thread.computing and _double.value else _OwnSettings()
 
 
 def under_own_settings(function: Callable[P, R]) -> Callable[P, R]:
@@ -159,7 +159,7 @@ def under_own_settings(function: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(function)
     def door(*arguments: P.args, **keywords: P.kwargs) -> R:
-        if _thread.computing and config.enable_x64.value:
+        if _thread.computing and _double.value:
             return function(*arguments, **keywords)
         with _OwnSettings():
             return function(*arguments, **keywords)

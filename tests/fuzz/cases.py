@@ -17,7 +17,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from jounce.errors import JounceError
+from jounce.errors import LONGEST, JounceError
 from tests.fuzz.mutations import mutated, swollen
 from tests.fuzz.readers import READERS
 from tests.fuzz.results import changed_table
@@ -144,7 +144,7 @@ def _judged_error(error: JounceError, from_file: bool, with_line: bool) -> Outco
     except Exception as inner:  # noqa: BLE001 - the very question
         return _failure("message fails", inner)
     kind = "error"
-    if not words.isprintable() or len(words) > 2000:
+    if not words.isprintable() or len(words) > LONGEST + 1000:  # the message, and its place
         kind = "message is no line of text"
     elif from_file and error.path is None:
         kind = "names no file"

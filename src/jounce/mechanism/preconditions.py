@@ -77,24 +77,38 @@ def concrete_or(
 
 def _traced(given: Mapping[str, Any]) -> str | None:
     """Return the dotted name of the first value that JAX traces, None if there is none."""
+    if not _holds_tracer(given):  # nearly always, and before names are put together
+        return None
     pending: list[tuple[tuple[str | int, ...], Any]] = [((), given)]
     while pending:
         place, value = pending.pop()
         if isinstance(value, Tracer):
             return "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in place).removeprefix(".")
-        names = _fields(type(value))
-        if names is None:
-            entries = list(value.items())
-        elif names:  # those of an object are looked up at once: Equinox has a slow way of its own for each
-            own = getattr(value, "__dict__", None)
-            held = partial(getattr, value) if own is None else own.get
-            entries = [(name, held(name, None)) for name in names]
-        elif isinstance(value, (list, tuple)):
-            entries = list(enumerate(value))
-        else:
-            continue
+        entries = _entries(value)
         pending += [((*place, name), entry) for name, entry in reversed(entries) if type(entry) not in PLAIN]
     return None
+
+
+def _holds_tracer(given: Mapping[str, Any]) -> bool:
+    pending: list[Any] = [given]
+    while pending:
+        value = pending.pop()
+        if isinstance(value, Tracer):
+            return True
+        pending += [entry for _, entry in _entries(value) if type(entry) not in PLAIN]
+    return False
+
+
+def _entries(value: Any) -> list[tuple[str | int, Any]]:
+    """Return what an object, a mapping or a list holds, by name or index."""
+    names = _fields(type(value))
+    if names is None:
+        return list(value.items())
+    if names:  # those of an object are looked up at once: Equinox has a slow way of its own for each
+        own = getattr(value, "__dict__", None)
+        held = partial(getattr, value) if own is None else own.get
+        return [(name, held(name, None)) for name in names]
+    return list(enumerate(value)) if isinstance(value, list | tuple) else []
 
 
 @lru_cache(maxsize=1000)

@@ -8,6 +8,7 @@ import dataclasses
 import itertools
 import weakref
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import equinox as eqx
@@ -102,13 +103,16 @@ def users_class(kind: type) -> type:
 
 def _read_methods(kind: type) -> tuple[str, ...]:
     """Return the names of the methods of a class that a user may have written, or that call such."""
-    role = next((role for role in _METHODS if issubclass(kind, role)), None)
-    if role is None:
-        return ()
-    known = [name for name in _METHODS[role] if hasattr(kind, name)]
+    known = [name for name in _methods_of(kind) if hasattr(kind, name)]
     if changes_parts(kind, tuple(_METHODS), known):
         return tuple(known)
-    return tuple(name for name in known if not is_ours(getattr(kind, name)))
+    return tuple([name for name in known if not is_ours(getattr(kind, name))])
+
+
+@lru_cache(maxsize=1000)
+def _methods_of(kind: type) -> tuple[str, ...]:
+    """Return the names of the methods by which elements of a class compute; none for others."""
+    return next((names for role, names in _METHODS.items() if issubclass(kind, role)), ())
 
 
 def _words(kind: type) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from jounce.design.design_space import Grid, Sobol
 from jounce.design.variations import Values
-from jounce.errors import OutputError
+from jounce.errors import OutputError, shortened
 from jounce.execution.backends import is_wanted
 from jounce.execution.device import on_processor
 from jounce.sweeps.fingerprints import fingerprint
@@ -22,6 +22,7 @@ FORMAT = 3  # of 1, digests told nothing of the sweep and the place of a chunk; 
 LARGEST_CHUNK = 2**20  # that may be asked for
 COMPARED = ("vary", "options", "versions", "arithmetic")  # groups of a manifest, value by value
 LIBRARIES = ("jax", "jaxlib", "numpy")  # other versions may give other last bits
+MOST_SHOWN = 200  # characters of a value of a manifest
 
 
 def manifest_of(
@@ -174,7 +175,7 @@ def _others(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
 
 
 def _shown(value: Any) -> str:
-    return "not given" if value is None else str(value)
+    return "not given" if value is None else shortened(str(value), MOST_SHOWN)
 
 
 def _words(variation: Any) -> str:

@@ -312,7 +312,9 @@ def checked_order(order: Any) -> int:
 def _still(solver: Solver, coordinates: dict[str, np.ndarray]) -> SolvedState:
     """Return what is known of the first instant before it is solved: its position."""
     levels = solver.order + 1
-    still = {name: np.stack([x, *[np.zeros_like(x)] * (levels - 1)]) for name, x in coordinates.items()}
+    still = {name: np.zeros((levels, *np.shape(x))) for name, x in coordinates.items()}
+    for name, x in coordinates.items():
+        still[name][0] = x
     return still, tuple(np.zeros((levels, 1, g.instances, 1)) for g in solver.model.system.outputs), np.zeros(1)
 
 
