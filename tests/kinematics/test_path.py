@@ -6,6 +6,7 @@ import pytest
 
 import jounce as jn
 from jounce.jet import Jet
+from jounce.kinematics.continuation.continuation_steps import take_steps
 from jounce.kinematics.continuation.instant_program import advance_instant
 from jounce.mechanism import build
 from tests.problems.small import crank, four_bar, law, screw, slider_crank, spindle
@@ -113,7 +114,7 @@ def test_long_grid_is_the_short_one_and_progress_is_told():
 
 
 def compilations():
-    by_xla = advance_instant.on_xla, advance_instant.in_rounds, leg
+    by_xla = advance_instant.on_xla, advance_instant.in_rounds, take_steps
     return sum(one.jitted._cache_size() for one in by_xla) + len(advance_instant.machine_code)
 
 
