@@ -81,7 +81,7 @@ FAILING = {
 
 
 @needs_machine_code
-@pytest.mark.parametrize("keep", [True, False])
+@pytest.mark.parametrize("keep", [pytest.param(True, marks=pytest.mark.slow), False])
 @pytest.mark.parametrize("name", FAILING)
 def test_failures_are_those_without_rounds(monkeypatch, name, keep):
     time = np.linspace(0, 2, 2049)
@@ -90,7 +90,9 @@ def test_failures_are_those_without_rounds(monkeypatch, name, keep):
     assert_same(found, expected)
 
 
-@pytest.mark.parametrize("native", [pytest.param("1", marks=needs_machine_code), "0"])
+@pytest.mark.parametrize(
+    "native", [pytest.param("1", marks=needs_machine_code), pytest.param("0", marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("name", ["nothing", "a dead point", "a law out of its range", "change points"])
 def test_xla_has_the_same_outcome(monkeypatch, name, native):
     """By rounds as wide as the cache holds: the same statuses, and numbers to rounding."""
