@@ -93,9 +93,19 @@ def _holds_tracer(given: Mapping[str, Any]) -> bool:
     pending: list[Any] = [given]
     while pending:
         value = pending.pop()
-        if isinstance(value, Tracer):
+        kind = type(value)
+        if kind in PLAIN:
+            continue
+        names = _fields(kind)
+        if names is None:
+            pending += value.values()
+        elif names:
+            own = getattr(value, "__dict__", None)
+            pending += [getattr(value, name, None) for name in names] if own is None else map(own.get, names)
+        elif isinstance(value, list | tuple):
+            pending += value
+        elif isinstance(value, Tracer):
             return True
-        pending += [entry for _, entry in _entries(value) if type(entry) not in PLAIN]
     return False
 
 
@@ -114,6 +124,8 @@ def _entries(value: Any) -> list[tuple[str | int, Any]]:
 @lru_cache(maxsize=1000)
 def _fields(kind: type[Any]) -> tuple[str, ...] | None:
     """Return the names of the fields of a class; none for one without; None for a mapping."""
+    if issubclass(kind, Tracer):
+        return ()
     if issubclass(kind, Mapping):
         return None
     return tuple(field.name for field in dataclasses.fields(kind)) if dataclasses.is_dataclass(kind) else ()

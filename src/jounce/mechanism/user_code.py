@@ -103,10 +103,10 @@ def users_class(kind: type) -> type:
 
 def _read_methods(kind: type) -> tuple[str, ...]:
     """Return the names of the methods of a class that a user may have written, or that call such."""
-    known = [name for name in _methods_of(kind) if hasattr(kind, name)]
+    known = {name: method for name in _methods_of(kind) if (method := getattr(kind, name, None)) is not None}
     if changes_parts(kind, tuple(_METHODS), known):
         return tuple(known)
-    return tuple([name for name in known if not is_ours(getattr(kind, name))])
+    return tuple([name for name, method in known.items() if not is_ours(method)])
 
 
 @lru_cache(maxsize=1000)
