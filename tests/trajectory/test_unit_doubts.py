@@ -10,7 +10,7 @@ import pytest
 
 import jounce as jn
 from jounce.cli import main
-from jounce.trajectory.unit_doubts import degrees_meant, values_of
+from jounce.trajectory.unit_doubts import degrees_meant, looks_like_degrees, values_of
 
 T = np.linspace(0.0, 2.0, 41)
 SWING = 30 + 60 * np.sin(np.pi * T)
@@ -84,8 +84,13 @@ def test_swings_to_whole_and_half_degrees_of_more_than_a_turn_are_told(law, told
     assert degrees_meant(values_of(jn.ExpressionMotion(law), 0.0, 2.0)) == told
 
 
-def test_a_law_that_says_nothing_of_the_run_has_no_values():
-    assert values_of(jn.ExpressionMotion("log(t - 1)"), 0.0, 2.0) is None
+@pytest.mark.parametrize("law", ["log(t - 1)", "1.7e308*t", "1e300 + t", "1/(t - 1)"])
+def test_a_law_that_says_nothing_of_the_run_has_no_values(law):
+    assert values_of(jn.ExpressionMotion(law), 0.0, 2.0) is None
+
+
+def test_the_largest_numbers_look_like_degrees():
+    assert looks_like_degrees(1.7976931348623157e308)
 
 
 IN_DEGREES = {

@@ -27,6 +27,7 @@ MANY_TURNS = 2 * TURN  # to which a value without a unit is rarely meant in rad
 AT_REST = 0.05  # of the fastest step, the first or the last one
 DWELL = 0.03  # of the run, for which a law stands still at what it was to reach
 ROUND = 1e-7  # of a value
+ENDLESS = 1e300  # beyond it nothing is an angle, and sums overflow
 NEAR = 1e-3  # of a half degree, to which the largest value of a law is known
 OUTSIDE = 2.0  # times the limits of a joint
 SLACK = 0.05  # of a range of degrees, by which limits may be broken
@@ -55,8 +56,8 @@ def looks_like_degrees(value: float) -> bool:
     >>> [looks_like_degrees(x) for x in (6.0, 10.0, 12.0, 90.0, math.radians(1080))]
     [False, True, False, True, False]
     """
-    turns = math.degrees(value) / 5
-    if abs(turns - round(turns)) <= ROUND * abs(turns):
+    turns = math.degrees(value / 5)
+    if math.isfinite(turns) and abs(turns - round(turns)) <= ROUND * abs(turns):
         return False  # it had its unit, or is a multiple of pi
     return abs(value) > MANY_TURNS or (abs(value) > TURN and value % 5 == 0)
 
@@ -68,7 +69,7 @@ def values_of(law: AbstractMotion, first: float, last: float) -> Values | None:
         values = _values(law, grid)
     except (JounceError, TypeError, ValueError, ArithmeticError):  # told where the law is used
         return None
-    return values if values.shape == grid.shape and np.isfinite(values).all() else None
+    return values if values.shape == grid.shape and np.abs(values).max() < ENDLESS else None
 
 
 def _values(law: AbstractMotion, grid: Values) -> Values:
