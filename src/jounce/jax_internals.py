@@ -22,6 +22,16 @@ def is_tried() -> bool:
     return jax.__version_info__[:2] in TRIED
 
 
+def in_plain_operations(program: Any) -> Any:
+    """Return a traced program without operations that stand for several, as some do from JAX 0.12 on."""
+    if not getattr(program, "is_high", False):
+        return program
+    from jax._src.interpreters import partial_eval
+
+    lowered = getattr(partial_eval, "lower_jaxpr2", None)
+    return program if lowered is None else lowered(program)
+
+
 def trace_settings() -> tuple[Any, ...]:
     """Return how JAX is set up in this thread, as `jax.jit` tells its own programs apart."""
     return config.trace_context()
