@@ -46,6 +46,7 @@ def bead(shape, height, at, width, speed=2.0):
     )
 
 
+@pytest.mark.slow
 def test_a_hill_too_high_turns_the_bead_back():
     # 2 m/s reach 0.204 m of 0.3 m: it comes back as it came
     motion = jn.simulate(bead("bell", 0.3, 2.0, 0.15), [0.0, 0.5, 2.0], 1)
@@ -77,6 +78,7 @@ def test_implicit_formulas_see_it_too():
     assert motion.outputs["bead"][-1, 1, 0] == pytest.approx(-2.0, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_a_bend_where_velocities_would_jump_is_an_error():
     mechanism = bead("bend", 0.05, 1.3, 1.0)
     motion = jn.simulate(mechanism, [0.0, 0.5, 1.0, 2.0], 1, strict=False)

@@ -81,6 +81,7 @@ def test_a_jump_in_time_costs_no_digits():
     assert motion.kinks[0][0] == pytest.approx(1.1, abs=1e-13)
 
 
+@pytest.mark.slow
 def test_friction_at_rest_ends_the_run_with_a_reason():
     motion = jn.simulate(sled("-drag*v/abs(v)", "t"), [0.0, 10.0, 30.0], 1, strict=False)  # at rest after 20 s
     assert [jn.Status(int(s)).name for s in motion.status] == ["OK", "OK", "COLLAPSED"]

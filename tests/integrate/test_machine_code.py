@@ -63,6 +63,7 @@ def test_motions_are_those_of_xla(name, end, monkeypatch):
     agree(*both_ways(mechanism, np.linspace(0.0, end, 30), monkeypatch, events=events), 1e-8)
 
 
+@pytest.mark.slow
 def test_machine_code_goes_backward_and_takes_fixed_steps(monkeypatch):
     mechanism = jn.load("examples/simple_pendulum.yaml")
     for times, method in ((np.linspace(1.0, 0.0, 5), None), (np.linspace(0.0, 1.0, 5), jn.Taylor(8, step=0.05))):

@@ -66,6 +66,7 @@ def test_multipliers_of_driven_mechanisms(name, monkeypatch):
     agree(*both_ways(jn.solve(mechanism), monkeypatch))
 
 
+@pytest.mark.slow
 def test_angles_with_their_turns(monkeypatch):
     found, wanted = both_ways(jn.solve(turning_door()), monkeypatch)
     agree(found, wanted)

@@ -58,6 +58,7 @@ def test_a_cam_that_does_not_close_over_a_turn_is_told(tmp_path, last, told):
     assert (told in facts["cam"]) if told else facts["cam"] == ""
 
 
+@pytest.mark.slow
 def test_a_contact_force_that_changes_its_sign_is_told_as_lift_off(tmp_path):
     fast = jn.solve(cam(tmp_path, speed="200*pi/3"), [k / 2000 for k in range(60)], order=2)
     (remark,) = motion_facts(fast)["remarks"]
