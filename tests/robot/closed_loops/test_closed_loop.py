@@ -10,6 +10,7 @@ import pytest
 from mpmath import mp
 
 import jounce as jn
+from jounce.robot.model.floating_base import floating_joints
 from tests.problems.closed_robots import FIVE_BAR, forward, in_contact, in_pinocchio, inverse, random_loop
 
 TIME = np.linspace(0.1, 0.7, 4)
@@ -208,7 +209,7 @@ def test_spatial_loop_against_pinocchio():
 
 def carrier():
     """Return an arm that a load is joined to by a ball and welded to besides, so that it is a payload."""
-    joints, count = jn.robot.floating_base.floating_joints("load", prefix="J", world="arm")[1][3:], 3
+    joints, count = floating_joints("load", prefix="J", world="arm")[1][3:], 3
     names = [joint.child for joint in joints[:-1]]
     load = jn.Inertia(0.7, [0.1, 0.2, -0.1], [0.02, 0.03, 0.04])
     links = [jn.Link("base"), jn.Link("arm", ROD), *map(jn.Link, names), jn.Link("load", load)]
@@ -236,7 +237,7 @@ def test_what_is_welded_is_a_payload():
 @pytest.mark.slow
 def test_a_ball_driven_along_its_coordinates_keeps_its_joints():
     """The turns of a floating base; its slides are joints like others."""
-    links, joints = jn.robot.floating_base.floating_joints("rod", world="base_frame_3")
+    links, joints = floating_joints("rod", world="base_frame_3")
     robot = jn.Robot("rod", [*links[3:], jn.Link("rod", ROD)], joints[3:])
     agrees_with_newton_euler(robot, waves(robot), order=2)
 
