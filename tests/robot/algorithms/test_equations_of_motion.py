@@ -100,6 +100,7 @@ def test_parts():
     assert difference(jn.bias_forces(pair.robot, q, parts="coriolis", drives=False), both - squares) <= BOUND
     held = jn.bias_forces(pair.robot, q, parts="gravity", drives=False)
     assert difference(both + held, jn.bias_forces(pair.robot, q, drives=False)) <= BOUND
+    np.testing.assert_array_equal(jn.bias_forces(pair.robot, q, parts="gravity"), held)  # no friction in a part alone
     assert not jn.bias_forces(pair.robot, q, parts=(), drives=False).any()
 
 

@@ -217,7 +217,7 @@ def mass_matrix(
 
 
 def bias_forces(
-    robot: Robot, q: ArrayLike, *, rates: bool = False, parts: str | Sequence[str] = PARTS, drives: bool = True
+    robot: Robot, q: ArrayLike, *, rates: bool = False, parts: str | Sequence[str] = PARTS, drives: bool | None = None
 ) -> Float[Numbers, "*batch joint"]:
     """Return the joint torques or forces that velocities and gravity need, and on request their rates.
 
@@ -236,8 +236,9 @@ def bias_forces(
     parts : {"coriolis", "centrifugal", "gravity"} or a sequence of them, default all
         What to add up. Centrifugal forces go with the squares of the velocities of single coordinates, Coriolis forces
         with products of two; the split belongs to the choice of coordinates, and their sum is ``C(q, q') q'``.
-    drives : bool, default True
-        Add viscous damping and Coulomb friction of the joints, as in `inverse_dynamics`.
+    drives : bool, optional
+        Add viscous damping and Coulomb friction of the joints, as in `inverse_dynamics`. Unless given, they are added
+        to all parts together, and to no part alone.
 
     Returns
     -------
@@ -268,7 +269,8 @@ def bias_forces(
     chosen = (parts,) if isinstance(parts, str) or not isinstance(parts, Iterable) else tuple(parts)
     for part in chosen:
         check_choice("part", part, PARTS, RobotError, name="parts")
-    rates, drives = flag("rates", rates, error=RobotError), flag("drives", drives, error=RobotError)
+    rates = flag("rates", rates, error=RobotError)
+    drives = set(chosen) == set(PARTS) if drives is None else flag("drives", drives, error=RobotError)
     q = checked_coordinates(robot, q, 1, most=None if rates else 1)
     found = _bias(robot, (q,), (), (frozenset(chosen), drives))
     return found if rates else found[..., 0, :]
