@@ -258,7 +258,8 @@ class _Family:
                 found = found.reshape(*found.shape[:3], *(len(labels) for _, labels in axes))
                 dims += [axis for axis, _ in axes]
             variables[name] = (dims, found, {"units": output.unit, "long_name": derivatives_of(name)})
-        words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": _flags()}
+        meanings = " ".join(status.name.lower() for status in Status)
+        words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": meanings}
         variables["status"] = (("design", "time"), self.status[:, : len(self.instants)], words)
         taken = {*variables, *coordinates}
         named = {name: name if name not in taken else f"parameter_{name}" for name in values}
@@ -401,7 +402,3 @@ class _Family:
 
 def _is_of_pieces(part: Any) -> bool:
     return isinstance(part, SplineMotion)
-
-
-def _flags() -> str:
-    return " ".join(status.name.lower() for status in Status)
