@@ -89,6 +89,12 @@ def test_a_law_that_says_nothing_of_the_run_has_no_values(law):
     assert values_of(jn.ExpressionMotion(law), 0.0, 2.0) is None
 
 
+def test_a_pole_is_no_motion_in_degrees():
+    assert degrees_meant(values_of(jn.ExpressionMotion("tan(2*t)"), 0.0, 0.9)) == ""
+    there = np.repeat([-90.0, 90.0], 100)  # at once: they stand still on both sides
+    assert degrees_meant(there) == "goes from -90 to 90 rad, 29 turns: degrees?"
+
+
 def test_the_largest_numbers_look_like_degrees():
     assert looks_like_degrees(1.7976931348623157e308)
 

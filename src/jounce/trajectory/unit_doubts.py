@@ -196,7 +196,16 @@ def _is_round(values: Values) -> bool:
 
 
 def _is_position(values: Values) -> bool:
-    """Tell whether values are those of something that is positioned: back and forth, or from rest to rest."""
+    """Tell whether values are those of something that is positioned: back and forth, or from rest to rest.
+
+    Where the largest and the least stand side by side, on both sides of zero, they are those beside a pole.
+    """
+    if (
+        abs(int(np.argmax(values)) - int(np.argmin(values))) == 1
+        and values.max() > 0 > values.min()
+        and len(values) > 2
+    ):
+        return False
     fallen = float((np.maximum.accumulate(values) - values).max())
     risen = float((values - np.minimum.accumulate(values)).max())
     if min(fallen, risen) > TURN:
