@@ -152,10 +152,10 @@ def test_what_was_computed_before_a_singularity_is_kept():
     time = [0.0, 0.6, 0.8, 1.5, 2.0]
     motion = jn.simulate(block("-x**-3"), time, 1, strict=False)
     assert [jn.Status(s).name for s in motion.status] == ["OK"] * 3 + ["COLLAPSED", "NOT_REACHED"]
-    assert motion.faults == {3: "body block"}
+    assert motion.faults == {3: "forces.pull at t = 1 s"}
     assert motion.ended_at == pytest.approx(1.0, abs=1e-9)
     assert np.allclose(motion.outputs["x"][:3, 0, 0], [1.0, 0.8, 0.6], rtol=0, atol=1e-13)
-    with pytest.raises(jn.SolveError, match=r"t = 1\.5 s, body block: collapsed.*3 of 5") as e:
+    with pytest.raises(jn.SolveError, match=r"t = 1\.5 s, forces.pull at t = 1 s: collapsed.*3 of 5") as e:
         jn.simulate(block("-x**-3"), time, 1)
     assert e.value.motion.ended_at == motion.ended_at
 
