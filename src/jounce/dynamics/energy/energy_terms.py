@@ -78,7 +78,8 @@ def energy_terms(
     """Return the terms of the acceleration energy of order p apart: translation, and the three of rotation; with rates.
 
     Negrean 2025, equations 82-106 and 111-114 for order 1, whose terms they are; for any order the same split, exact,
-    in the place of equations 116-121, which lack terms.
+    in the place of equations 116-121, which lack terms. They are those of the links alone: the armature inertia of
+    joints, which `acceleration_energy` adds unless `drives` is False, has no such split.
 
     Parameters
     ----------
