@@ -18,6 +18,7 @@ RANKS = {
         "parallel1": 1,
         "parallel2": 1,
         "prismatic": 2,
+        "fixed": 3,
         "coordinate": 1,
         "gear": 1,
         "rolling": 1,
@@ -35,6 +36,11 @@ RANKS = {
         "cylindrical": 4,
         "prismatic": 5,
         "screw": 5,
+        "planar": 3,
+        "fixed": 6,
+        "constant_velocity": 4,
+        "tripod": 3,
+        "oldham": 4,
         "rotation": 1,
         "slide": 1,
         "distance": 1,
@@ -137,6 +143,14 @@ class SpatialCouple:
         return 2 * np.arctan2(q[3], q[0])
 
     @property
+    def twist_along_axes(self):
+        """The same with the frame of body j turned on by the shortest tilt between the components of the axis."""
+        u, v = self.C_i[:, 2], self.C_j[:, 2]
+        tilt = np.array([1.0 + u @ v, *np.cross(u, v)])  # takes the components on i to those on j
+        q = product(product(list(self.q_i), self.back), list(tilt / np.linalg.norm(tilt)))
+        return 2 * np.arctan2(u @ np.array(q[1:]), q[0])
+
+    @property
     def back(self):
         return [self.q_j[0], *(-self.q_j[1:])]
 
@@ -200,7 +214,43 @@ def spatial_joints(c):
             [([STILL, STILL, screwed], spin)],
             [(up, still), (none, spin), (none, tilt)],
         ),
+        "planar": (
+            spatial.PlaneOnPlane,
+            c.points | c.pair("axis"),
+            [([TRAVEL, OTHER, STILL], spin)],
+            [(up, spin), (none, tilt)],
+        ),
+        "fixed": (
+            spatial.Fixed,
+            c.points | c.pair("axis") | c.pair("normal", "x"),
+            [(none, still)],
+            [(none, spin), (aside, still), (up, still), (none, tilt)],
+        ),
+        "constant_velocity": (
+            spatial.ConstantVelocity,
+            c.points | c.pair("axis") | {"offset": c.twist_along_axes},
+            [(none, shortest_tilt())],
+            [(none, spin), (aside, still), (up, still)],
+        ),
+        "tripod": (
+            spatial.Tripod,
+            c.points | c.pair("axis") | c.pair("normal", "x") | {"radius": RADIUS},
+            [(up, still)],
+            [(none, spin), (aside, still)],
+        ),
+        "oldham": (
+            spatial.Oldham,
+            c.points | c.pair("axis") | c.pair("vector", "x", "y"),
+            [([TRAVEL, OTHER, STILL], still)],
+            [(none, spin), (up, still), (none, tilt)],
+        ),
     }
+
+
+def shortest_tilt():
+    """A turn about an axis across the axis of the joint, which moves too: the balls stay in the plane between."""
+    half = 0.5 * OTHER
+    return [jet.cos(half), jet.sin(half) * jet.cos(TURN), jet.sin(half) * jet.sin(TURN), STILL]
 
 
 def spin_of(first, second):
@@ -272,6 +322,12 @@ def planar_joints(c):
             c.points | c.along("i", "j"),
             [(along, STILL)],
             [(across, STILL), (along, TURN)],
+        ),
+        "fixed": (
+            planar.Fixed,
+            c.points | {"offset": c.a_i - c.a_j},
+            [(none, STILL)],
+            [(along, STILL), (across, STILL), (none, TURN)],
         ),
         "rolling": (planar.Rolling, c.points | c.along("i") | offset, [(rolled, TURN)], [(along, STILL), (none, TURN)]),
     }

@@ -1,5 +1,6 @@
 """Laws that every joint and driver of the catalogue keeps, and a user's own one too: those of `jounce.testing`."""
 
+import numpy as np
 import pytest
 
 from jounce.testing import check_joint
@@ -16,7 +17,8 @@ def case(request) -> Case:
 
 def checked(case, *contracts, **claims):
     """Hold a case to contracts; return why those that say nothing of it do not."""
-    claims = {"values": case.given, "period": "lead" if case.kind.type_name == "screw" else None, **claims}
+    period = {"screw": "lead", "constant_velocity": 2 * np.pi}.get(case.kind.type_name)
+    claims = {"values": case.given, "period": period, **claims}
     report = check_joint(case.kind, space=case.space, optional=case.optional, contracts=contracts, **claims)
     assert {*report.held, *report.left_out} == {*contracts}
     return report.left_out

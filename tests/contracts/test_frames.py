@@ -239,6 +239,30 @@ def screw():
     )  # fmt: skip
 
 
+def couplings():
+    """Shafts behind one another, joined by couplings, the last on a plane, and a body welded to the first."""
+    along, up = [0.1, -0.2, 1.0], [0.0, 0.0, 1.0]
+    return in_space(
+        9,
+        {"first": [0, 0, 0], "second": [0, 0, 1], "third": [0.05, 0.02, 2], "fourth": [0, 0, 2.5], "plate": [1, 0, 0]},
+        joints={
+            "axle": spatial.Revolute(("ground", "first"), ZERO, ZERO, along, along),
+            "ball": spatial.ConstantVelocity(("first", "second"), up, ZERO, up, [0.1, 0, 1]),
+            "disc": spatial.Oldham(("second", "third"), up, ZERO, up, up, [1, 0.1, 0.2], [0.1, 1, 0]),
+            "tripod": spatial.Tripod(("third", "fourth"), [0, 0, 0.5], ZERO, up, up, [1, 0, 0.1], [1, 0.1, 0], 0.2),
+            "table": spatial.PlaneOnPlane(("ground", "fourth"), [0, 0, 2.5], ZERO, along, along),
+            "weld": spatial.Fixed(("first", "plate"), A, ZERO, Z, Z, A, A),
+        },
+        drivers={
+            "spin": drivers.RotationDriver(("ground", "first"), along, wave(0.1, 0.7, 0.4, 2.0)),
+            "tilt": drivers.SpatialDistanceDriver(("ground", "second"), [1, 0, 2], up, wave(1.0, 0, 0.1, 1.0)),
+            "lean": drivers.SpatialDistanceDriver(("ground", "second"), [0, 1, 2], up, wave(0.95, 0, 0.05, 2.0)),
+            "aside": drivers.SpatialSlideDriver(("second", "third"), up, ZERO, [1, 0, 0], wave(0.05, 0, 0.02, 2.0)),
+            "away": drivers.SpatialSlideDriver(("second", "third"), up, ZERO, [0, 1, 0], wave(0.02, 0, 0.03, 1.0)),
+        },
+    )
+
+
 def all_in_the_plane():
     """The same in the plane."""
     o, x, y = [0.0, 0.0], [1.0, 0.1], [-0.1, 1.0]
@@ -260,6 +284,7 @@ def all_in_the_plane():
             "disc": body([3.0, 1.0], 0.0),
             "wheel": body([5.0, 1.0], 0.4),
             "second": body([6.0, 1.0], 0.3),
+            "plate": body([7.0, 1.4], 0.7),
         },
         joints={
             "A": planar.Revolute(("ground", "crank"), o, o),
@@ -276,6 +301,7 @@ def all_in_the_plane():
             "rolling": planar.Rolling(("ground", "disc"), [3.0, 0.7], o, x, 0.3),
             "axle": planar.Revolute(("disc", "wheel"), [2.0, 0], o),
             "W": planar.Revolute(("wheel", "second"), [1.0, 0], o),
+            "weld": planar.Fixed(("second", "plate"), x, [-0.1, 0.2]),
         },
         drivers={
             "turn": drivers.CoordinateDriver(("ground", "crank"), "angle", LAW),
@@ -345,7 +371,14 @@ def test_an_angle_between_bodies_in_any_motion_changes_by_a_constant_with_their_
 
 
 ORDERS = {"plane": 2, "cross": 2, "linkage": 1}  # rates of forces; of the others forces alone, which compile long
-MECHANISMS = {"plane": all_in_the_plane, "arm": arm, "cross": cross, "linkage": linkage, "screw": screw}
+MECHANISMS = {
+    "plane": all_in_the_plane,
+    "arm": arm,
+    "cross": cross,
+    "linkage": linkage,
+    "screw": screw,
+    "couplings": couplings,
+}
 
 
 @pytest.mark.slow

@@ -107,6 +107,20 @@ class Prismatic(AbstractConstraint, type="prismatic", space="planar"):
         return rows(cross(along, body_j.direction(self.vector_j)), cross(along, d))
 
 
+class Fixed(AbstractConstraint, type="fixed", space="planar"):
+    """Weld: a point of each body coincides, and body j keeps its angle to body i, that of the guess unless given."""
+
+    point_i: Vector  # m, in the frame of body i
+    point_j: Vector
+    offset: Scalar = None  # rad, the angle of body j less that of body i
+
+    dimensions = {"offset": "angle"}
+
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        return rows(d, body_j.angle - body_i.angle - self.offset)
+
+
 class Coordinate(AbstractConstraint, type="coordinate", space="planar"):
     """Fixed angle, gear pair or rolling along x or y: ``c_j = K phi_i + C``. Sommer 2024, equations 39-40.
 

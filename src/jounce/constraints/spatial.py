@@ -1,4 +1,4 @@
-"""Spatial joints: the four basic residuals of Sommer 2024, section 5, and the joints composed of them.
+"""Spatial joints: the four basic residuals of Sommer 2024, section 5, joints composed of them, and couplings of shafts.
 
 In each, ``d = r_j^P - r_i^P`` leads from the joint's point on body i to that on body j.
 """
@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jounce.constraints.angles import Vectors, coaxial, perpendiculars, relative_angle
 from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
 from jounce.constraints.planar import length_of, slide
-from jounce.jet import Jet, cross, wrap
+from jounce.jet import Jet, cross, dot, wrap
 from jounce.rigid import SpatialPose
 
 
@@ -132,6 +132,42 @@ class Prismatic(AbstractConstraint, type="prismatic", space="spatial"):
         return rows(*_collinear(self, body_i, body_j), side.dot(body_j.direction(self.normal_j)))
 
 
+class PlaneOnPlane(AbstractConstraint, type="planar", space="spatial"):
+    """Planar joint: a plane of body j stays on one of body i; the bodies slide on it and turn about its normal."""
+
+    point_i: Vector  # m, on the plane, in the frame of body i
+    point_j: Vector
+    axis_i: Vector  # normal of the plane
+    axis_j: Vector
+
+    held_parallel = (("axis_i", "axis_j"),)
+    symbol = "plane"
+
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
+        apart = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
+        return rows(apart, *_parallel(body_i, body_j, self.axis_i, self.axis_j))
+
+
+class Fixed(AbstractConstraint, type="fixed", space="spatial"):
+    """Weld: a point of each body coincides, and both an axis and a normal of each stay parallel."""
+
+    point_i: Vector  # m, in the frame of body i
+    point_j: Vector
+    axis_i: Vector  # a direction of each body that stays parallel
+    axis_j: Vector
+    normal_i: Vector  # another one, not along the first
+    normal_j: Vector
+
+    held_parallel = (("axis_i", "axis_j"), ("normal_i", "normal_j"))
+    never_parallel = (("normal_i", "axis_i"), ("normal_j", "axis_j"))
+
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        side = body_i.direction(cross(self.axis_i, self.normal_i) / length_of(self.axis_i)[None])
+        level = side.dot(body_j.direction(self.normal_j))
+        return rows(d, *_parallel(body_i, body_j, self.axis_i, self.axis_j), level)
+
+
 class Screw(AbstractConstraint, type="screw", space="spatial"):
     """Nut j on a screw i: cylindrical, and an advance of one lead per turn. Sommer 2024, section 5.
 
@@ -157,6 +193,82 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
         return rows(*_collinear(self, body_i, body_j), wrap(excess, self.lead))
 
 
+class ConstantVelocity(AbstractConstraint, type="constant_velocity", space="spatial"):
+    """Homokinetic joint, such as a Rzeppa joint: the centres coincide, and both shafts turn about their axes alike.
+
+    What is left of the relative attitude after the shortest tilt of the axis is no turn about it, but for the offset:
+    so the balls of such a joint lie in the plane that bisects the angle of the shafts. Hunt, Constant-velocity shaft
+    couplings: a general theory, 1973.
+    """
+
+    point_i: Vector  # m, centre, in the frame of body i
+    point_j: Vector
+    axis_i: Vector  # of each shaft, in its frame, both from one end of the drive to the other
+    axis_j: Vector
+    offset: Scalar = None  # rad, by which shaft j is turned about its axis
+
+    dimensions = {"offset": "angle"}
+    symbol = "spherical"
+
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        twist = relative_angle(body_i, body_j, self.axis_i, datum=coaxial(self.axis_i, self.axis_j))
+        return rows(body_i.to_body(d), wrap(twist - self.offset))
+
+
+class Tripod(AbstractConstraint, type="tripod", space="spatial"):
+    """Plunging joint: three rollers on the arms of spider j, each in the middle plane of a track of tulip i.
+
+    The tracks hold the axis of the tulip, 120 degrees from one another, and so do the arms at the spider: its centre
+    may slide along the tulip, and goes round a small circle three times a turn where the shafts are at an angle.
+    """
+
+    point_i: Vector  # m, on the axis of the tulip, in the frame of body i
+    point_j: Vector  # m, centre of the spider, in the frame of body j
+    axis_i: Vector  # of each shaft, in its frame, both from one end of the drive to the other
+    axis_j: Vector
+    normal_i: Vector  # across the axis, toward the first track
+    normal_j: Vector  # across the axis, along the first arm
+    radius: Scalar  # m, of the rollers' centres
+
+    never_parallel = (("normal_i", "axis_i"), ("normal_j", "axis_j"))
+    symbol = "spherical"
+
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
+        first, second = _frame_of(self.axis_i, self.normal_i)
+        arm, side = _frame_of(self.axis_j, self.normal_j)
+        held = []
+        for c, s in ((1.0, 0.0), (-0.5, 0.75**0.5), (-0.5, -(0.75**0.5))):
+            roller = body_j.point(self.point_j + self.radius[None] * (c * arm + s * side))
+            held.append(body_i.direction(c * second - s * first).dot(roller - body_i.point(self.point_i)))
+        return rows(*held)
+
+
+class Oldham(AbstractConstraint, type="oldham", space="spatial"):
+    """Coupling of parallel shafts: a disc with two slots at right angles, in which a tongue of each hub slides.
+
+    The disc has no mass here. The hubs may move to each other in the plane across the axes, and neither turn nor tilt.
+    """
+
+    point_i: Vector  # m, in the plane of the disc, in the frame of body i
+    point_j: Vector
+    axis_i: Vector
+    axis_j: Vector
+    vector_i: Vector  # the tongue on each hub
+    vector_j: Vector
+
+    held_parallel = (("axis_i", "axis_j"),)
+    never_parallel = (("vector_i", "axis_i"), ("vector_j", "axis_j"))
+    symbol = "universal"
+
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
+        apart = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
+        first, _ = _frame_of(self.axis_i, self.vector_i)
+        second, _ = _frame_of(self.axis_j, self.vector_j)
+        turned = body_i.direction(first).dot(body_j.direction(second))
+        return rows(apart, *_parallel(body_i, body_j, self.axis_i, self.axis_j), turned)
+
+
 def _parallel(body_i: SpatialPose, body_j: SpatialPose, axis_i: Vectors, axis_j: Vectors) -> list[Jet]:
     """Return the two rows that keep an axis of each body parallel."""
     axis = body_j.direction(axis_j)
@@ -168,3 +280,11 @@ def _collinear(joint: Any, body_i: SpatialPose, body_j: SpatialPose) -> list[Jet
     d = body_j.point(joint.point_j) - body_i.point(joint.point_i)
     on_line = [body_i.direction(side).dot(d) for side in perpendiculars(joint.axis_i)]
     return [*_parallel(body_i, body_j, joint.axis_i, joint.axis_j), *on_line]
+
+
+def _frame_of(axis: Vectors, normal: Vectors) -> tuple[Any, Any]:
+    """Return the unit vector across a constant axis toward another one, and the vector a quarter turn on."""
+    along = axis / length_of(axis)[None]
+    across = normal - dot(along, normal)[None] * along
+    across = across / length_of(across)[None]
+    return across, cross(along, across)
