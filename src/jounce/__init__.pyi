@@ -193,6 +193,7 @@ from jounce.trajectory import (
     FollowingMotion as FollowingMotion,
     FunctionMotion as FunctionMotion,
     HermiteMotion as HermiteMotion,
+    IntegratedMotion as IntegratedMotion,
     JointTrajectory as JointTrajectory,
     MeasuredMotion as MeasuredMotion,
     OutputMotion as OutputMotion,

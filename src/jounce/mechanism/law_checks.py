@@ -51,6 +51,7 @@ def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces
             for field, law in _motions(element):
                 place = f"{kind}.{name}.{field}"
                 try:
+                    law = law.resolved(mechanism.parameter_values)
                     law.check_instants(since, until)
                 except JounceError as error:
                     raise error.located(name=place) from None

@@ -4,9 +4,9 @@ from jounce.settings import compute_under_own_settings as _compute_under_own_set
 from jounce.trajectory.composed import (
     FollowingMotion as FollowingMotion,
     OutputMotion as OutputMotion,
-    PiecewiseMotion as PiecewiseMotion,
 )
 from jounce.trajectory.hermite import HermiteMotion as HermiteMotion
+from jounce.trajectory.integrated import IntegratedMotion as IntegratedMotion
 from jounce.trajectory.joint_trajectory import JointTrajectory as JointTrajectory
 from jounce.trajectory.measured import MeasuredMotion as MeasuredMotion
 from jounce.trajectory.motion import (
@@ -15,6 +15,7 @@ from jounce.trajectory.motion import (
     FunctionMotion as FunctionMotion,
     SplineMotion as SplineMotion,
 )
+from jounce.trajectory.piecewise import PiecewiseMotion as PiecewiseMotion
 from jounce.trajectory.polynomial import PolynomialMotion as PolynomialMotion
 from jounce.trajectory.profiles import (
     AbstractProfile as AbstractProfile,

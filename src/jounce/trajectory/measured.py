@@ -14,6 +14,7 @@ from jaxtyping import Float
 from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet
 from jounce.shapes import ArrayLike
+from jounce.trajectory.beyond import CLOSED
 from jounce.trajectory.checks import whole_number
 from jounce.trajectory.motion import SplineMotion, Untraced
 from jounce.trajectory.sample_errors import derivative_errors
@@ -21,7 +22,7 @@ from jounce.trajectory.splines import integrated, spline_through
 from jounce.units.expression import Expression
 
 HIGHEST = 4  # derivative that can be measured: jounce
-BEYOND = ("refuse", "hold", "continue")
+BEYOND = ("refuse", "hold", "repeat", "advance", "continue")
 
 InitialValue = float | str | Expression | jax.Array
 
@@ -45,8 +46,9 @@ class MeasuredMotion(SplineMotion):
         that are expressions of parameters have their values from the mechanism that the law belongs to.
     degree : int, default 5
         Of the spline through the samples, from 1 to 11; that of the law is higher by `derivative`.
-    beyond : {"refuse", "hold", "continue"}, default "refuse"
-        What the law is before the first and after the last sample, as for `SplineMotion`.
+    beyond : {"refuse", "hold", "repeat", "advance", "continue"}, default "refuse"
+        What the law is before the first and after the last sample, as for `SplineMotion`. Where it is to repeat or to
+        advance, its derivatives must be at the last sample what they are at the first.
 
     Raises
     ------
@@ -65,6 +67,7 @@ class MeasuredMotion(SplineMotion):
 
     derivative: int = eqx.field(static=True)
     initial: Untraced = eqx.field(static=True)
+    way: str = eqx.field(static=True)
 
     def __init__(
         self,
@@ -77,14 +80,23 @@ class MeasuredMotion(SplineMotion):
     ):
         check_choice("beyond", beyond, BEYOND, MechanismError)
         self.derivative = whole_number("derivative", derivative, 1, HIGHEST, error=MechanismError)
-        samples, ends, pieces, _ = spline_through(times, values, degree)
+        repeats = beyond in ("repeat", "advance")
+        samples, ends, pieces, open_by = spline_through(times, values, degree, "repeat" if repeats else beyond)
+        if open_by:
+            message = "samples of a derivative that repeat must end at the value they begin with; the last differs by"
+            raise MechanismError(message, name="values", value=open_by)
         for _ in range(self.derivative):
             pieces = integrated(pieces, np.diff(ends))
         self.initial = Untraced(_checked(initial, self.derivative))
         known = [np.nan if isinstance(x, Expression) else x for x in self.initial.value]
         if any(isinstance(x, Tracer) for x in known):
             self.initial = Untraced(())  # a tracer must not outlive its trace
-        self._set(ends[:-1], _started(pieces, ends, known), ends[-1], beyond, samples=samples)
+        whole, advance = _started(pieces, ends, known), 0.0
+        if repeats and not self._open:
+            advance = _advance(whole, ends, self.derivative, beyond)
+        way = "repeat" if beyond == "advance" else beyond
+        self._set(ends[:-1], whole, ends[-1], way, advance, samples=samples)
+        self.way = beyond
 
     def resolved(self, parameters: Mapping[str, Any]) -> "MeasuredMotion":
         """Return the law with numbers in the place of its expressions of parameters."""
@@ -93,7 +105,7 @@ class MeasuredMotion(SplineMotion):
         known = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in self.initial.value]
         times, values = self.samples.value
         degree = self.degree - self.derivative
-        return MeasuredMotion(times, values, self.derivative, known, degree, self.beyond)
+        return MeasuredMotion(times, values, self.derivative, known, degree, self.way)
 
     @property
     def _open(self) -> list[str]:
@@ -128,6 +140,25 @@ def _started(
     ]
     namespace = jnp if any(isinstance(x, Tracer) for x in initial) else np
     return namespace.concatenate([pieces[: len(added)] + namespace.stack(added), pieces[len(added) :]])
+
+
+def _advance(pieces: Any, ends: Float[np.ndarray, " breakpoints"], derivative: int, beyond: str) -> Any:
+    """Return by how much a law goes on from one period to the next, whose derivatives must begin as they end."""
+    length = ends[-1] - ends[-2]
+    gains = []
+    for level in range(derivative):
+        end = sum(c * math.perm(k, level) * length ** (k - level) for k, c in enumerate(pieces[:, -1]) if k >= level)
+        gains.append(end - math.factorial(level) * pieces[level, 0])
+    if any(isinstance(x, Tracer) for x in gains):
+        return gains[0] if beyond == "advance" else 0.0
+    for level, gain in enumerate(gains):
+        size = math.factorial(level) * float(np.max(np.abs(pieces[level]))) + abs(float(gain))
+        if abs(float(gain)) > CLOSED * size and (level or beyond == "repeat"):
+            what = f"its derivative {level}" if level else "the law"
+            told = "change the samples or initial" if level else "close it, or choose beyond: advance"
+            message = f"samples of a derivative that repeat: {what} ends {float(gain):.6g} from where it began; {told}"
+            raise MechanismError(message, name="beyond", value=beyond)
+    return float(gains[0]) if beyond == "advance" else 0.0
 
 
 def _checked(initial: Any, derivative: int) -> tuple[Any, ...]:

@@ -15,6 +15,7 @@ from jounce.jet import Jet, compose
 from jounce.jet.pieces import last_begun
 from jounce.modules import Module, Untraced
 from jounce.shapes import ArrayLike, Numbers, Real, is_traced
+from jounce.trajectory.beyond import check_within, continued
 from jounce.trajectory.sample_errors import derivative_errors
 from jounce.trajectory.splines import spline_through
 from jounce.units.expression import Expression
@@ -98,8 +99,7 @@ class FunctionMotion(AbstractMotion):
         return compose(self.function, time)
 
 
-BEYOND = ("refuse", "hold", "repeat", "continue")
-SLACK = 1e-9  # of the duration: how far rounding may take an instant out of the samples
+BEYOND = ("refuse", "hold", "repeat", "advance", "continue")
 
 
 class SplineMotion(AbstractMotion):
@@ -116,10 +116,11 @@ class SplineMotion(AbstractMotion):
         Samples of the driven quantity, m or rad.
     degree : int, default 5
         From 1 to 11; odd degrees interpolate best. At least ``degree + 1`` samples are needed.
-    beyond : {"refuse", "hold", "repeat", "continue"}, default "refuse"
+    beyond : {"refuse", "hold", "repeat", "advance", "continue"}, default "refuse"
         What the law is before the first and after the last sample: nothing (an error), the value there, at rest; the
         samples once more, as one period of a smooth motion whose last sample is the first one (or whole turns of 2 pi
-        from it: then the law goes on turning); or what the polynomials at the ends make of it.
+        from it: then the law goes on turning); once more from where they ended; or what the polynomials at the ends
+        make of it.
 
     Raises
     ------
@@ -150,8 +151,8 @@ class SplineMotion(AbstractMotion):
 
     def __init__(self, times: ArrayLike, values: ArrayLike, degree: int = 5, beyond: str = "refuse"):
         check_choice("beyond", beyond, BEYOND, MechanismError)
-        samples, ends, pieces, advance = spline_through(times, values, degree, repeats=beyond == "repeat")
-        self._set(ends[:-1], pieces, ends[-1], beyond, advance, samples)
+        samples, ends, pieces, advance = spline_through(times, values, degree, beyond)
+        self._set(ends[:-1], pieces, ends[-1], "repeat" if beyond == "advance" else beyond, advance, samples)
 
     def _set(
         self,
@@ -183,17 +184,8 @@ class SplineMotion(AbstractMotion):
 
     def check_instants(self, first: float, last: float) -> None:
         """Raise MechanismError if the law says nothing of some instants from a first to a last one, s."""
-        if self.beyond != "refuse":
-            return
-        start, stop = float(self.breakpoints[0]), float(self.stop)
-        slack = SLACK * (stop - start)
-        if first < start - slack or last > stop + slack:
-            asked = last if last > stop + slack else first
-            message = (
-                f"the samples go from {start:.9g} to {stop:.9g} s, and the law is not defined beyond them"
-                "; stay within them, or choose beyond: hold or repeat"
-            )
-            raise MechanismError(message, value=float(asked))
+        if self.beyond == "refuse":
+            check_within(first, last, float(self.breakpoints[0]), float(self.stop), "samples")
 
     def __call__(self, time: Jet) -> Jet:
         """Return the jet of the law at the instants of the time jet.
@@ -212,21 +204,8 @@ class SplineMotion(AbstractMotion):
 
     def _evaluated(self, time: Jet) -> Jet:
         """Return the jet of the law, NaN at instants that it refuses."""
-        instants = time.coefficients[0]
         first, stop = jnp.asarray(self.breakpoints)[0], jnp.asarray(self.stop)
-        slack = SLACK * (stop - first)
-        outside = (instants < first - slack) | (instants > stop + slack)
-        if self.beyond == "refuse":
-            return self._within(time).dense().map(lambda c: jnp.where(outside, jnp.nan, c))
-        if self.beyond == "hold":
-            held = [jnp.clip(instants, first, stop), *(jnp.zeros_like(instants),) * time.order]
-            return self._within(
-                Jet(jnp.where(outside, h, c) for h, c in zip(held, time.dense().coefficients, strict=True))
-            )
-        if self.beyond == "repeat":
-            periods = jnp.floor((instants - first) / (stop - first))
-            return self._within(time - periods * (stop - first)) + periods * jnp.asarray(self.advance)
-        return self._within(time)
+        return continued(self._within, time, first, stop, self.beyond, self.advance)
 
     def _within(self, time: Jet) -> Jet:
         """Return the jet of the polynomials at the instants; outside, those at the ends go on."""

@@ -11,6 +11,7 @@ from jaxtyping import Float
 from jounce.errors import TrajectoryError, check_choice, check_name
 from jounce.jet import Jet, sin
 from jounce.shapes import Numbers, is_traced
+from jounce.trajectory.beyond import CLOSED
 from jounce.trajectory.knots import knot_jumps
 from jounce.trajectory.motion import SplineMotion, Untraced
 from jounce.trajectory.segment_pieces import (
@@ -26,7 +27,6 @@ from jounce.trajectory.trapezoid import LIMITS
 from jounce.units.expression import Expression
 
 BEYOND = ("hold", "repeat", "advance")
-CLOSED = 1e-9  # of the range of a law: so near to where it began it ends there
 MOST_CONDITIONS = 10  # derivatives that a polynomial is given at an end
 
 

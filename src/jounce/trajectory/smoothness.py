@@ -9,9 +9,11 @@ from jaxtyping import Float, Int
 from jounce.jet import Jet
 from jounce.jet.compose import Composed
 from jounce.trajectory.checks import whole_number
-from jounce.trajectory.composed import FollowingMotion, OutputMotion, PiecewiseMotion
+from jounce.trajectory.composed import FollowingMotion, OutputMotion
+from jounce.trajectory.integrated import IntegratedMotion
 from jounce.trajectory.knots import SMOOTH, Jumps, derivative_sizes, knot_jumps
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion, SplineMotion
+from jounce.trajectory.piecewise import PiecewiseMotion
 from jounce.trajectory.profiles import AbstractProfile
 from jounce.trajectory.user_laws import ReadMotion
 
@@ -100,7 +102,7 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
     """
     whole_number("order", order, 0, HIGHEST)
     instants, jumps, unknown = _jumps(law, first, last)
-    repeats = getattr(law, "beyond", "") == "repeat"
+    repeats = getattr(law, "beyond", "") in ("repeat", "advance")
     if periodic:  # its end is its beginning, and counts once; whatever else a law is there, it begins again
         near = SLACK * (last - first)
         inside = (instants < last - near) & ((instants > first + near) | repeats)
@@ -169,7 +171,7 @@ def known_jumps(
 
 def _is_of_polynomials(law: AbstractMotion) -> bool:
     """Tell whether a law is made of smooth pieces whose ends are known."""
-    if isinstance(law, PiecewiseMotion):
+    if isinstance(law, PiecewiseMotion | IntegratedMotion):
         return all(map(_is_of_polynomials, law.parts))
     return isinstance(law, SplineMotion | AbstractProfile)
 
@@ -185,10 +187,15 @@ def _jumps(
         case FollowingMotion() if law.parts:
             following, leader = law.parts
             return _followed(following, leader, first, last, order)
+        case IntegratedMotion() if law.parts:
+            instants, sizes, unknown = _jumps(law.parts[0], first, last, max(order - 1, 0))
+            return instants, np.concatenate([np.zeros((1, len(instants))), sizes])[: order + 1], unknown
         case PiecewiseMotion() if law.parts:
             return _of_pieces(law, first, last, order)
         case SplineMotion():
-            return *_repeated(law, knot_jumps(law, order), first, last), ""
+            start = float(np.asarray(law.breakpoints)[0])
+            repeats = law.beyond == "repeat"
+            return *_repeated(knot_jumps(law, order), start, float(law.stop), first, last, repeats=repeats), ""
         case AbstractProfile():
             return *_within(*_profile_jumps(law, order), first, last), ""
         case ExpressionMotion():
@@ -203,12 +210,12 @@ def _jumps(
 
 
 def _repeated(
-    law: SplineMotion, jumps: Jumps, first: float, last: float
+    jumps: Jumps, start: float, stop: float, first: float, last: float, *, repeats: bool
 ) -> tuple[Float[np.ndarray, " all"], Float[np.ndarray, "levels all"]]:
     """Return the jumps within a time, those of all periods where the law repeats."""
     instants, sizes = jumps
-    if law.beyond == "repeat" and len(instants):
-        start, period = float(np.asarray(law.breakpoints)[0]), float(law.stop) - float(np.asarray(law.breakpoints)[0])
+    if repeats and len(instants):
+        period = stop - start
         since = np.arange(np.floor((first - start) / period), np.floor((last - start) / period) + 1)
         since = since[: max(MOST_CROSSINGS // len(instants), 1)]
         instants = (instants + period * since[:, None]).ravel()
@@ -234,17 +241,21 @@ def _profile_jumps(law: AbstractProfile, order: int) -> Jumps:
 
 def _of_pieces(law: PiecewiseMotion, first: float, last: float, order: int) -> tuple[np.ndarray, np.ndarray, str]:
     """Return the jumps between pieces, and those that pieces have themselves."""
-    instants, sizes = law.jumps(order)
-    inside = (instants >= first) & (instants <= last)
-    found = [(instants[inside], sizes[:, inside], "")]
-    begins, ends = (-np.inf, *law.until), (*law.until, np.inf)
+    found = [(*law.jumps(order), "")]
+    bounded = law.beyond != "continue"
+    whole = (float(law.start), float(law.until[-1])) if bounded else (first, last)
+    inner = law.until[: len(law.parts) - 1]
+    begins, ends = (whole[0] if bounded else -np.inf, *inner), (*inner, whole[1] if bounded else np.inf)
     for part, begin, end in zip(law.parts, begins, ends, strict=True):
-        if first < end and last > begin:
-            own, jumps, unknown = _jumps(part, max(first, begin), min(last, end), order)
+        if whole[0] < end and whole[1] > begin:
+            own, jumps, unknown = _jumps(part, max(whole[0], begin), min(whole[1], end), order)
             within = (own > begin) & (own < end)
             found.append((own[within], jumps[:, within], unknown))
     parts = list(zip(*found, strict=True))
-    return np.concatenate(parts[0]), np.concatenate(parts[1], axis=1), "; ".join(dict.fromkeys(filter(None, parts[2])))
+    jumps = np.concatenate(parts[0]), np.concatenate(parts[1], axis=1)
+    repeats = law.beyond in ("repeat", "advance")
+    within = _repeated(jumps, *whole, first, last, repeats=repeats)
+    return *within, "; ".join(dict.fromkeys(filter(None, parts[2])))
 
 
 def _followed(

@@ -9,17 +9,17 @@ from jaxtyping import Float
 from jounce.errors import MechanismError
 from jounce.jet.turns import whole_periods
 from jounce.shapes import ArrayLike
+from jounce.trajectory.beyond import CLOSED
 from jounce.trajectory.checks import check_samples, whole_number
 
 _Samples = Float[np.ndarray, " samples"]
 _Breakpoints = Float[np.ndarray, " breakpoints"]
 _Pieces = Float[np.ndarray, "powers pieces"]
 HIGHEST_DEGREE = 11
-CLOSED = 1e-9  # how nearly samples that repeat come back to their first value, over their range
 
 
 def spline_through(
-    times: ArrayLike, values: ArrayLike, degree: int, *, repeats: bool = False
+    times: ArrayLike, values: ArrayLike, degree: int, beyond: str = "refuse"
 ) -> tuple[tuple[_Samples, _Samples], _Breakpoints, _Pieces, float]:
     """Return checked samples, and the spline through them.
 
@@ -29,8 +29,8 @@ def spline_through(
         Samples, the times increasing.
     degree : int
         From 1 to 11; odd where the samples repeat.
-    repeats : bool, default False
-        Whether they are one period, at whose end the spline goes on smoothly at its beginning.
+    beyond : str, default "refuse"
+        With ``repeat`` and ``advance`` they are one period, at whose end the spline goes on smoothly at its beginning.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def spline_through(
     coefficients : ndarray of shape (degree + 1, pieces)
         Of the powers of the time since the beginning of each piece, lowest first.
     advance : float
-        From one period to the next: 0, or whole turns, rad.
+        From one period to the next: 0, whole turns, rad, or with ``advance`` whatever it is.
 
     Raises
     ------
@@ -56,7 +56,10 @@ def spline_through(
         message = f"a spline of degree {degree} needs at least {degree + 1} samples; give more, or lower the degree"
         raise MechanismError(message, value=len(times))
     try:
-        found = _periodic(times, values, degree) if repeats else (*_interpolated(times, values, degree), 0.0)
+        if beyond in ("repeat", "advance"):
+            found = _periodic(times, values, degree, beyond)
+        else:
+            found = (*_interpolated(times, values, degree), 0.0)
     except (np.linalg.LinAlgError, ValueError):
         message = "no spline goes through the samples: too uneven or too large; sample evenly"
         raise MechanismError(message, value=float(np.diff(times).min())) from None
@@ -116,15 +119,17 @@ def _interpolated(times: _Samples, values: _Samples, degree: int, **ends: Any) -
     return np.where(rounded, times[near], breakpoints), powers
 
 
-def _periodic(times: _Samples, values: _Samples, degree: int) -> tuple[_Breakpoints, _Pieces, float]:
+def _periodic(times: _Samples, values: _Samples, degree: int, beyond: str) -> tuple[_Breakpoints, _Pieces, float]:
     """Return breakpoints, coefficients and advance of a spline that goes on smoothly from its end at its beginning."""
     if degree % 2 == 0:
         raise MechanismError("samples that repeat need a spline of odd degree", value=degree)
     difference, span = float(values[-1] - values[0]), float(np.ptp(values)) or 1.0
-    advance = float(whole_periods(difference))
+    advance = float(whole_periods(difference)) if beyond == "repeat" else difference
     if abs(difference - advance) > CLOSED * span:
         message = "samples that repeat must end at the value they begin with, or whole turns (in rad) from it"
-        raise MechanismError(f"{message}; the last one differs by", value=difference)
+        raise MechanismError(
+            f"{message}; choose beyond: advance, or close them: the last one differs by", value=difference
+        )
     slope = advance / (times[-1] - times[0])
     level = values - slope * (times - times[0])
     level[-1] = level[0]

@@ -16,8 +16,9 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError
 from jounce.jet import Jet
-from jounce.trajectory.composed import FollowingMotion, PiecewiseMotion
+from jounce.trajectory.composed import FollowingMotion
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, FunctionMotion, SplineMotion
+from jounce.trajectory.piecewise import PiecewiseMotion
 from jounce.trajectory.profiles import AbstractProfile
 from jounce.trajectory.segments import SegmentedMotion
 
@@ -90,7 +91,7 @@ def _values(law: AbstractMotion, grid: Values) -> Values:
         if not plain and _is_polynomial(own):  # it is followed from its beginning to its end, at some pace
             return _spline_values(own, np.linspace(float(own.breakpoints[0]), float(own.stop), len(grid)))
         return _values(own, _values(leader, grid))
-    if isinstance(law, PiecewiseMotion) and law.parts:
+    if isinstance(law, PiecewiseMotion) and law.parts and law.beyond == "continue":
         piece = np.searchsorted(np.array(law.until, float), grid, side="right")
         own = [grid[piece == k] for k in range(len(law.parts))]
         return np.concatenate([_values(part, x) for part, x in zip(law.parts, own, strict=True) if len(x)])

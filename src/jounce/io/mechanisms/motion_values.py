@@ -11,10 +11,13 @@ from pydantic_core import PydanticCustomError
 from jounce.errors import UNSET, no_such, show_value, unknown
 from jounce.io.files.samples import rates
 from jounce.io.mechanisms.segment_values import (
+    EXPRESSION_KEYS,
     LEADER_SCHEMA,
     PIECEWISE_KEYS,
     PROFILE_KEYS,
     bases,
+    expressed,
+    expression_schema,
     leader,
     piecewise,
     piecewise_schema,
@@ -36,13 +39,14 @@ from jounce.trajectory.measured import HIGHEST as MOST
 from jounce.trajectory.splines import HIGHEST_DEGREE
 from jounce.units.dimensions import TIME, Dimension
 
-WAYS = ("refuse", "hold", "repeat")
+WAYS = ("refuse", "hold", "repeat", "advance")
 
 
 class Samples(BaseModel):
     """A motion law through samples: a CSV file, the degree of the spline, and the columns of time and value.
 
-    Beyond the samples there is no law, unless it is to hold the value at the end, or to repeat them as one period. Of a
+    Beyond the samples there is no law, unless it is to hold the value at the end, to repeat them as one period, or to
+    advance: to repeat them from where they ended. Of a
     law whose derivative was measured, such as 2, the acceleration, initial holds the value, the velocity and so on at
     the first sample, zero unless given. Of a law of the coordinate of another driver, `of` is the driver's name, or
     an expression of t, and the column of the time is that of the coordinate.
@@ -53,7 +57,7 @@ class Samples(BaseModel):
     degree: int = Field(default=5, ge=1, le=11)
     time: str | None = None
     value: str | None = None
-    beyond: Literal["refuse", "hold", "repeat"] = "refuse"
+    beyond: Literal["refuse", "hold", "repeat", "advance"] = "refuse"
     derivative: int = Field(default=0, ge=0, le=MOST)
     initial: tuple[Any, ...] = ()
     of: Any = None
@@ -76,7 +80,7 @@ class OutputLaw:
 
 
 FORMS = {
-    "expression": ("expression",),
+    "expression": EXPRESSION_KEYS,
     "samples": tuple(Samples.model_fields),
     "profile": PROFILE_KEYS,
     "piecewise": PIECEWISE_KEYS,
@@ -92,12 +96,13 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) 
     def check(raw: object, info: Any) -> Any:
         if not isinstance(raw, dict):
             return parse(raw, quantity, info, variables=variables).value
-        if raw.keys() == {"expression"}:
-            return parse(raw["expression"], quantity, info, "expression", variables=variables).value
         form = next((key for key in FORMS if key in raw), None)
         valid = list(FORMS[form]) if form else sorted({key for keys in FORMS.values() for key in keys})
-        for key in raw.keys() - set(valid):
+        allowed = {*valid, "beyond", "until"} if form == "expression" else set(valid)
+        for key in raw.keys() - allowed:
             raise problem(unknown(f"key {show_value(key)}", key, valid), key, value=UNSET)
+        if form == "expression":
+            return expressed(raw, quantity, info, variables)
         if form == "profile":
             return segmented(raw, quantity, info)
         if form == "piecewise":
@@ -122,7 +127,7 @@ def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) 
         title = spline["properties"][key]["title"]
         spline["properties"][key] = {"title": title, "type": "string", "description": words}
     forms = [
-        object_schema({"expression": law}),
+        expression_schema(law),
         defined("samples_law", spline),
         segmented_schema(),
         piecewise_schema(law),
@@ -178,8 +183,6 @@ def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
     derivative, initial, beyond = raw.get("derivative", 0), raw.get("initial", []), raw.get("beyond", WAYS[0])
     if beyond not in WAYS:
         raise problem(unknown("way", beyond, WAYS), "beyond", value=beyond)
-    if derivative and beyond == "repeat":
-        raise problem("samples of a derivative cannot repeat; valid: refuse, hold", "beyond", value=beyond)
     if not isinstance(initial, list | tuple) or len(initial) > derivative:
         message = f"must be a list of at most {derivative} values: the law and its derivatives below the measured one"
         raise problem(message, "initial", value=initial)

@@ -18,6 +18,7 @@ from jounce.trajectory import (
     ExpressionMotion,
     FollowingMotion,
     HermiteMotion,
+    IntegratedMotion,
     MeasuredMotion,
     OutputMotion,
     PiecewiseMotion,
@@ -58,6 +59,8 @@ class WrittenLaws:
             return [self.written(place, entry, element) for entry in law]
         if isinstance(law, TimeLaw):
             law = law.motion
+        if isinstance(law, str | Expression | numbers.Real):
+            return plain(law, place)
         if isinstance(law, OutputMotion):
             return {"output": law.output, "law": self.written(f"{place}.law", law.law, element)}
         if isinstance(law, FollowingMotion):
@@ -66,14 +69,12 @@ class WrittenLaws:
             return _segmented(place, law)
         if isinstance(law, PiecewiseMotion):
             return _piecewise(place, law)
+        if isinstance(law, IntegratedMotion):
+            return self._integrated(place, law, element)
         if isinstance(law, SplineMotion):
             return self._spline(place, law)
-        if isinstance(law, ExpressionMotion):
+        if isinstance(law, ExpressionMotion) or (isinstance(law, ExpressionLaw) and _own_names(law, element)):
             return _substituted(law.expression, law.parameters)
-        if isinstance(law, ExpressionLaw) and _own_names(law, element):
-            return _substituted(law.expression, law.parameters)
-        if isinstance(law, str | Expression | numbers.Real):
-            return plain(law, place)
         message = f"a {type(law).__name__} has no form in a file; give an expression, or a spline through samples"
         raise MechanismError(message, name=place)
 
@@ -96,15 +97,35 @@ class WrittenLaws:
         if isinstance(law, MeasuredMotion):
             found |= {"degree": law.degree - law.derivative, "derivative": law.derivative}
             found["initial"] = plain(law.initial.value, f"{place}.initial")
+        beyond = "advance" if beyond == "repeat" and float(law.advance) else beyond
         return found if beyond == "refuse" else found | {"beyond": beyond}
+
+    def _integrated(self, place: str, law: IntegratedMotion, element: Any) -> dict[str, Any]:
+        """Return a law of which a derivative is given."""
+        _, given, initial, start = law.recipe.value
+        if not isinstance(given, PiecewiseMotion | ExpressionMotion | SegmentedMotion | Expression | str):
+            message = f"a {type(given).__name__} as a derivative has no form in a file; give expressions or segments"
+            raise MechanismError(message, name=place)
+        found = self.written(place, given, element)
+        found = found if isinstance(found, dict) else {"expression": found}
+        values = [plain(x, f"{place}.initial") for x in initial]
+        if isinstance(given, SegmentedMotion):
+            values.append(found.pop("initial", 0.0))
+        ends = isinstance(given, SegmentedMotion) or (isinstance(given, PiecewiseMotion) and given.beyond != "continue")
+        if ends and found.get("start", 0.0) != plain(start, place):
+            message = "a derivative that begins elsewhere than its own law has no form in a file"
+            raise MechanismError(message, name=place, value=found.get("start", 0.0))
+        found |= {"derivative": law.derivative, "initial": values}
+        return found if plain(start, place) == 0.0 else found | {"start": plain(start, place)}
 
     def _following(self, place: str, law: FollowingMotion, element: Any) -> dict[str, Any]:
         """Return a law of the coordinate of a driver, by its name, or of an expression of t."""
         followed, leader = law.recipe.value[0]
-        if isinstance(followed, PiecewiseMotion | ExpressionMotion | FollowingMotion | TrapezoidalMotion):
+        if isinstance(followed, FollowingMotion | OutputMotion | TrapezoidalMotion):
             message = f"a {type(followed).__name__} of another coordinate has no form in a file; use segments"
             raise MechanismError(message, name=place)
         found = self.written(place, followed, element)
+        found = found if isinstance(found, dict) else {"expression": found}
         for name, driver in self.drivers.items():
             if driver is not element and _same(getattr(driver, "motion", None), leader):
                 return found | {"of": name}
@@ -134,7 +155,7 @@ def _segmented(place: str, law: SegmentedMotion) -> dict[str, Any]:
 
 def _piecewise(place: str, law: PiecewiseMotion) -> dict[str, Any]:
     """Return expressions that follow each other."""
-    parts, entries = law.recipe.value[0], []
+    (parts, ends, start, beyond), entries = law.recipe.value, []
     for k, part in enumerate(parts):
         if isinstance(part, ExpressionMotion):
             text = _substituted(part.expression, part.parameters)
@@ -143,8 +164,11 @@ def _piecewise(place: str, law: PiecewiseMotion) -> dict[str, Any]:
         else:
             message = f"a {type(part).__name__} within a piecewise law has no form in a file; give expressions"
             raise MechanismError(message, name=place)
-        entries.append({"expression": text} | ({"until": plain(law.until[k], place)} if k < len(law.until) else {}))
-    return {"piecewise": entries}
+        entries.append({"expression": text} | ({"until": plain(ends[k], place)} if k < len(ends) else {}))
+    found: dict[str, Any] = {"piecewise": entries}
+    if start is not None:
+        found["start"] = plain(start, place)
+    return found if beyond == "refuse" else found | {"beyond": beyond}
 
 
 def _samples_of(law: SplineMotion) -> tuple[Any, Any]:

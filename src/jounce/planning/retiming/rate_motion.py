@@ -13,7 +13,7 @@ from jounce.jet import Jet
 from jounce.jet.pieces import last_begun
 from jounce.shapes import ArrayLike
 from jounce.trajectory import AbstractMotion
-from jounce.trajectory.motion import SLACK
+from jounce.trajectory.beyond import SLACK
 
 NODES = 16  # of Gauss's quadrature on a piece
 NEWTON = 8  # steps: the time over a piece is smooth and grows everywhere
