@@ -88,6 +88,12 @@ PICTURES = {
     "double_cardan": Picture(("rim",), 0.1, view=(-70.0, 40.0)),
     "double_four_bar": Picture(("tip",), 0.25, stop=1.5),
     "double_pendulum": Picture(("tip",), 0.4, stop=2.0),
+    "double_wishbone": Picture(
+        ("contact", "wheel"),
+        0.6,
+        points={"contact": ("upright", (0, 0.78, 0)), "top": ("upright", (0, 0.78, 0.6))},
+        view=(-20.0, 20.0),
+    ),
     "epicyclic": Picture(("tooth",), 0.4),
     "excavator": Picture(("teeth",), 1.0),
     "five_bar": robot(

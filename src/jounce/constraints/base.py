@@ -28,6 +28,7 @@ Vector = Annotated[Any, "vector"]
 MotionLaw = Annotated[Any, "motion"]
 Wrenches = Annotated[Any, "wrenches"]
 Whole = Annotated[int, "whole"]
+Nested = Annotated[Any, "nested"]  # an element within another
 
 SPACES = ("planar", "spatial")
 ROLES = ("joint", "driver", "force")
@@ -203,7 +204,7 @@ def check_bodies(element: Any, counts: tuple[int, ...], does: str = "joins", mus
         noun = "body" if counts == (1,) else "bodies"
         message = f"{name} {does} {' or '.join(map(str, counts))} {noun}"
         raise MechanismError(message, name="bodies", value=list(element.bodies))
-    if len(set(element.bodies)) != len(element.bodies):
+    if len(set(element.bodies)) != len(element.bodies) and not getattr(element, "may_repeat", False):
         message = f"{name} must {must} different bodies, not a body with itself"
         raise MechanismError(message, name="bodies", value=list(element.bodies))
 

@@ -9,11 +9,19 @@ from jounce.mechanism.attitude_outputs import (
     RotationMatrixOutput as RotationMatrixOutput,
 )
 from jounce.mechanism.builder import Model as Model, build as build
+from jounce.mechanism.derivative_outputs import DerivativeOutput as DerivativeOutput
 from jounce.mechanism.driver_outputs import (
     DriverAngleOutput as DriverAngleOutput,
     DriverDisplacementOutput as DriverDisplacementOutput,
 )
 from jounce.mechanism.held_outputs import with_outputs_held as with_outputs_held
+from jounce.mechanism.linkage_outputs import (
+    InstantCenterOutput as InstantCenterOutput,
+    ProjectedAngleOutput as ProjectedAngleOutput,
+    RollCenterOutput as RollCenterOutput,
+    SpatialInstantCenterOutput as SpatialInstantCenterOutput,
+    SymmetricRollCenterOutput as SymmetricRollCenterOutput,
+)
 from jounce.mechanism.mechanism import Body as Body, Mechanism as Mechanism, check_mechanism as check_mechanism
 from jounce.mechanism.outputs import (
     AbstractMotionOutput as AbstractMotionOutput,

@@ -10,6 +10,7 @@ from jounce.constraints import AbstractConstraint
 from jounce.display import Displayed
 from jounce.errors import ExpressionError, JounceError, MechanismError, check_choice, check_name
 from jounce.forces import AbstractForce
+from jounce.mechanism.derivative_outputs import bound
 from jounce.mechanism.outputs import AbstractQuantity
 from jounce.mechanism.redundant_reactions import RedundantReactions, check_redundant_reactions
 from jounce.mechanism.resolve import parameter_value
@@ -176,6 +177,7 @@ class Mechanism(Displayed):
         if not self.bodies:
             raise MechanismError("a mechanism needs at least one moving body", name="bodies", value=dict(self.bodies))
         self._check_names()
+        object.__setattr__(self, "outputs", bound(self.outputs, self))
         check_redundant_reactions(self.redundant_reactions, (*self.joints, *self.drivers))
         self._check_assembly()
         for kind, elements in self.elements.items():

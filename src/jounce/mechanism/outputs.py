@@ -10,7 +10,9 @@ import equinox as eqx
 from jounce.constraints.angles import relative_angle
 from jounce.constraints.base import Vector, check_bodies, check_words
 from jounce.constraints.facts import USUAL_DIMENSIONS, USUAL_SIGNS
+from jounce.constraints.planar import length_of
 from jounce.jet import Jet, sqrt
+from jounce.jet.rounding import told_in_plane
 from jounce.modules import Module
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.orientation import FRAMES
@@ -77,6 +79,7 @@ class AbstractOutput(AbstractQuantity):
     turning: ClassVar[bool] = False  # an angle known up to whole turns, made continuous along the motion
     wraps: ClassVar[tuple[bool, ...]] = ()  # which components are angles in a range, continued once all are known
     body_count: ClassVar[int] = 1
+    may_repeat: ClassVar[bool] = False  # whether a body may be named more than once
 
     def __check_init__(self):
         check_bodies(self, (self.body_count,), "takes", "be of")
@@ -114,6 +117,7 @@ class RelativeAngleOutput(AbstractOutput):
     """Signed angle about an axis of body i, from a vector of body i to one of body j, rad, continuous over turns.
 
     Without vectors it is the angle of ``A_i^T A_j`` where the mechanism is put together, and the turn from there.
+    Vectors are seen along the axis: where one has no part across it there is no angle.
     """
 
     axis: Vector
@@ -128,7 +132,11 @@ class RelativeAngleOutput(AbstractOutput):
     never_parallel = (("vector_i", "axis"),)
 
     def evaluate(self, body_i: SpatialPose, body_j: SpatialPose) -> Jet:
-        return relative_angle(body_i, body_j, self.axis, self.vector_i, self.vector_j, self.datum)
+        angle = relative_angle(body_i, body_j, self.axis, self.vector_i, self.vector_j, self.datum)
+        if self.vector_j is None:
+            return angle
+        line, axis = body_j.direction(self.vector_j), body_i.direction(self.axis / length_of(self.axis)[None])
+        return told_in_plane(angle, line - line.dot(axis) * axis, line)
 
 
 class PlanarRelativeAngleOutput(AbstractOutput):

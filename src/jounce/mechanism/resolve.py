@@ -231,6 +231,9 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
                 check_value(kind, value, components, facts.signs[field_name])
             elif kind == "wrenches":
                 value = _wrenches(resolve(value, parameters))
+            elif kind == "nested":  # the bodies are those of the whole
+                found = resolve_element(value, parameters, components, name)
+                value = unchecked(type(value), {**vars(value), **found, "bodies": ()})
         except JounceError as error:
             raise error.located(name=f"{name}.{field_name}") from None
         values[field_name] = value

@@ -1,8 +1,8 @@
 """Units in which results are shown and written; inside, everything is in SI.
 
 A unit is chosen for a kind of quantity, or for an output by its name. Derivatives follow, by s: an angle in deg has
-velocities in deg/s. What is composed of lengths and angles does not follow from them: a torque stays in N m, whatever
-the unit of length, unless a unit of torque is chosen.
+velocities in deg/s, and quotients: an angle over a length is in deg/mm where these are chosen. Products of lengths and
+forces do not follow from them: a torque stays in N m, whatever the unit of length, unless a unit of torque is chosen.
 """
 
 from __future__ import annotations
@@ -118,6 +118,8 @@ class ShownUnits:
     >>> units = ShownUnits({"angle": "deg", "length": "mm"})
     >>> units.of("rad/s"), units.of("N*m")
     (('deg/s', 57.29577951308232), ('N*m', 1.0))
+    >>> units.of("rad/m^2")
+    ('deg/mm^2', 5.729577951308232e-05)
     """
 
     chosen: Mapping[str, str] = field(default_factory=dict)
@@ -170,9 +172,20 @@ class ShownUnits:
             rate = re.search(r"/s(?:\^(\d+))?$", self.outputs[name])
             order -= int(rate[1] or 1) if rate else 0
             return derivative_unit(shown, order), 1.0 / unit_size(shown)[0]
+        above, *below = base.split("/")
+        (shown, factor), parts = self._of_base(above), []
+        for part in below:
+            known, _, exponent = part.partition("^")
+            unit_below, size = self._of_base(known)
+            parts.append(f"/{unit_below}" + (f"^{exponent}" if exponent else ""))
+            factor /= size ** int(exponent or 1)
+        return derivative_unit("".join([shown, *parts]), order), factor
+
+    def _of_base(self, base: str) -> tuple[str, float]:
+        """Return the unit in which a quantity of a kind is shown, and by what its values in SI are multiplied."""
         kind = next((kind for kind, (known, _) in QUANTITIES.items() if known == base), "")
         shown = self._chosen(kind, self._of_kind(kind))
-        return (derivative_unit(shown, order), 1.0 / unit_size(shown)[0]) if shown else (unit, 1.0)
+        return (shown, 1.0 / unit_size(shown)[0]) if shown else (base, 1.0)
 
     def merged(self, others: Mapping[str, str] | None) -> "ShownUnits":
         """Return these units with others in their place."""

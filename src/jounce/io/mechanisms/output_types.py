@@ -22,6 +22,12 @@ OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
     ("euler_angles", mechanism.EulerAnglesOutput),
     ("euler_angles", mechanism.RelativeEulerAnglesOutput),
     ("slide", SlideOutput),
+    ("projected_angle", mechanism.ProjectedAngleOutput),
+    ("instant_center", mechanism.InstantCenterOutput),
+    ("instant_center", mechanism.SpatialInstantCenterOutput),
+    ("roll_center", mechanism.RollCenterOutput),
+    ("roll_center", mechanism.SymmetricRollCenterOutput),
+    ("derivative", mechanism.DerivativeOutput),
     ("angle", mechanism.DriverAngleOutput),
     ("displacement", mechanism.DriverDisplacementOutput),
     ("force", dynamics.DriverForceOutput),
@@ -44,6 +50,7 @@ HOLDERS = {
     "bodies": "bodies",
     "body": "a body",
     "mechanism": "the mechanism",
+    "of": "an output",
 }
 """The keys that say what an output is of, and their words; the first that is there counts."""
 

@@ -19,6 +19,7 @@ from jounce.io.mechanisms.output_types import OUTPUTS, output_holder
 from jounce.io.mechanisms.written_laws import WrittenLaws
 from jounce.io.mechanisms.written_values import plain, plain_number
 from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid
+from jounce.mechanism.derivative_outputs import form_of
 from jounce.settings import under_own_settings
 from jounce.shapes import seconds
 
@@ -161,7 +162,7 @@ class _Writer:
         return found | self._values(place, element)
 
     def _output(self, name: str, output: Any) -> dict[str, Any]:
-        place, kind = f"outputs.{name}", type(output)
+        place, kind = f"outputs.{name}", form_of(output)
         words = [word for word, known in OUTPUTS if known is kind]
         if not words:
             raise MechanismError(f"the output {kind.__name__} has no form in a file", name=place)
@@ -171,16 +172,17 @@ class _Writer:
             found[holder] = output.bodies[0] if holder == "body" else list(output.bodies)
         elif holder == "mechanism":
             found["mechanism"] = True
-        values = self._values(place, output)
+        values = self._values(place, output, kind)
         if holder in values:
             found[holder] = values.pop(holder)
         if words[-1] is not None:  # of a joint, reaction rather than force
             found["quantity"] = words[-1]
         return found | values
 
-    def _values(self, place: str, element: Any) -> dict[str, Any]:
+    def _values(self, place: str, element: Any, kind: type[Any] | None = None) -> dict[str, Any]:
         """Return the values of an element by key; those that a file need not give are left out."""
-        kind, found = type(element), {}
+        kind = kind or type(element)
+        found: dict[str, Any] = {}
         fields = value_fields(kind)
         for key in file_keys(kind):
             values = [getattr(element, field) for field in key.fields]

@@ -35,6 +35,7 @@ from jounce.mechanism import (
 from jounce.mechanism.attitude_outputs import continued, euler_angles_of
 from jounce.mechanism.axis_angles import AttitudeHistory, at_lanes, attitudes_of, measures_angle
 from jounce.mechanism.builder import counted_as_in
+from jounce.mechanism.derivative_outputs import bound_alone
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
@@ -308,13 +309,30 @@ class Motion(Displayed):
         MechanismError
             If the output names a body, joint, driver or force that does not exist, or does not fit the mechanism.
         """
-        check_output(output, self.mechanism, name)
-        if isinstance(output, AbstractMotionOutput):
-            return self._labelled(name, self._derivatives(output.coefficients(self)), output)
+        given: Any = bound_alone(output, self.mechanism)
+        check_output(given, self.mechanism, name)
+        self._check_order(given, name)
+        if isinstance(given, AbstractMotionOutput):
+            return self._labelled(name, self._derivatives(given.coefficients(self)), given)
+        output = given
         group = output_group(output, self.mechanism, self.model, name)
         values = self._derivatives(self._continued(group, self._coefficients(group))[:, :, 0])
         self._check_finite(values, name)
         return self._labelled(name, values, output)
+
+    def series(self, output: AbstractQuantity) -> Float[Numbers, "order component time"]:
+        """Return the Taylor coefficients of any output, (levels, components, time), angles up to whole turns."""
+        if isinstance(output, AbstractMotionOutput):
+            return output.coefficients(self)
+        posed: Any = output
+        return self._coefficients(output_group(posed, self.mechanism, self.model))[:, :, 0]
+
+    def _check_order(self, output: AbstractQuantity, name: str) -> None:
+        """Raise MechanismError for an output that takes more derivatives than the motion has."""
+        levels = len(self._coordinates["position"])
+        if output.lost_orders >= levels:
+            message = f"needs the motion to order {output.lost_orders}, and it was solved to order {levels - 1}"
+            raise MechanismError(f"{message}: solve it to a higher order", name=name)
 
     def _check_finite(self, values: Float[np.ndarray, "time derivative *component"], name: str) -> None:
         """Raise MechanismError for the first instant that was solved and at which an output is not finite."""

@@ -17,6 +17,7 @@ from jounce.io.files.source import read_source
 from jounce.io.mechanisms.output_types import OUTPUTS, output_holder
 from jounce.kinematics.curves.choice import chosen
 from jounce.mechanism import Mechanism, Model, build, time_grid, with_outputs_held
+from jounce.mechanism.derivative_outputs import form_of
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve
 from jounce.mechanism.system import POSITION_COMPONENTS
@@ -320,8 +321,9 @@ def _law_words(law: Any) -> str:
 
 
 def _output(name: str, output: Any) -> dict[str, Any]:
-    words = [word for word, kind in OUTPUTS if kind is type(output)]
-    holder = output_holder(type(output))
-    of = list(output.bodies) or [getattr(output, holder, holder)]  # an energy may be that of the mechanism
+    form = form_of(output)
+    words, holder = [word for word, kind in OUTPUTS if kind is form], output_holder(form)
+    of = list(output.bodies) if form.body_count else []
+    of = of or [getattr(output, holder, holder)]  # an energy may be that of the mechanism
     quantity = (words[-1] if words else type(output).__name__) or "point"
     return {"name": name, "quantity": quantity, "unit": output.unit, "of": of}
