@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.limits.local_maxima import highest_of, local_heights
+from jounce.dynamics.limits.local_maxima import largest_indices, local_heights
 
 Times = Float[np.ndarray, " time"]
 Curves = Float[np.ndarray, "time curves"]
@@ -62,7 +62,7 @@ class Highest:
         if not len(height):
             return self._maxima
         places = np.arange(len(time))[inner]
-        top = highest_of(height, self._count)
+        top = largest_indices(height, self._count)
         index = places[top]
         heights = np.take_along_axis(height, top, axis=0)
         for k in range(1, self._count):  # one that stands twice, for want of others, counts once

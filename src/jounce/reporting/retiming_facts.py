@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from jounce.dynamics.limits.limit_report import LimitReport
-from jounce.dynamics.limits.trajectories import told_drives
+from jounce.dynamics.limits.trajectories import drives_note
 from jounce.planning import RetimedTrajectory
 from jounce.planning.retiming.path import Path as JointPath
 from jounce.reporting.json.results import limits_result
@@ -68,7 +68,7 @@ def retimed_words(
             f"({100 * (found.stop / free - 1):.2f} % slower)"
         )
     if what == "joint" and any(row.unit.startswith("N") for row in found.report.limited):
-        lines.append(f"torques: {told_drives(found.report.drives)}")
+        lines.append(f"torques: {drives_note(found.report.drives)}")
     lines += [*path_words(found.path), *ends_words(found.report.ends)]
     worst = found.report.worst
     if worst is not None and worst.ratio is not None:

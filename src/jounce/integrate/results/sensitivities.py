@@ -239,7 +239,7 @@ def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -
 @compiled(narrow=True)
 def _jacobian(equations: Equations, state: State, instant: Instants) -> Float[Numbers, "row column"]:
     """Return the Jacobian at a state."""
-    return equations.system.jacobian(equations.still(state.position, state.attitude), Jet([instant]))[..., 0]
+    return equations.system.jacobian(equations.pose_at_rest(state.position, state.attitude), Jet([instant]))[..., 0]
 
 
 @compiled(narrow=True)
@@ -255,7 +255,7 @@ def _assembled(
     It changes by the shortest step onto the constraints, as that of the assembly: `inverse` is that of the Jacobian.
     """
     position, attitude = guess
-    still = equations.still(position, attitude)
+    still = equations.pose_at_rest(position, attitude)
     gap = equations.system.residual(still, Jet([instant])).coefficients[0]
     column = -(inverse @ gap)
     pose = still.displaced(*equations.system.coordinates(column, still.shifts))
@@ -381,7 +381,7 @@ def _corrected(equations: Equations, state: State, time: Instants) -> State:
     state = state._replace(attitude=normalised(state.attitude))
     held, fixed = jax.lax.stop_gradient((equations, state))
     factor = held.factored(fixed, time)
-    still = equations.still(state.position, state.attitude)
+    still = equations.pose_at_rest(state.position, state.attitude)
     gap = equations.system.residual(still, Jet([time])).coefficients[0]
     pose = still.displaced(*equations.system.coordinates(equations.least_change(factor, gap), still.shifts))
     position, attitude = pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)

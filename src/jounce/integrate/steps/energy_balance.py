@@ -74,7 +74,7 @@ def is_balanced(equations: Equations, state: State, time: Instants) -> bool:
 
     It is looked at where a joint could be overlooked, at less than a tenth of the cost of a step.
     """
-    still, pose = equations.still(state.position, state.attitude), equations.pose(state)
+    still, pose = equations.pose_at_rest(state.position, state.attitude), equations.pose(state)
     groups, forces = equations.system.groups, equations.system.forces
     if not hiding(equations, state, time) or any(_is_moved(group, still, time) for group in groups):
         return False

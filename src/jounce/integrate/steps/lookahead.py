@@ -95,7 +95,7 @@ def hiding(equations: Equations, state: State, time: Instants) -> dict[int, Floa
 
     The law of a driver is looked at by itself.
     """
-    pose, clock = equations.still(state.position, state.attitude), Jet([time])
+    pose, clock = equations.pose_at_rest(state.position, state.attitude), Jet([time])
     found, first = {}, 0
     for k, group in enumerate(equations.system.groups):
         bare = law_left_out(group) if group.is_driver else group

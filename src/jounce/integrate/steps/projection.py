@@ -45,12 +45,12 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
 
     def correction(position: Any, attitude: Any) -> tuple[Any, Any]:
         factor = equations.factored(state._replace(position=position, attitude=attitude), time)
-        gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
+        gap = equations.system.residual(equations.pose_at_rest(position, attitude), clock).coefficients[0]
         return factor, gap
 
     def moved(position: Any, attitude: Any, column: Any) -> tuple[Any, Any]:
         change = equations.system.coordinates(column, equations.pose_type.shifts)
-        pose = equations.still(position, attitude).displaced(*change)
+        pose = equations.pose_at_rest(position, attitude).displaced(*change)
         return pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)
 
     def iterate(carry: Any) -> Any:
@@ -69,7 +69,7 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
     moving = equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)
     fulfilled = last <= 1e-9
     if equations.system.rank is not None:
-        gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
+        gap = equations.system.residual(equations.pose_at_rest(position, attitude), clock).coefficients[0]
         fulfilled &= jnp.max(jnp.abs(gap), axis=0) <= LARGEST_GAP
     return moving, jnp.where(fulfilled, first, jnp.inf), inverted(factor)
 

@@ -56,7 +56,7 @@ def measured(equations: Equations, state: State) -> AnglesOfForces:
     groups = [group for group in equations.system.forces if measures_angle(group)]
     if not groups:
         return ()
-    pose, clock = equations.still(state.position, state.attitude), Jet([jnp.zeros_like(state.position[:1, 0])])
+    pose, clock = equations.pose_at_rest(state.position, state.attitude), Jet([jnp.zeros_like(state.position[:1, 0])])
     shape = state.position.shape[-1:]
     found = [group.displacement(pose, clock).coefficients[0][0] for group in groups]
     return tuple(jnp.broadcast_to(angle, angle.shape[:1] + shape) for angle in found)

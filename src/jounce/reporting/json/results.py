@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits.limit_report import LimitReport
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
-from jounce.dynamics.limits.trajectories import told_drives
+from jounce.dynamics.limits.trajectories import drives_note
 from jounce.errors import UNSET, JounceError, show_value
 from jounce.kinematics import Motion, Stretches
 from jounce.reporting.facts.mechanism_facts import grid_facts
@@ -127,7 +127,7 @@ def torques_result(
         "rates": dataset.sizes["derivative"] - 1,
         "time": grid_facts(times),
         "held": [name for name in dataset.data_vars if name not in motion.names],
-        "drives": dataset.attrs["drives"] == told_drives(True),
+        "drives": dataset.attrs["drives"] == drives_note(True),
         "peaks": [{"joint": peak.pop("output"), **peak} for peak in told],
         "ends": ends_facts(ends),
         "between": between_facts(motion),

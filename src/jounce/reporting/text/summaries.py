@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits.limit_report import LimitReport
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
-from jounce.dynamics.limits.trajectories import told_drives
+from jounce.dynamics.limits.trajectories import drives_note
 from jounce.mechanism.time import last_step_words
 from jounce.reporting.motion_ends import between_words, breaks_words, ends_words
 from jounce.reporting.text.law_facts import law_words
@@ -141,7 +141,7 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
         held = [f"{name} at {value:.6g} {units[name]}" for name, value in report.held.items()]
         lines.append(f"not in the trajectory, held still: {', '.join(held)}")
     if any(row.unit.startswith("N") for row in report.limited):
-        lines.append(f"torques: {told_drives(report.drives)}")
+        lines.append(f"torques: {drives_note(report.drives)}")
     free: dict[str, list[str]] = {}
     for row in report.rows:
         if row.ratio is None:
