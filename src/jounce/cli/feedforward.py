@@ -95,7 +95,7 @@ def feedforward(
             report = found.report
             errors = link_errors(found) if simulate or figure is not None else None
     if not output.json:
-        say(facts.feedforward_words(found, getattr(found.system, "held", {})))
+        say(facts.feedforward_words(found, getattr(found.system, "resting_joints", {})))
         show_table(facts.drives_table(report), "bold red")
         if (table := facts.expansion_table(found)) is not None:
             show_table(table)

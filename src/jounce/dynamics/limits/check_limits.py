@@ -108,7 +108,7 @@ def check_limits(
     """
     drives, hand_over = flag("drives", drives, error=RobotError), flag("hand_over", hand_over, error=RobotError)
     followed = FollowedTrajectory(robot, trajectory)
-    resting = followed.held
+    resting = followed.resting_joints
 
     def curves(times: np.ndarray) -> np.ndarray:
         """Return all quantities of all joints, (time, 6, joints)."""

@@ -40,7 +40,7 @@ class FollowedTrajectory:
 
     Attributes
     ----------
-    held : dict of str to float
+    resting_joints : dict of str to float
         Joints that the trajectory does not name, and where they stand: at zero, or at the end of their range that is
         nearest to it.
     doubts : list of str
@@ -63,7 +63,7 @@ class FollowedTrajectory:
         self.columns = [robot.joint_names.index(name) for name in trajectory.names]
         resting = [name for name in robot.joint_names if name not in trajectory.names]
         limits = robot.limits if resting else {}
-        self.held = {name: _rest(limits[name]) for name in resting}
+        self.resting_joints = {name: _rest(limits[name]) for name in resting}
         self.doubts: list[str] = []
         if given:
             warn_of_degrees(robot, trajectory)
@@ -77,7 +77,7 @@ class FollowedTrajectory:
             If one is not finite.
         """
         q = np.zeros((len(times), order + 1, len(self.robot.joint_names)))
-        for name, value in self.held.items():
+        for name, value in self.resting_joints.items():
             q[:, 0, self.robot.joint_names.index(name)] = value
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", SampleWarning)
