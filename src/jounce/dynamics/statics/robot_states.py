@@ -53,7 +53,7 @@ def standing(
     order = [joint.name for joint in robot.moving_joints]
     forces: dict[str, Any] = {}
     for name, value in given.items():
-        at, law = parts.placed(order.index(name)), repr(float(value))
+        at, law = parts.joint_placement(order.index(name)), repr(float(value))
         if at.turning:
             forces[f"{name}_torque"] = SpatialTorque(
                 at.bodies, axis_i=at.axis_i, law=law, vector_i=at.vector_i, vector_j=at.vector_j

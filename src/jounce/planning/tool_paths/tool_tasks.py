@@ -16,7 +16,7 @@ from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.robot.model.arguments import floats, joints_of
 from jounce.robot.model.robot_size import robot_size
 from jounce.robot.model.tree import Frame, Tree, axes_with_z_along
-from jounce.robot.recursions.kinematics import link_frame, place_of
+from jounce.robot.recursions.kinematics import frame_at, link_frame
 from jounce.shapes import ArrayLike, Numbers
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def tool_of(robot: AbstractRobot, link: str, point: ArrayLike, axis: ArrayLike) 
     norm = float(np.linalg.norm(axis))
     if not norm:
         raise RobotError("must not be zero", name="axis", value=axis.tolist())
-    frame = place_of(robot, link, point)
+    frame = frame_at(robot, link, point)
     return Tool(frame, axes_with_z_along(axis / norm), np.float64(robot_size(robot)))
 
 

@@ -216,13 +216,13 @@ class Joint:
 
 def ranges_at_leader(limits: Limits, followers: Iterable[Joint]) -> list[tuple[float, float]]:
     """Return the range of a joint, and those of the joints that follow it as they bind it; infinite where none is."""
-    found = []
+    ranges = []
     every = [(limits, Mimic("")), *((x.limits, x.mimic) for x in followers if x.mimic and x.mimic.multiplier)]
     for own, mimic in every:
         ends = (-math.inf if own.lower is None else own.lower, math.inf if own.upper is None else own.upper)
         low, high = sorted((x - mimic.offset) / mimic.multiplier + 0.0 for x in ends)  # no -0
-        found.append((low, high))
-    return found
+        ranges.append((low, high))
+    return ranges
 
 
 def common_range(ranges: Iterable[tuple[float, float]]) -> tuple[float, float]:
