@@ -138,12 +138,12 @@ def _streamed(
     """Solve stretch by stretch, and write each of them before the next is solved."""
     from jounce.io import in_units
     from jounce.kinematics import solve_in_stretches
-    from jounce.reporting.peaks import looked_at
+    from jounce.reporting.peaks import parts_with_peaks
 
     with Bar("solving") as bar:
         with errors_about(file):
             motion = solve_in_stretches(mechanism, order=order, tolerance=tolerance, progress=bar)
-        parts = (in_units(part.dataset, mechanism.shown_units) for part in looked_at(motion, refine=refine))
+        parts = (in_units(part.dataset, mechanism.shown_units) for part in parts_with_peaks(motion, refine=refine))
         output.write_parts(parts, len(motion.time), header_units=heading)
     return motion
 

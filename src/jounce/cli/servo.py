@@ -148,7 +148,7 @@ def _units_of(mechanism: Mechanism, names: list[str]) -> ShownUnits:
 
 
 def _result(file: Path, frequency: float, names: list[str], laws: Any, found: Any, out: Path | None) -> dict[str, Any]:
-    from jounce.reporting.json.results import told_peak
+    from jounce.reporting.json.results import peak_facts
 
-    peaks = [told_peak(peak) for peak in found]
+    peaks = [peak_facts(peak) for peak in found]
     return {"file": file, "rate": frequency, "drivers": names, "laws": laws, "peaks": peaks, "written": out}
