@@ -60,32 +60,32 @@ def stand(drawing: Drawing, symbol: Symbol) -> None:
     """Draw the stand of a joint whose one body is the ground, once where several joints share it."""
     if GROUND not in symbol.bodies[:2]:
         return
-    u, place = drawing.unit, drawing.place(symbol, symbol.bodies.index(GROUND))
-    if any(np.allclose(known, place, rtol=0, atol=0.1 * u, equal_nan=True) for known in drawing.supports):
+    u, point = drawing.unit, drawing.point(symbol, symbol.bodies.index(GROUND))
+    if any(np.allclose(known, point, rtol=0, atol=0.1 * u, equal_nan=True) for known in drawing.supports):
         return
-    drawing.supports.append(place)
-    left, right = (place + np.array([sign * 1.1, -2.0]) * u for sign in (-1, 1))
-    drawing.area(place, left, right, fill=PAPER, width=1.1, layer=GUIDES)
+    drawing.supports.append(point)
+    left, right = (point + np.array([sign * 1.1, -2.0]) * u for sign in (-1, 1))
+    drawing.area(point, left, right, fill=PAPER, width=1.1, layer=GUIDES)
     wide = np.array([0.7 * u, 0.0])
     _hatching(drawing, left - wide, right + wide, DOWN, 6)
 
 
-def pin(drawing: Drawing, place: Flat) -> None:
+def pin(drawing: Drawing, point: Flat) -> None:
     """Draw a pin."""
-    drawing.disc(place, 0.8 * drawing.unit, fill=PAPER, width=1.3, layer=SYMBOLS)
+    drawing.disc(point, 0.8 * drawing.unit, fill=PAPER, width=1.3, layer=SYMBOLS)
 
 
-def ball(drawing: Drawing, place: Flat) -> None:
+def ball(drawing: Drawing, point: Flat) -> None:
     """Draw the ball of a spherical joint."""
     u = drawing.unit
-    drawing.disc(place, 0.85 * u, fill="#BBBBBB", width=1.2, layer=SYMBOLS)
-    drawing.disc(place + np.array([-0.25, 0.25]) * u, 0.22 * u, stroke="", fill=PAPER, layer=SYMBOLS)
+    drawing.disc(point, 0.85 * u, fill="#BBBBBB", width=1.2, layer=SYMBOLS)
+    drawing.disc(point + np.array([-0.25, 0.25]) * u, 0.22 * u, stroke="", fill=PAPER, layer=SYMBOLS)
 
 
 def rail(
     drawing: Drawing,
     body: str,
-    places: Float[np.ndarray, "time components"],
+    points: Float[np.ndarray, "time components"],
     axis: Point,
     *,
     beyond: float = 2.6,
@@ -97,7 +97,7 @@ def rail(
     from where it is held, `start` in its frame.
     """
     u = drawing.unit
-    local = drawing.within(body, places)
+    local = drawing.within(body, points)
     along = axis / np.linalg.norm(axis)
     travel = local @ along
     foot = local - travel[:, None] * along
@@ -166,14 +166,14 @@ def turn(drawing: Drawing, center: Flat, plane: Float[np.ndarray, "time 2 2"], *
     angle = np.linspace(0.0, 5.0 * np.pi, 61) if spiral else np.radians(np.linspace(-50.0, 195.0, 25))
     radius = np.linspace(0.9, 2.3, len(angle)) if spiral else np.full(len(angle), 2.4)
 
-    def place(at: Any, distance: Any) -> np.ndarray:
+    def point_at(at: Any, distance: Any) -> np.ndarray:
         circle = np.stack([distance * np.cos(at), distance * np.sin(at)], axis=-1) * u
         return center[:, None] + np.einsum("nk,tkc->tnc", circle, plane)
 
-    drawing.curve(place(angle, radius), width=1.2, layer=MARKS)
+    drawing.curve(point_at(angle, radius), width=1.2, layer=MARKS)
     if not spiral:
         last = np.array([angle[-1], angle[-1], angle[-1] + 0.42])
-        head = place(last, np.array([1.95, 2.85, 2.4]))
+        head = point_at(last, np.array([1.95, 2.85, 2.4]))
         drawing.curve(head, closed=True, fill=INK, width=0.5, layer=MARKS)
 
 
