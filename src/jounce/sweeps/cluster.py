@@ -93,12 +93,12 @@ def _check_releases(client: Any, timeout: float) -> None:
     """
     names = list(versions())
     try:
-        found = client.sync(client._get_versions, packages=names, callback_timeout=max(timeout, PATIENCE))
+        releases = client.sync(client._get_versions, packages=names, callback_timeout=max(timeout, PATIENCE))
     except (OSError, TimeoutError) as error:
         raise _lost(error) from None
-    own = {name: found["client"]["packages"].get(name) for name in names}  # told in the same way
-    for address, told in sorted(found["workers"].items()):
-        packages = told["packages"] if isinstance(told, dict) else {}
+    own = {name: releases["client"]["packages"].get(name) for name in names}  # told in the same way
+    for address, worker in sorted(releases["workers"].items()):
+        packages = worker["packages"] if isinstance(worker, dict) else {}
         for name, release in own.items():
             if packages.get(name) != release:
                 there = f"has {name} {packages[name]}" if packages.get(name) else f"has no {name}"
@@ -152,8 +152,8 @@ def _reason(future: Any) -> Exception:
 
 
 def _lost(reason: object) -> ClusterError:
-    said = str(reason).strip().partition("\n")[0].rstrip(": ") or type(reason).__name__
-    return ClusterError(f"the cluster was lost: its scheduler or all of its workers do not answer ({said})")
+    message = str(reason).strip().partition("\n")[0].rstrip(": ") or type(reason).__name__
+    return ClusterError(f"the cluster was lost: its scheduler or all of its workers do not answer ({message})")
 
 
 @contextmanager
