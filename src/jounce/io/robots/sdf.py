@@ -20,8 +20,8 @@ from jounce.io.robots.sdf_links import gravity_of, read_inertia
 from jounce.io.robots.sdf_poses import (
     HERE,
     WORLD,
+    FramePose,
     Frames,
-    Place,
     check_known,
     flag_of,
     needed,
@@ -78,7 +78,7 @@ def read_sdf(root: Element, faults: Faults) -> Robot:
     return _Reader(*model_frames(root), world, version, faults).robot()
 
 
-def model_frames(root: Element) -> tuple[Frames, Place]:
+def model_frames(root: Element) -> tuple[Frames, FramePose]:
     """Return the links, joints and further frames of the one model of a file, and its pose in the world."""
     model, place = _model(root)
     check_known(model, MODEL_PARTS)
@@ -92,7 +92,7 @@ def model_frames(root: Element) -> tuple[Frames, Place]:
     return Frames(model, elements), place
 
 
-def _model(root: Element) -> tuple[Element, Place]:
+def _model(root: Element) -> tuple[Element, FramePose]:
     """Return the model of a file, and its pose in the world."""
     check_known(root, (*ROOT, "actor", "light"))
     worlds = root.every("world")
@@ -142,7 +142,9 @@ def _named(model: Element) -> dict[str, Element]:
 class _Reader:
     """Turns the links and joints of a model into those of a tree, and closures."""
 
-    def __init__(self, frames: Frames, place: Place, world: Element | None, version: tuple[int, ...], faults: Faults):
+    def __init__(
+        self, frames: Frames, place: FramePose, world: Element | None, version: tuple[int, ...], faults: Faults
+    ):
         self.frames, self.place, self.world, self.version, self.faults = frames, place, world, version, faults
         self.model, self.elements, self.lines = frames.model, frames.elements, NamedElements(frames.model)
         self.links: list[Link] = []
@@ -186,9 +188,9 @@ class _Reader:
         except RobotError as error:
             raise self.lines.placed(error) from None
 
-    def _place(self, link: str) -> Place:
+    def _place(self, link: str) -> FramePose:
         """Return where a link is in the model."""
-        return HERE.seen_from(self.place) if link == WORLD else self.frames.place(link)
+        return HERE.seen_from(self.place) if link == WORLD else self.frames.pose(link)
 
     def _divided(
         self, joints: Sequence[SdfJoint], base: str, links: Sequence[str], fixed: bool
@@ -203,7 +205,7 @@ class _Reader:
 
         if fixed and not any(WORLD in (joint.parent, joint.child) for joint in joints):
             link = self.frames.canonical_link()
-            place = self.frames.place(link).position
+            place = self.frames.pose(link).position
             joints = [SdfJoint(self._unused(f"{link}_{WORLD}"), "fixed", WORLD, link, place, (), self.model), *joints]
         chosen = set()
         for joint in sorted(joints, key=lambda joint: TREE_FIRST.index(joint.kind)):
@@ -238,7 +240,7 @@ class _Reader:
     def _add(self, joint: SdfJoint, mimics: dict[str, Mimic]) -> None:
         """Add a joint of the tree, with the massless links that it needs."""
         parent, child = self._place(joint.parent), self._place(joint.child)
-        here = Place(joint.origin, child.rotation)  # of the joint, with the axes of the child
+        here = FramePose(joint.origin, child.rotation)  # of the joint, with the axes of the child
         beside = joint.kind != "fixed" and bool(np.any(np.abs(joint.origin - child.position) > 1e-12))
         held = self._unused(f"{joint.child}_{joint.name}") if beside else joint.child
         if beside:
@@ -298,7 +300,7 @@ class _Reader:
             message = "closes a loop, and so has no coordinate that could follow another"
             raise mimics[0].error(message, "joints", joint.name, "mimic")
         ends = self._place(joint.parent), self._place(joint.child)
-        points = [Place(joint.origin, np.eye(3)).seen_from(place).position for place in ends]
+        points = [FramePose(joint.origin, np.eye(3)).seen_from(place).position for place in ends]
         axis = ends[0].rotation.T @ joint.axes[0].direction if joint.axes else None
         turn = None if joint.kind == "ball" else ends[1].seen_from(ends[0]).rotation
         links = (joint.parent, joint.child)

@@ -17,22 +17,22 @@ WORLD = "world"
 MAX_CHAIN = 1000  # frames, each attached to the next
 
 
-class Place(NamedTuple):
+class FramePose(NamedTuple):
     """Where a frame is in another one: its origin, and its axes as columns."""
 
     position: Float[np.ndarray, "3"]
     rotation: Float[np.ndarray, "3 3"]
 
-    def then(self, inner: Place) -> Place:
+    def then(self, inner: FramePose) -> FramePose:
         """Return where a frame is that this one holds at a place."""
-        return Place(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
+        return FramePose(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
 
-    def seen_from(self, outer: Place) -> Place:
+    def seen_from(self, outer: FramePose) -> FramePose:
         """Return where the frame is in another one; both places are in one frame."""
-        return Place(outer.rotation.T @ (self.position - outer.position), outer.rotation.T @ self.rotation)
+        return FramePose(outer.rotation.T @ (self.position - outer.position), outer.rotation.T @ self.rotation)
 
 
-HERE = Place(np.zeros(3), np.eye(3))
+HERE = FramePose(np.zeros(3), np.eye(3))
 
 
 class Frames:
@@ -48,9 +48,9 @@ class Frames:
 
     def __init__(self, model: Element, elements: dict[str, Element]):
         self.model, self.elements = model, elements
-        self._found: dict[str, Place] = {MODEL: HERE}
+        self._found: dict[str, FramePose] = {MODEL: HERE}
 
-    def place(self, name: str) -> Place:
+    def pose(self, name: str) -> FramePose:
         """Return where a frame is in the model."""
         chain = [name]
         while chain[-1] not in self._found:
@@ -110,7 +110,7 @@ def _attachment(frame: Element) -> str:
     return frame.attributes.get("attached_to") or MODEL
 
 
-def pose_of(element: Element, *name: str) -> Place:
+def pose_of(element: Element, *name: str) -> FramePose:
     """Return the pose of an element in the frame that it is relative to: turns about fixed axes, or a quaternion."""
     from scipy.spatial.transform import Rotation
 
@@ -122,12 +122,12 @@ def pose_of(element: Element, *name: str) -> Place:
         *position, x, y, z, w = pose.content_numbers(7, *name, "pose")
         if math.hypot(x, y, z, w) < 1e-9:
             raise pose.error("the quaternion must not be zero", *name, "pose", value=[x, y, z, w])
-        return Place(np.array(position), Rotation.from_quat([x, y, z, w]).as_matrix())
+        return FramePose(np.array(position), Rotation.from_quat([x, y, z, w]).as_matrix())
     if form != "euler_rpy":
         raise pose.error("rotation_format must be euler_rpy or quat_xyzw", *name, "pose", value=form)
     *position, roll, pitch, yaw = pose.content_numbers(6, *name, "pose")
     degrees = pose.attributes.get("degrees", "false").strip() in ("true", "1")
-    return Place(np.array(position), Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=degrees).as_matrix())
+    return FramePose(np.array(position), Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=degrees).as_matrix())
 
 
 def only(element: Element, tag: str, *name: str) -> Element | None:

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from jounce.robot.closed_loops.mechanism_parts import on_body
 from jounce.robot.robot import Robot
 from jounce.viewer.shapes.appearance import BODY_COLOURS, DARK, GREY, Appearance, BodyPoint, ColouredMesh, upward
-from jounce.viewer.shapes.meshes import box, capsule, cylinder, merged, placed, rotation_to, sphere
+from jounce.viewer.shapes.meshes import box, capsule, cylinder, merged, rotation_to, sphere, transformed
 from jounce.viewer.shapes.robot_shapes import file_shapes
 from jounce.viewer.shapes.shapes import Shapes
 
@@ -45,17 +45,19 @@ def robot_appearance(robot: Robot, path: Path | None = None, allow: Iterable[str
     """
     links = (robot.base, *robot.moving_links)
     size = _size(robot)
-    found: Shapes = {link: [] for link in links}
+    shapes_of_links: Shapes = {link: [] for link in links}
     for link, shapes in (file_shapes(path, allow) if path is not None else {}).items():
         if link in robot.frames:
             body, position, rotation = _body_of(robot, link)
-            found[body] += [dataclasses.replace(each, mesh=placed(each.mesh, position, rotation)) for each in shapes]
+            shapes_of_links[body] += [
+                dataclasses.replace(each, mesh=transformed(each.mesh, position, rotation)) for each in shapes
+            ]
     bars = _bars(robot, size)
-    bare = not any(found.values())
+    bare = not any(shapes_of_links.values())
     for link in links:  # a base without shapes stands on nothing, as in its file, unless all is bars
-        if not found[link] and (bare or link != robot.base):
-            found[link] = bars[link]
-    return Appearance(found, (), list(_points(robot)), size, upward(robot.gravity))
+        if not shapes_of_links[link] and (bare or link != robot.base):
+            shapes_of_links[link] = bars[link]
+    return Appearance(shapes_of_links, (), list(_points(robot)), size, upward(robot.gravity))
 
 
 def _body_of(robot: Robot, link: str) -> tuple[str, Vector, Rotation]:
