@@ -62,31 +62,31 @@ class Obreshkov(AbstractMethod):
         check_step(self.step)
 
     @property
-    def highest(self) -> int:
+    def max_derivative(self) -> int:
         """Highest derivative of positions and velocities in the formula."""
         return self.order // 2
 
     def expansion_order(self, tolerance: float) -> int:
         """Return the order of the expansions: beyond the formula's own, where the step is to be chosen."""
-        return self.highest if self.step is not None else self.order + HIGHER_COEFFICIENTS
+        return self.max_derivative if self.step is not None else self.order + HIGHER_COEFFICIENTS
 
     def longest_step(self, sizes: Sizes, tolerance: Number) -> Lanes:
         """Return the step at which the leading error, or the next where that vanishes, is the tolerance."""
         if self.step is not None:
             return jnp.full(sizes.shape[1], self.step, float)
         first = self.order + 1
-        constant = (self.order + 2) * math.factorial(self.highest) ** 2 / math.factorial(self.order)
+        constant = (self.order + 2) * math.factorial(self.max_derivative) ** 2 / math.factorial(self.order)
         return reach(sizes, first) * (tolerance / constant) ** (1.0 / first)
 
     def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
         """Return the end that fulfils the formula, not finite where the iteration for it does not converge."""
         measure = _measure(equations.system.column_scale[0], step)
         later = (time + step)[None]
-        known = _known(expansion, step, self.highest)
+        known = _known(expansion, step, self.max_derivative)
 
         def improved(end: State) -> State:
-            found = expand(equations, end, later, self.highest).state
-            return State(*(a - _terms(c, -step, self.highest) for a, c in zip(known, found, strict=True)))
+            state = expand(equations, end, later, self.max_derivative).state
+            return State(*(a - _terms(c, -step, self.max_derivative) for a, c in zip(known, state, strict=True)))
 
         def iterate(carry: Any) -> Any:
             end, before, _, count = carry
@@ -106,11 +106,11 @@ class Obreshkov(AbstractMethod):
 
     def polynomial(self, start: Expansion, end: Expansion, step: Lanes) -> State:
         """Return the polynomial that has the derivatives of the formula at both ends, of degree order + 1."""
-        upper = jnp.asarray(_hermite(self.highest))
+        upper = jnp.asarray(_hermite(self.max_derivative))
         length = jnp.where(step == 0.0, 1.0, step)  # runs that have arrived stand still
 
         def joined(c0: Any, c1: Any) -> Any:
-            count = self.highest + 1
+            count = self.max_derivative + 1
             power = length[None, None, None] ** jnp.arange(2.0 * count)[:, None, None, None]
             low, high = c0[:count] * power[:count], c1[:count] * power[:count]
             ends = jnp.concatenate([(high - low)[:1], low[1:], high[1:]])
@@ -123,23 +123,23 @@ class Obreshkov(AbstractMethod):
         """Return how far the end departs from the formula of the next order."""
         if self.step is not None:
             return jnp.zeros_like(step)
-        p, measure = self.highest + 1, _measure(length, step)
+        p, measure = self.max_derivative + 1, _measure(length, step)
         known = _known(start, step, p)
         parts = zip(end.state, known, start.state, strict=True)
         departure = State(*(jnp.abs(c[0] + _terms(c, -step, p) - a) - ROUNDING * jnp.abs(c0[0]) for c, a, c0 in parts))
         return jnp.maximum(_size(departure, measure, signed=True), 0.0)
 
 
-def _known(expansion: Expansion, step: Lanes, highest: int) -> State:
+def _known(expansion: Expansion, step: Lanes, max_derivative: int) -> State:
     """Return what the formula takes from the start of a step."""
-    return State(*(c[0] + _terms(c, step, highest) for c in expansion.state))
+    return State(*(c[0] + _terms(c, step, max_derivative) for c in expansion.state))
 
 
 def _terms(
-    coefficients: Float[Numbers, "order component body batch"], step: Lanes, highest: int
+    coefficients: Float[Numbers, "order component body batch"], step: Lanes, max_derivative: int
 ) -> Float[Numbers, "component body batch"]:
     """Return what the formula adds for the derivatives of one end; seen from the other end, the step is negative."""
-    weights = _weights(highest)
+    weights = _weights(max_derivative)
     return total(float(w) * step[None, None] ** j * coefficients[j] for j, w in enumerate(weights, 1))
 
 

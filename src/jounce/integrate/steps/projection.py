@@ -60,9 +60,11 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
         factor, gap = correction(position, attitude)
         column = equations.least_change(factor, gap)
         size = jnp.where(inverting, last, jnp.max(jnp.abs(column), axis=0))
-        place = [jnp.where(inverting, x, y) for x, y in zip(carry[:2], moved(position, attitude, column), strict=True)]
+        moved_pose = [
+            jnp.where(inverting, x, y) for x, y in zip(carry[:2], moved(position, attitude, column), strict=True)
+        ]
         known = inverting | jnp.all(size <= CLOSE)
-        return *place, factor, size, jnp.where(count == 0, size, first), count + 1, known
+        return *moved_pose, factor, size, jnp.where(count == 0, size, first), count + 1, known
 
     start = (position, attitude, equations.blank_factor(lanes), jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0, False)
     position, attitude, factor, last, first, *_ = jax.lax.while_loop(lambda carry: ~carry[-1], iterate, start)
