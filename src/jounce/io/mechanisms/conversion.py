@@ -77,10 +77,10 @@ def _move_samples(
             if any(Path(file).is_relative_to(folder) for folder in folders):
                 entry["samples"] = Path(os.path.relpath(file, folders[0])).as_posix()
             else:
-                beside = there / Path(file).name
-                while copies.setdefault(beside, file) != file:  # another of the same name
-                    beside = beside.with_name(f"{beside.stem}_{beside.suffix}")
-                entry["samples"] = beside.name
+                target = there / Path(file).name
+                while copies.setdefault(target, file) != file:  # another of the same name
+                    target = target.with_name(f"{target.stem}_{target.suffix}")
+                entry["samples"] = target.name
         _move_samples(entry, path, there, allow, copies)
 
 
@@ -110,16 +110,16 @@ def assigned(robot: Robot, texts: Iterable[str], option: str, *, law: bool) -> d
     >>> assigned(scara, ["quill=5 cm"], "--start", law=False)
     {'quill': 0.05}
     """
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     form = "a joint is given a value by JOINT=VALUE, such as 'elbow=30 deg'"
     for name, value in assignments(texts, option, form).items():
         check_name("moving joint", name, robot.joint_names, JounceError, name=option)
         kind = "angle" if robot.joints[name].turning else "length"
         try:
-            found[name] = parse_value(_number_or_text(value), kind, ("t",) if law else ()).value
+            values[name] = parse_value(_number_or_text(value), kind, ("t",) if law else ()).value
         except JounceError as error:
             raise error.located(name=f"{option} {name}", value=value) from None
-    return found
+    return values
 
 
 def _number_or_text(text: str) -> float | str:

@@ -157,8 +157,8 @@ def _spliced(text: str, values: Mapping[str, Any], assembly: Any) -> str:
     root = YAML(typ="rt", pure=True).compose(text)
     assert isinstance(root, MappingNode)
     entries = {key.value: node for key, node in root.value}
-    places = {key.value: node for key, node in entries["parameters"].value}
-    splices = [(places[name], _scalar(value, places[name])) for name, value in values.items()]
+    nodes = {key.value: node for key, node in entries["parameters"].value}
+    splices = [(nodes[name], _scalar(value, nodes[name])) for name, value in values.items()]
     if assembly is not None and "assembly" in entries:
         splices.append((entries["assembly"], str(assembly)))
     for node, new in sorted(splices, key=lambda splice: splice[0].start_mark.index, reverse=True):

@@ -104,7 +104,7 @@ def rotor_of(element: Element, *where: str) -> float:
 
 
 def _axis(
-    axis: Element, place: FramePose, frames: Frames, version: tuple[int, ...], armature: float, *where: str
+    axis: Element, pose: FramePose, frames: Frames, version: tuple[int, ...], armature: float, *where: str
 ) -> SdfAxis:
     check_known(axis, AXIS, *where)
     xyz = only(axis, "xyz", *where)
@@ -116,7 +116,7 @@ def _axis(
     old = version < (1, 7)
     if old and flag_of(axis, "use_parent_model_frame", *where, default=version < (1, 5)):
         frame = MODEL
-    rotation = frames.pose(frame).rotation if frame else place.rotation
+    rotation = frames.pose(frame).rotation if frame else pose.rotation
     limit, dynamics = only(axis, "limit", *where), only(axis, "dynamics", *where)
     for part, known in ((limit, LIMIT), (dynamics, DYNAMICS)):
         if part is not None:

@@ -48,18 +48,18 @@ class Frames:
 
     def __init__(self, model: Element, elements: dict[str, Element]):
         self.model, self.elements = model, elements
-        self._found: dict[str, FramePose] = {MODEL: HERE}
+        self._resolved: dict[str, FramePose] = {MODEL: HERE}
 
     def pose(self, name: str) -> FramePose:
         """Return where a frame is in the model."""
         chain = [name]
-        while chain[-1] not in self._found:
+        while chain[-1] not in self._resolved:
             element = self.elements[chain[-1]]
             self._extend(chain, self._reference(element), element)
         for name in reversed(chain[:-1]):
             element = self.elements[name]
-            self._found[name] = self._found[self._reference(element)].then(pose_of(element, name))
-        return self._found[name]
+            self._resolved[name] = self._resolved[self._reference(element)].then(pose_of(element, name))
+        return self._resolved[name]
 
     def link(self, name: str, element: Element, *where: str) -> str:
         """Return the link that a frame is fixed to, or ``world``; `element` names the frame."""
@@ -132,10 +132,10 @@ def pose_of(element: Element, *name: str) -> FramePose:
 
 def only(element: Element, tag: str, *name: str) -> Element | None:
     """Return the one child of a tag, None if there is none."""
-    found = element.every(tag)
-    if len(found) > 1:
-        raise found[1].error(f"<{tag}> is given twice, first in line {found[0].line}", *name)
-    return found[0] if found else None
+    elements = element.every(tag)
+    if len(elements) > 1:
+        raise elements[1].error(f"<{tag}> is given twice, first in line {elements[0].line}", *name)
+    return elements[0] if elements else None
 
 
 def needed(element: Element, tag: str, *name: str) -> Element:
