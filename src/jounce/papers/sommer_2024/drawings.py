@@ -108,14 +108,14 @@ def _panel(axes: Any, drawn: Drawn, view: View) -> SketchFigure:
     def line(points: Any, **look: Any) -> None:
         drawing.curve(drawing.flat(np.asarray(points))[None], stroke=PALE_GREY, layer=2, owner="", **look)
 
-    def name(text: str, place: np.ndarray, colour: str, owner: str) -> None:
+    def name(text: str, point: np.ndarray, colour: str, owner: str) -> None:
         drawing.owner = owner
-        drawing.name(text, drawing.flat(place[None]), colour)
+        drawing.name(text, drawing.flat(point[None]), colour)
 
     for pair in drawn.fixed:
         line([places[letter] for letter in pair], width=0.9, dashes=(5.0, 4.0))
-    for letter, place in places.items():
-        name(letter, place, "black", f"bodies.{letter}")
+    for letter, point in places.items():
+        name(letter, point, "black", f"bodies.{letter}")
     for symbol, (vertex, start, quarter, arm) in drawn.angles.items():
         reach = places[arm] - places[vertex]
         angle, radius = np.arctan2(reach @ quarter, reach @ start), ARC * drawing.unit
