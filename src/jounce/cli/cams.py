@@ -64,7 +64,7 @@ def cam(
     from jounce.reporting.facts.cam_facts import cam_facts, cam_words
 
     output.check()
-    told = heading.units
+    unit_choice = heading.units
     if figure is not None:
         from jounce.plot import check_figure
 
@@ -78,7 +78,7 @@ def cam(
         facts = cam_facts(profile)
     if not output.json:
         say(cam_words(facts, shown))
-    output.write(lambda: in_units(profile.dataset, shown), header_units=told)
+    output.write(lambda: in_units(profile.dataset, shown), header_units=unit_choice)
     if figure is not None:
         from jounce.plot import draw_cam, save
 

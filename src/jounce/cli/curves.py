@@ -82,9 +82,11 @@ def trace(
     with errors_about(file), options_named():
         curves = [traced(mechanism, time, driver=driver, order=order, count=points, length=length)]
         if circuits:
-            found = assemblies(mechanism, time, driver=curves[0].driver).circuits
+            chosen_circuits = assemblies(mechanism, time, driver=curves[0].driver).circuits
             here = curves[0].coordinates_at(0.0)
-            curves += [x.sampled(order, points) for x in found if not any(c.passes(here) for c in x.connected())]
+            curves += [
+                x.sampled(order, points) for x in chosen_circuits if not any(c.passes(here) for c in x.connected())
+            ]
     return write_curves(curves, file, figure, show, output)
 
 

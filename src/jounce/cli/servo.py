@@ -147,8 +147,10 @@ def _units_of(mechanism: Mechanism, names: list[str]) -> ShownUnits:
     return ShownUnits(chosen, known)
 
 
-def _result(file: Path, frequency: float, names: list[str], laws: Any, found: Any, out: Path | None) -> dict[str, Any]:
+def _result(
+    file: Path, frequency: float, names: list[str], laws: Any, peaks_found: Any, out: Path | None
+) -> dict[str, Any]:
     from jounce.reporting.json.results import peak_facts
 
-    peaks = [peak_facts(peak) for peak in found]
+    peaks = [peak_facts(peak) for peak in peaks_found]
     return {"file": file, "rate": frequency, "drivers": names, "laws": laws, "peaks": peaks, "written": out}

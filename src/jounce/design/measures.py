@@ -111,8 +111,8 @@ def top(series: Float[Numbers, "order cell"], cells: Cells) -> Float[Numbers, " 
     series = jax.lax.stop_gradient(series)
     share = np.linspace(0.0, 1.0, SAMPLES)[:, None]
     width = cells.high - cells.low
-    places = cells.low[None] + share * width[None]
-    best = jnp.argmax(value(series[:, None], jnp.asarray(places)), axis=0)
+    positions = cells.low[None] + share * width[None]
+    best = jnp.argmax(value(series[:, None], jnp.asarray(positions)), axis=0)
     spacing = width / (SAMPLES - 1)
     start = jnp.asarray(cells.low) + best.astype(float) * spacing
     low, high = jnp.maximum(start - spacing, cells.low), jnp.minimum(start + spacing, cells.high)

@@ -124,13 +124,13 @@ def optimise(
     for number, variant in chosen:
         study = Study(variant, asked, clearance, iterations, seed, progress)
         try:
-            found = study.best(starts, samples)
+            best_result = study.best(starts, samples)
         except DesignError as error:
             if len(chosen) == 1:
                 raise
             first_error = first_error or error
             continue
-        whole = study.result(mechanism, found, assembly=number)
+        whole = study.result(mechanism, best_result, assembly=number)
         if best is None or (whole.success, -whole.objective) > (best.success, -best.objective):
             best = whole
     if best is None:

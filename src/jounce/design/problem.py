@@ -100,7 +100,7 @@ class Problem:
         self._compile()
 
     def values(self, point: Float[np.ndarray, " parameter"]) -> dict[str, float]:
-        """Return the parameters at a place, SI; those on a bound to the bit."""
+        """Return the parameters at a point, SI; those on a bound to the bit."""
         parameters = np.where(point >= 1.0 - ON_BOUND, self.high, self.low + self.width * point)
         parameters = np.where(point <= ON_BOUND, self.low, parameters)
         return dict(zip(self.names, parameters.tolist(), strict=True))
@@ -111,7 +111,7 @@ class Problem:
         return np.clip((given - self.low) / self.width, 0.0, 1.0)
 
     def design(self, point: Float[np.ndarray, " parameter"]) -> Mechanism:
-        """Return the mechanism at a place, with the outputs that goals need."""
+        """Return the mechanism at a point, with the outputs that goals need."""
         return self.goals.mechanism.with_parameters(**self.values(point))
 
     def evaluate(self, point: Float[np.ndarray, " parameter"]) -> Evaluation:

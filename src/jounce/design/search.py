@@ -46,7 +46,7 @@ class SearchResult:
     multipliers : array of shape (conditions,)
         Slope of the objective by each condition.
     bound_multipliers : array of shape (parameters,)
-        Slope of the objective by a lower bound (positive) or an upper one (negative), by the place.
+        Slope of the objective by a lower bound (positive) or an upper one (negative), by the point.
     singular_multiplier : float
     """
 
@@ -102,7 +102,7 @@ class Search:
         self.scale = self.asked_scale = 1.0
 
     def from_point(self, point: Vector, *, elastic: bool = False) -> SearchResult:
-        """Search from a place that does not lock.
+        """Search from a point that does not lock.
 
         Parameters
         ----------
@@ -135,7 +135,7 @@ class Search:
         return self.result_at(best)
 
     def _fitted(self, point: Vector) -> Vector:
-        """Return a better place by least squares, which knows more of distances from points than their sum."""
+        """Return a better point by least squares, which knows more of distances from points than their sum."""
         from scipy.optimize import least_squares  # here, to start quickly
 
         chosen = np.array(self.problem.goals.gaps)
@@ -159,7 +159,7 @@ class Search:
         return min((point, fit.x, near), key=self._fitness)
 
     def _fitness(self, point: Vector) -> tuple[float, float]:
-        """Return by what places are compared: how near they are to a singular position, then the objective."""
+        """Return by what points are compared: how near they are to a singular position, then the objective."""
         try:
             here = self.problem.evaluate(point)
         except Locked:
@@ -169,7 +169,7 @@ class Search:
         return (worst if worst > CONDITION_TOLERANCE else 0.0), float(numbers[0])
 
     def result_at(self, point: Vector) -> SearchResult:
-        """Return what is known of a place: values, broken conditions, multipliers."""
+        """Return what is known of a point: values, broken conditions, multipliers."""
         here = self.problem.evaluate(point)
         extremes, chosen = self.problem.extremes(here)
         numbers, slopes = self.problem.numbers(point, extremes, here.smooth)

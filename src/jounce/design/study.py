@@ -189,7 +189,7 @@ class Study:
         AssemblyError, MobilityError, SolveError
             The design cannot be put together, or locks.
         """
-        goals, kept = self.goals, self.goals.instants
+        goals, previous = self.goals, self.goals.instants
         try:
             goals.set_instants(instants)
             motion = solve(mechanism.with_parameters(**values), goals.instants, goals.order, strict=False)
@@ -201,7 +201,7 @@ class Study:
             numbers = np.asarray(goals.numbers(values, extremes, np.asarray(smooth), as_asked=True))
             return float(numbers[0]), numbers[1:], goals.sides(values, extremes, np.asarray(smooth))
         finally:
-            goals.set_instants(kept)
+            goals.set_instants(previous)
 
     def _note_bounds(self) -> None:
         """Note what was given outside the bounds."""

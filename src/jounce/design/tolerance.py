@@ -199,8 +199,8 @@ class _Spread:
 
         def outputs(values: Any) -> dict[str, Any]:
             changed = self.mechanism.with_parameters(**dict(zip(self.names, values, strict=True)))
-            found = solve(changed, self.nominal.time, self.nominal.order).outputs
-            return {name: found[name] for name in self._outputs}
+            solved = solve(changed, self.nominal.time, self.nominal.order).outputs
+            return {name: solved[name] for name in self._outputs}
 
         for name, gradient in jax.jacfwd(outputs)(start).items():
             dims = self._variables[name].dims
@@ -228,11 +228,11 @@ class _Spread:
         peaks = {name: np.full((count, *s[1:]), np.nan) for name, s in zip(self._outputs, shapes, strict=True)}
         solved = np.zeros((count, len(self.nominal.time)), bool)
         for start, stop in _batches(count, progress):
-            found, sides = self._solved_designs(space.values(start, stop))
-            solved[start:stop] = found["status"].values == Status.OK
+            batch, sides = self._solved_designs(space.values(start, stop))
+            solved[start:stop] = batch["status"].values == Status.OK
             for name in self._outputs:
-                if name in found:
-                    whole[name][start:stop] = self._near_nominal(name, found[name].values)
+                if name in batch:
+                    whole[name][start:stop] = self._near_nominal(name, batch[name].values)
                     peaks[name][start:stop] = self._peaks(name, whole[name][start:stop], sides)
         self._solved = solved.sum(axis=0)
         for name, values in whole.items():

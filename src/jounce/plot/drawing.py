@@ -157,11 +157,11 @@ class Drawing:
         return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
 
     def within(self, body: str, points: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:
-        """Return global places in the frame of a body."""
+        """Return global points in the frame of a body."""
         return within(self.frames[body], points)
 
     def flat(self, points: np.ndarray) -> np.ndarray:
-        """Return places or vectors, (..., components), as they are seen, (..., 2)."""
+        """Return points or vectors, (..., components), as they are seen, (..., 2)."""
         return points if self.planar else points @ self.screen[:2].T
 
     def depth(self, vectors: np.ndarray) -> np.ndarray:

@@ -104,5 +104,5 @@ def points_at(
 
 
 def within(frame: Frame, points: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:
-    """Return global places in the frame of a body."""
+    """Return global points in the frame of a body."""
     return np.einsum("tkc,tk->tc", frame[:, :, 1:], points - frame[:, :, 0])

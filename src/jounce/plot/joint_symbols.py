@@ -27,8 +27,8 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
         drawing.owner = f"joints.{symbol.name}"
         (_PLANAR if drawing.planar else _SPATIAL).get(symbol.kind, _unknown)(drawing, symbol)
         if symbol.kind not in _UNNAMED:
-            place = np.mean(drawing.ends(symbol), axis=0) if symbol.kind == "rod" else drawing.point(symbol)
-            drawing.name(symbol.name, place, INK)
+            center = np.mean(drawing.ends(symbol), axis=0) if symbol.kind == "rod" else drawing.point(symbol)
+            drawing.name(symbol.name, center, INK)
     for kind, symbols in (("drivers", seen.drivers), ("forces", seen.forces)):
         for symbol in symbols:
             drawing.owner = f"{kind}.{symbol.name}"
@@ -37,8 +37,8 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
         bodies = getattr(output, "bodies", ())
         if getattr(output, "point", None) is not None and len(bodies) == 1:
             link = seen.links[bodies[0]]
-            for place in (point for point, names in zip(link.points, link.names, strict=True) if name in names):
-                drawing.owner, flat = f"outputs.{name}", drawing.flat(drawing.at(link.body, place))
+            for center in (point for point, names in zip(link.points, link.names, strict=True) if name in names):
+                drawing.owner, flat = f"outputs.{name}", drawing.flat(drawing.at(link.body, center))
                 drawing.disc(flat, 0.3 * drawing.unit, stroke="", fill=INK, layer=MARKS)
 
 

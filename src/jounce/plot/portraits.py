@@ -57,7 +57,7 @@ def hodograph(motion: Motion, output: str, order: int = 1) -> Figure:
     values = _values(motion, output, (order,))[0]
     outputs = motion.mechanism.outputs
     if values.ndim != 2 or outputs[output].axes:
-        vectors = [name for name, found in motion.outputs.items() if found.ndim == 3 and not outputs[name].axes]
+        vectors = [name for name, series in motion.outputs.items() if series.ndim == 3 and not outputs[name].axes]
         message = f"a hodograph needs an output with components; {did_you_mean(output, vectors)}"
         raise MechanismError(message, name="output", value=output)
     pairs = PROJECTIONS if values.shape[1] == 3 else PROJECTIONS[:1]

@@ -91,9 +91,9 @@ def rail(
     beyond: float = 2.6,
     start: Point | None = None,
 ) -> None:
-    """Draw the line of a body along which global places move, hatched where it is the ground.
+    """Draw the line of a body along which global points move, hatched where it is the ground.
 
-    The places stand on the line, at least about; `beyond` is how far it goes on, in units. A moving body has its line
+    The points stand on the line, at least about; `beyond` is how far it goes on, in units. A moving body has its line
     from where it is held, `start` in its frame.
     """
     u = drawing.unit
@@ -138,18 +138,18 @@ def spring(drawing: Drawing, first: Flat, second: Flat, *, turns: int = 6) -> No
 def actuator(drawing: Drawing, first: Flat, second: Flat) -> None:
     """Draw a cylinder that stands at the first place, and its rod, which reaches to the second."""
     u = drawing.unit
-    span = np.linalg.norm(second - first, axis=-1)
-    finite = span[np.isfinite(span)]
+    distance = np.linalg.norm(second - first, axis=-1)
+    finite = distance[np.isfinite(distance)]
     length = 0.62 * float(finite.min()) if finite.size else 0.0
     direction = unit_vector(second - first)
     side = normal_of(direction) * 0.55 * u
-    head = first + direction * np.minimum(length, span)[:, None]
+    head = first + direction * np.minimum(length, distance)[:, None]
     drawing.line(first, second, width=1.5, layer=SYMBOLS)
     drawing.area(first - side, first + side, head + side, head - side, fill="#DDDDDD", width=1.0, layer=SYMBOLS)
 
 
 def turn(drawing: Drawing, center: Flat, plane: Float[np.ndarray, "time 2 2"], *, spiral: bool = False) -> None:
-    """Draw an arrow that turns about a place, or a spiral spring.
+    """Draw an arrow that turns about a point, or a spiral spring.
 
     Parameters
     ----------

@@ -170,11 +170,11 @@ def _equilibrium(rest: Equilibrium) -> list[str]:
 def _linearisation(small: Linearisation) -> list[str]:
     where = "a motion" if small.equilibrium is None else f"an equilibrium that is {small.equilibrium.stability}"
     title = _title(small.mechanism.title or "Small motions", f"about {where} at t = {small.time:g} s")
-    found = []
+    tables = []
     for name, matrix in (("Mass", small.mass), ("Damping", small.damping), ("Stiffness", small.stiffness)):
         rows = [[c, *map(number, row)] for c, row in zip(small.coordinates, matrix.tolist(), strict=True)]
-        found.append(Table(f"{name} (SI)", ("", *small.coordinates), rows, range(1, len(rows) + 1)))
-    return [*title, *_tables([*found, modes_table(small.modes)])]
+        tables.append(Table(f"{name} (SI)", ("", *small.coordinates), rows, range(1, len(rows) + 1)))
+    return [*title, *_tables([*tables, modes_table(small.modes)])]
 
 
 def _robot(robot: Robot) -> list[str]:

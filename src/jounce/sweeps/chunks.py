@@ -169,9 +169,9 @@ def _unpickled(content: bytes) -> Any:
     try:
         return pickle.loads(content)
     except Exception as error:  # noqa: BLE001 - whatever it needs and does not find
-        said = " ".join(f"{type(error).__name__}: {error}".split())
+        text = " ".join(f"{type(error).__name__}: {error}".split())
         message = (
-            f"a worker cannot load what is to be computed ({said}); it needs the same release of jounce as the client, "
+            f"a worker cannot load what is to be computed ({text}); it needs the same release of jounce as the client, "
             "and the modules that your own classes are from"
         )
         raise JounceError(message) from None

@@ -169,8 +169,8 @@ def _client(scheduler: str | None, workers: int | None, timeout: float, scratch:
         try:
             client = closing.enter_context(Client(scheduler, timeout=timeout))
         except (OSError, ValueError, ImportError) as error:  # TimeoutError is an OSError
-            said = str(error).strip().partition("\n")[0]
-            message = f"no Dask scheduler answers within {timeout:g} s: {said or type(error).__name__}"
+            text = str(error).strip().partition("\n")[0]
+            message = f"no Dask scheduler answers within {timeout:g} s: {text or type(error).__name__}"
             raise ClusterError(message, name="scheduler", value=scheduler) from None
         try:
             client.wait_for_workers(1, timeout=timeout)

@@ -330,11 +330,11 @@ def find(folder: Path) -> Store | None:
     except (OSError, ValueError) as error:
         raise OutputError(f"cannot be read: {reason_of(error)}", path=str(folder)) from None
     try:
-        found = "manifest" in attributes_in(folder / ROOT)
+        present = "manifest" in attributes_in(folder / ROOT)
         reason = f"{ROOT} has no manifest"
     except OutputError as error:
-        found, reason = False, f"{ROOT}: {error.message}"
-    if not found:
+        present, reason = False, f"{ROOT}: {error.message}"
+    if not present:
         message = (
             f"something is there that is no sweep of jounce, or one that was damaged ({reason}); give another name"
         )

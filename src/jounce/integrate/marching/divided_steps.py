@@ -201,7 +201,7 @@ def _needed(
 
     What is left out of a series is what follows the orders that are kept: the sizes known of it, or, where all are
     kept, as much less than the last two terms as those are less than the two before. It counts by the largest change,
-    that of velocities over the whole span.
+    that of velocities over the whole duration.
     """
     positions, velocities = sizes
     orders = np.arange(len(positions))[:, None, None]

@@ -195,7 +195,7 @@ def march(
     length = equations.system.column_scale[0]
     order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
     here = current.expansion.state.map(lambda part: part[0])
-    keeps = method.controlled and is_balanced(equations, here, current.time[None])
+    checked = method.controlled and is_balanced(equations, here, current.time[None])
 
     def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
         left = stop - current.time - current.rest
@@ -231,7 +231,7 @@ def march(
             kick = 0.5 * order * (order + 1) * error
             good = good & ~(suspect & _lasting(kick, step, duration, MARGIN * allowed, current))
         balanced, balance = jnp.ones(step.shape, bool), current.balance
-        if keeps:
+        if checked:
             energies_there = energies(there, state, time[None])
             kick = MARGIN * allowed * order / jnp.maximum(wished, 1e-300)
             leeway = kick * length * jnp.sqrt(equations.scale * bodies)

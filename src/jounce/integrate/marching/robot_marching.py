@@ -278,8 +278,8 @@ def march_robot(
         A velocity that is wrong goes on to the end of the run, so that jumps count by what they move until then. What
         the equations miss at the beginning, where the series follows from them, is rounding.
         """
-        places = jnp.maximum(_point_count(step), POINTS)
-        shares = jnp.concatenate([jnp.zeros(1), (first + jnp.arange(1.0, POINTS + 1)) / places])
+        point_count = jnp.maximum(_point_count(step), POINTS)
+        shares = jnp.concatenate([jnp.zeros(1), (first + jnp.arange(1.0, POINTS + 1)) / point_count])
         since = jnp.minimum(shares, 1.0) * step
         state, rates = at(polynomial, since), rates_at(polynomial, since)
         gap, size = problem.departures(state, rates, (time + since)[None])
@@ -301,8 +301,8 @@ def march_robot(
 
         def further(carry: Any) -> Any:
             first, error, finite = carry
-            found, fine = look(polynomial, time, step, first, usual)
-            return first + POINTS, jnp.maximum(error, found), finite & fine
+            crossed, fine = look(polynomial, time, step, first, usual)
+            return first + POINTS, jnp.maximum(error, crossed), finite & fine
 
         def open_(carry: Any) -> Any:
             first, error, finite = carry

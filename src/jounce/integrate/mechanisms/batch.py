@@ -301,9 +301,9 @@ class _Runs:
         taken: np.ndarray,
         positions: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> dict[int, np.ndarray]:
-        """Return angles about axes near places, (instances, places) for each group of outputs, and count them on.
+        """Return angles about axes near positions, (instances, positions) for each group of outputs, and count them on.
 
-        The places are given by step, lane and share of the step.
+        The positions are given by step, lane and share of the step.
         """
         lane, step = np.nonzero(taken.T)
         if not lane.size:
@@ -311,7 +311,7 @@ class _Runs:
         number = np.zeros(taken.shape, int)
         number[step, lane] = np.arange(len(lane))
         last = np.append(lane[1:] != lane[:-1], True)  # of the steps of a run
-        found = {}
+        counted_angles = {}
         measuring = [which for which, group in enumerate(self._made[1]) if measures_angle(group)]
         for which, turns in zip(measuring, self._turns_reached, strict=True):
 
@@ -322,9 +322,9 @@ class _Runs:
                 return raw_angles([outputs[which]], {"quaternion": attitudes})[0]
 
             counted = counted_along(measured, lane, turns[:, runs[lane]], POINTS_IN_STEP)
-            found[which] = counted.near(number[positions[0], positions[1]], positions[2])
+            counted_angles[which] = counted.near(number[positions[0], positions[1]], positions[2])
             turns[:, runs[lane[last]]] = counted.near(np.flatnonzero(last), np.ones(last.sum()))
-        return found
+        return counted_angles
 
     def _note(
         self,

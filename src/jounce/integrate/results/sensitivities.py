@@ -255,10 +255,10 @@ def _assembled(
     It changes by the shortest step onto the constraints, as that of the assembly: `inverse` is that of the Jacobian.
     """
     position, attitude = guess
-    still = equations.pose_at_rest(position, attitude)
-    gap = equations.system.residual(still, Jet([instant])).coefficients[0]
+    rest_pose = equations.pose_at_rest(position, attitude)
+    gap = equations.system.residual(rest_pose, Jet([instant])).coefficients[0]
     column = -(inverse @ gap)
-    pose = still.displaced(*equations.system.coordinates(column, still.shifts))
+    pose = rest_pose.displaced(*equations.system.coordinates(column, rest_pose.shifts))
     state = known._replace(position=pose.position.coefficients[0][:, 1:], attitude=equations.attitude_of(pose))
     factor = jax.lax.stop_gradient(equations).factored(known, instant)
     return equations.with_rates(factor, state, instant)
@@ -381,8 +381,8 @@ def _corrected(equations: Equations, state: State, time: Instants) -> State:
     state = state._replace(attitude=normalised(state.attitude))
     constant, fixed = jax.lax.stop_gradient((equations, state))
     factor = constant.factored(fixed, time)
-    still = equations.pose_at_rest(state.position, state.attitude)
-    gap = equations.system.residual(still, Jet([time])).coefficients[0]
-    pose = still.displaced(*equations.system.coordinates(equations.least_change(factor, gap), still.shifts))
+    rest_pose = equations.pose_at_rest(state.position, state.attitude)
+    gap = equations.system.residual(rest_pose, Jet([time])).coefficients[0]
+    pose = rest_pose.displaced(*equations.system.coordinates(equations.least_change(factor, gap), rest_pose.shifts))
     position, attitude = pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)
     return equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)

@@ -224,7 +224,7 @@ def read_points(
             message = "points have two or three columns; name them in the first row where there are others"
             raise table.error(message, line=table.rows[0][0], value=len(table.header))
         return None, np.stack([table.column(k) for k in range(len(table.header))], axis=1)
-    found = {}
+    targets = {}
     for letter in "xyz":
         named = [k for k, name in enumerate(table.header) if name == letter or name.endswith(f"_{letter}")]
         exact = [k for k in named if table.header[k] == letter] or named
@@ -232,11 +232,11 @@ def read_points(
             message = f"several columns may be the {letter} of the points; name one of them '{letter}'"
             raise table.error(message, line=table.header_line)
         if exact:
-            found[letter] = table.column(exact[0], rates(("length",), 0))
-    if list(found) not in (["x", "y"], ["x", "y", "z"]):
+            targets[letter] = table.column(exact[0], rates(("length",), 0))
+    if list(targets) not in (["x", "y"], ["x", "y", "z"]):
         message = "points need columns x and y, and in space z"
         raise table.error(message, line=table.header_line, value=", ".join(table.header))
-    points = np.stack(list(found.values()), axis=1)
+    points = np.stack(list(targets.values()), axis=1)
     times = np.array(table.column(table.header.index("time"), (TIME,))) if "time" in table.header else None
     return times, points
 

@@ -147,15 +147,15 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
     """
     links = _file_names(name for name in robot.links if name != robot.base)
     links[robot.base] = robot.base
-    held = _file_names([*robot.joints, *robot.closures])
-    changed = {old: new for names in (links, held) for old, new in names.items() if old != new}
+    file_names = _file_names([*robot.joints, *robot.closures])
+    changed = {old: new for names in (links, file_names) for old, new in names.items() if old != new}
     if not changed:
         return robot, {}
 
     def joint(given: Any) -> Any:
-        mimic = given.mimic and dataclasses.replace(given.mimic, joint=held[given.mimic.joint])
+        mimic = given.mimic and dataclasses.replace(given.mimic, joint=file_names[given.mimic.joint])
         ends = {"parent": links[given.parent], "child": links[given.child]}
-        return dataclasses.replace(given, name=held[given.name], mimic=mimic, **ends)
+        return dataclasses.replace(given, name=file_names[given.name], mimic=mimic, **ends)
 
     made = Robot(
         robot.name,
@@ -163,7 +163,7 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
         [joint(given) for given in robot.joints.values()],
         robot.gravity,
         [
-            dataclasses.replace(given, name=held[given.name], links=[links[name] for name in given.links])
+            dataclasses.replace(given, name=file_names[given.name], links=[links[name] for name in given.links])
             for given in robot.closures.values()
         ],
         robot.strict,
@@ -172,17 +172,17 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
 
 
 def _file_names(names: Iterable[str]) -> dict[str, str]:
-    found: dict[str, str] = {}
+    by_name: dict[str, str] = {}
     names = list(names)
     for name in names:
         new = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:80] or "part"
         new = f"_{new}" if new.startswith("-") else new
         if new == GROUND or names_column(new):
             new += "_"
-        while new in found.values() or (new != name and new in names):
+        while new in by_name.values() or (new != name and new in names):
             new += "_"
-        found[name] = new
-    return found
+        by_name[name] = new
+    return by_name
 
 
 def robot_mechanism(

@@ -178,8 +178,8 @@ class _LimitsFile:
                 entries = data.get(part)
                 if not isinstance(entries, list) or len(entries) < 2:
                     raise self.source.error("must be a list of two values or more", (*at, part), value=entries)
-                found = [self._value(x, kind, (*at, part, k), joint) for k, x in enumerate(entries)]
-                columns.append(np.array(found, float))
+                numbers = [self._value(x, kind, (*at, part, k), joint) for k, x in enumerate(entries)]
+                columns.append(np.array(numbers, float))
             q, values = columns
             if len(q) != len(values) or not bool((np.diff(q) > 0).all()):
                 raise self.source.error("needs positions q that increase, and as many values", at)
@@ -217,8 +217,8 @@ class _LimitsFile:
     def _measured(self, raw: Any, rate: int, at: Location) -> float:
         """Return a length by time to a power, greater than zero where it is a rate."""
         number, dimension = self._parsed(raw, at)
-        wanted = tuple(sorted(({"length": 1} | ({"time": -rate} if rate else {})).items()))
-        if dimension and dimension != wanted:
+        expected = tuple(sorted(({"length": 1} | ({"time": -rate} if rate else {})).items()))
+        if dimension and dimension != expected:
             raise self.source.error(f"{_wrong_unit(dimension)}; it is in {('m', 'm/s', 'm/s^2')[rate]}", at, value=raw)
         if not math.isfinite(number) or (rate and number <= 0):
             raise self.source.error("must be a finite number" + " greater than zero" * bool(rate), at, value=raw)

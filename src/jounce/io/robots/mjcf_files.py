@@ -172,8 +172,8 @@ def check_assets(spec: Any, parts: Iterable[Element], allow: Iterable[str | Path
     roots = list(parts)
     folders = list(dict.fromkeys(Path(part.path).parent for part in roots))
     for tag, asset, file in _asset_files(spec):
-        kept = spec.texturedir if tag == "texture" else spec.meshdir
-        name = str(Path(kept) / (Path(file).name if spec.strippath else file))
+        directory = spec.texturedir if tag == "texture" else spec.meshdir
+        name = str(Path(directory) / (Path(file).name if spec.strippath else file))
         element = Element(tag, {}, roots[0].path, line_of(asset.info) or roots[0].line)
         for folder in folders:
             path = _named(element, name, roots[0], allow, folder)

@@ -21,7 +21,7 @@ def tied_tendons(spec: Any, mujoco: Any, path: str) -> set[str]:
         One runs from site to site.
     """
     along = {t.name for t in spec.tendons if all(part.type == mujoco.mjtWrap.mjWRAP_JOINT for part in t.path)}
-    found: set[str] = set()
+    tied: set[str] = set()
     for equality in spec.equalities:
         if equality.active and equality.type == mujoco.mjtEq.mjEQ_TENDON:
             names = {name for name in (equality.name1, equality.name2) if name}
@@ -29,8 +29,8 @@ def tied_tendons(spec: Any, mujoco: Any, path: str) -> set[str]:
                 name = f"equality.{equality.name}" if equality.name else "equality"
                 message = f"an active equality of a tendon between sites {NO_CLOSURE}"
                 raise RobotFileError(message, path=path, line=line_of(equality.info), name=ascii(name)[1:-1])
-            found |= names
-    return found
+            tied |= names
+    return tied
 
 
 class Ties:

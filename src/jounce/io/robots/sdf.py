@@ -164,9 +164,9 @@ class _Reader:
         ]
         gears = [joint for joint in every if joint.kind == "gearbox"]
         joints = [joint for joint in every if joint.kind != "gearbox"]
-        held = any(WORLD in (joint.parent, joint.child) for joint in joints)
+        to_world = any(WORLD in (joint.parent, joint.child) for joint in joints)
         fixed = flag_of(self.model, "static", "static")
-        base = WORLD if held or fixed else self.frames.canonical_link()
+        base = WORLD if to_world or fixed else self.frames.canonical_link()
         tree, closing = self._divided(joints, base, [*inertias, *([WORLD] if base == WORLD else [])], fixed)
         self.links += [Link(WORLD)] if base == WORLD else []
         self.links += [Link(name, inertia) for name, inertia in inertias.items()]
@@ -241,16 +241,16 @@ class _Reader:
         """Add a joint of the tree, with the massless links that it needs."""
         parent, child = self._link_pose(joint.parent), self._link_pose(joint.child)
         here = FramePose(joint.origin, child.rotation)  # of the joint, with the axes of the child
-        beside = joint.kind != "fixed" and bool(np.any(np.abs(joint.origin - child.position) > 1e-12))
-        intermediate = self._unused(f"{joint.child}_{joint.name}") if beside else joint.child
-        if beside:
+        offset_origin = joint.kind != "fixed" and bool(np.any(np.abs(joint.origin - child.position) > 1e-12))
+        intermediate = self._unused(f"{joint.child}_{joint.name}") if offset_origin else joint.child
+        if offset_origin:
             self.links.append(Link(intermediate))
         first = (child if joint.kind == "fixed" else here).seen_from(parent)
         for part in self._parts(joint, intermediate, child.rotation, mimics):
             self.joints.append(dataclasses.replace(part, position=first.position, rotation=first.rotation))
             self.lines.add(joint.element, "joints", part.name)
             first = HERE
-        if beside:
+        if offset_origin:
             offset = child.seen_from(here).position
             self.joints.append(Joint(self._unused(f"{joint.child}_fixed"), intermediate, joint.child, "fixed", offset))
 
@@ -359,8 +359,8 @@ class _Reader:
     def _gearing(self, gear: SdfJoint, tree: Sequence[SdfJoint]) -> tuple[str, Mimic]:
         """Return which joint a gearbox makes follow, and how: theta_2 = -ratio theta_1 about its own axes."""
         where = ("joints", gear.name)
-        place = needed(gear.element, "gearbox_reference_body", *where)
-        reference = self.frames.link(text_of(gear.element, "gearbox_reference_body", *where), place, *where)
+        body = needed(gear.element, "gearbox_reference_body", *where)
+        reference = self.frames.link(text_of(gear.element, "gearbox_reference_body", *where), body, *where)
         needed(gear.element, "gearbox_ratio", *where)
         ratio = number_of(gear.element, "gearbox_ratio", *where, default=1.0)
         turned = []

@@ -69,11 +69,11 @@ class Frames:
             if name == WORLD:
                 return name
             self._check(name, element, *where)
-            found = self.elements[name]
-            if found.tag == "link":
+            target = self.elements[name]
+            if target.tag == "link":
                 return name
-            following = text_of(found, "child", "joints", name) if found.tag == "joint" else _attachment(found)
-            self._extend(chain, self.canonical_link() if following == MODEL else following, found)
+            following = text_of(target, "child", "joints", name) if target.tag == "joint" else _attachment(target)
+            self._extend(chain, self.canonical_link() if following == MODEL else following, target)
 
     def canonical_link(self) -> str:
         """Return the link that stands for the model: the first one, unless it names another."""
@@ -140,10 +140,10 @@ def only(element: Element, tag: str, *name: str) -> Element | None:
 
 def needed(element: Element, tag: str, *name: str) -> Element:
     """Return the one child of a tag, which must be there."""
-    found = only(element, tag, *name)
-    if found is None:
+    single = only(element, tag, *name)
+    if single is None:
         raise element.error(f"<{element.tag}> has no <{tag}>", *name)
-    return found
+    return single
 
 
 def text_of(element: Element, tag: str, *name: str) -> str:

@@ -186,16 +186,16 @@ def _of_gazebo(
     about = gazebo.attributes.get("reference", "").strip()
     moves = any(joint.moving for joint in names.get(about, ()))
     frame, link = robot.frames.get(about), robot.links.get(about)
-    carried = frame is not None and frame.body >= 0
-    heavy = carried and link is not None and link.inertia is not None and link.inertia.mass > 0
+    on_moving = frame is not None and frame.body >= 0
+    heavy = on_moving and link is not None and link.inertia is not None and link.inertia.mass > 0
     table: dict[str, tuple[str, bool, Callable[[Element], bool]]] = {
         **dict.fromkeys(SPRINGS, (JOINT_SPRINGS, moves, _counts)),
         "gravity": (WEIGHTLESS, heavy, lambda x: x.content.strip() in NO),
         "turnGravityOff": (WEIGHTLESS, heavy, lambda x: x.content.strip() in YES),
-        "kinematic": (KINEMATIC, carried, lambda x: x.content.strip() in YES),
+        "kinematic": (KINEMATIC, on_moving, lambda x: x.content.strip() in YES),
         "static": (STATIC, moving and not about, lambda x: x.content.strip() in YES),
-        "dampingFactor": (DECAY, carried, _counts),
-        "velocity_decay": (DECAY, carried, lambda x: any(map(_counts, x.children))),
+        "dampingFactor": (DECAY, on_moving, _counts),
+        "velocity_decay": (DECAY, on_moving, lambda x: any(map(_counts, x.children))),
         "joint": (IN_GAZEBO, not about, lambda _: True),
         "link": (IN_GAZEBO, not about, lambda _: True),
         "plugin": (PLUGINS, True, lambda x: _followed(x, joints)),

@@ -65,11 +65,11 @@ def _verdicts(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
             judge = (
                 _history if figure in cases.HISTORIES else _tolerances if figure in cases.TOLERANCE_SWEEPS else _steps
             )
-            found, confirmed, but = judge([results[name] for name in names], figure)
+            result, confirmed, but = judge([results[name] for name in names], figure)
             chosen = {STANDS_IN[name] for name in names} - {""}
             verdict = ("reproduced" if confirmed else "NOT reproduced") + but
             verdict += f"; {', '.join(sorted(chosen))}: stand-in" if chosen else ""
-            yield str(figure), found, verdict
+            yield str(figure), result, verdict
 
 
 def _history(results: Sequence[Results], figure: int) -> tuple[str, bool, str]:

@@ -139,7 +139,7 @@ def follow_tool_path(
     u = np.concatenate([begin / scale, np.zeros(equations.size - n)])
     if equations.has_posture:
         u = _to_posture(equations, u, target, path.start, link)
-    nodes = followed(equations, u, target, path.start, path.stop, path.max_order)
+    nodes = followed(equations, u, target, path.start, path.stop, path.highest)
     motion = ToolPathMotion(robot, link, path, equations, nodes, target, whole, ranges if limits else None, time, order)
     if strict:
         _raise_for(motion, nodes)

@@ -143,7 +143,7 @@ class ToolPath(Displayed):
         return tuple(kind for kind, part in parts.items() if part is not None)
 
     @property
-    def max_order(self) -> int:
+    def highest(self) -> int:
         """The highest derivative that is continuous, as far as splines decide it."""
         laws = [law for part in (self._position, self._direction) if part is not None for law in part.laws.values()]
         degrees = [law.degree for law in laws if type(law) is SplineMotion]
@@ -197,8 +197,8 @@ class ToolPath(Displayed):
         TrajectoryError
             If an instant is outside, a law is not smooth there, or there is no derivative so high.
         """
-        if order > self.max_order:
-            message = f"the splines of this path have continuous derivatives to {self.max_order}; give a higher degree"
+        if order > self.highest:
+            message = f"the splines of this path have continuous derivatives to {self.highest}; give a higher degree"
             raise TrajectoryError(message, name="order", value=order)
         time = Jet.variable(jnp.asarray(times), order)
         if self._progress is not None:

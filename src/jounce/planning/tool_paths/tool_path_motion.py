@@ -108,7 +108,7 @@ class ToolPathMotion(Displayed):
         self._parts = (equations, nodes, target, rank, ranges)
         self.order = whole_number("order", order, 0, MAX_ORDER)
         self.time = _instants(path, time)
-        path.judge(min(self.order, path.max_order))
+        path.judge(min(self.order, path.highest))
         lost, self.ending = (Status.OK, "") if nodes.failed is None else self._why()
         until = nodes.time[-1] if nodes.failed is not None else np.inf
         self._until = until
@@ -244,7 +244,7 @@ class ToolPathMotion(Displayed):
         if (self.status != Status.OK).any():
             bad = int(np.argmax(self.status != Status.OK))
             raise TrajectoryError(f"there are no coordinates: {self.explain(bad)}", name=f"time[{bad}]")
-        order = max(self.order, min(LEAST, self.path.max_order))
+        order = max(self.order, min(LEAST, self.path.highest))
         times, q = followed_closely(self._exact(order), self.time, self.path.knots)
         laws = {name: HermiteMotion(times, q[:, :, k]) for k, name in enumerate(self.robot.joint_names)}
         return JointTrajectory(laws, float(times[0]), float(times[-1]), np.unique(times))

@@ -70,7 +70,7 @@ def expansion_table(motion: Feedforward) -> Table | None:
 
 
 def drives_verdict(report: LimitRows) -> str:
-    """Word whether limits of drives are kept, and the place nearest to one, or that breaks one most."""
+    """Word whether limits of drives are kept, and the quantity nearest to one, or that breaks one most."""
     worst = report.worst
     if worst is None:
         return "No limits are given."

@@ -74,11 +74,11 @@ def _facts(spread: Any, column: Column, names: Sequence[str]) -> dict[str, Any]:
 def chosen(spread: xarray.Dataset, variable: str, column: Column) -> np.ndarray:
     """Return what a variable holds of a column: numbers over time, for each parameter, or one."""
     _, component, order = column
-    found = spread[variable].sel(derivative=order)
-    axes = [dim for dim in found.dims if dim not in ("time", "parameter")]
-    labels = ["".join(map(str, x)) for x in itertools.product(*(found[axis].values for axis in axes))]
-    dims = [dim for dim in ("parameter", "time") if dim in found.dims]
-    values = found.transpose(*axes, *dims).values
+    data = spread[variable].sel(derivative=order)
+    axes = [dim for dim in data.dims if dim not in ("time", "parameter")]
+    labels = ["".join(map(str, x)) for x in itertools.product(*(data[axis].values for axis in axes))]
+    dims = [dim for dim in ("parameter", "time") if dim in data.dims]
+    values = data.transpose(*axes, *dims).values
     return np.asarray(values.reshape(-1, *values.shape[len(axes) :])[labels.index(component)])
 
 

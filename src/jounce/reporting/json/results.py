@@ -86,7 +86,7 @@ def motion_result(motion: Motion | Stretches, file: Path, written: Path | None, 
 
 
 def peak_facts(peak: Peak) -> dict[str, Any]:
-    """Return what is told of a peak, in SI."""
+    """Return the facts of a peak, in SI."""
     record = dataclasses.asdict(peak)
     del record["size"]
     return record

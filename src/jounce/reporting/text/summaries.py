@@ -177,7 +177,7 @@ def torques_summary(
 
 
 def verdict(report: LimitReport) -> str:
-    """Word whether the limits are kept, and the place that is nearest to breaking one or breaks one most."""
+    """Word whether the limits are kept, and the quantity that is nearest to breaking one or breaks one most."""
     number, worst = len(report.limited), report.worst
     assert worst is not None
     size = "infinite by a jump" if worst.infinite else f"{worst.ratio:.4g} of its limit"

@@ -136,7 +136,7 @@ def _applied(
 def _on_bodies(
     tree: Tree,
     arrays: tuple[Any, ...],
-    places: tuple[Frame, ...],
+    link_frames: tuple[Frame, ...],
     global_axes: tuple[bool, ...],
     scene: tuple[Jet, Jet, Jet] | None = None,
 ) -> BodyWrenches | None:
@@ -150,7 +150,7 @@ def _on_bodies(
     levels = q.shape[0] - 2
     frames: Any = body_frames(tree, q[:levels]) if any(global_axes) else None
     whole = jnp.zeros((levels, tree.shape.bodies + 1, 6, q.shape[-1]))
-    for values, (body, point, rotation), in_base in zip(wrenches, places, global_axes, strict=True):
+    for values, (body, point, rotation), in_base in zip(wrenches, link_frames, global_axes, strict=True):
         force, torque = Jet(tuple(values[:, :3])), Jet(tuple(values[:, 3:]))
         if in_base:
             frame = frames.take(body)
@@ -204,8 +204,8 @@ def _joint_wrenches(
     tree: Tree, arrays: tuple[Any, ...], constants: Any, global_axes: tuple[bool, ...], in_base: bool
 ) -> BodyWrenches:
     q = arrays[0]
-    places, aligned = constants
-    applied = _on_bodies(tree, arrays, places, global_axes)
+    link_frames, aligned = constants
+    applied = _on_bodies(tree, arrays, link_frames, global_axes)
     applied = None if applied is None else applied[:, :-1]
     _, force, moment, _ = recursive_newton_euler(tree, q, applied)
     parts = [Jet(tuple(jnp.swapaxes(x, 1, 2))) for x in (force, moment)]  # components, bodies, batch

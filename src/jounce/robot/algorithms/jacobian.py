@@ -75,9 +75,9 @@ def jacobian(
     return _jacobian(robot, (checked_coordinates(robot, q),), frame_at(robot, link, point))
 
 
-def twist(tree: Tree, q: Series, place: Frame) -> Jet:
+def twist(tree: Tree, q: Series, frame_in_body: Frame) -> Jet:
     """Return the velocity of a point and the angular velocity of its link, (6, batch), one order shorter than q."""
-    frame = link_frame(tree, q, place)
+    frame = link_frame(tree, q, frame_in_body)
     assert frame.angular_velocity is not None  # there are velocities
     return concatenate([frame.position.differentiate(), frame.angular_velocity])
 

@@ -242,10 +242,10 @@ class AbstractRobot(Displayed, abc.ABC):
         4.905
         """
         check_name("link", link, self.links, RobotError, name="link")
-        held = self.links[link].inertia or Inertia(0.0, strict=False)
+        previous = self.links[link].inertia or Inertia(0.0, strict=False)
         given = {"mass": mass, "center_of_mass": center_of_mass, "tensor": tensor}
-        values: dict[str, Any] = {k: getattr(held, k) if v is None else v for k, v in given.items()}
-        if is_traced(values) or isinstance(held, TracedInertia):
+        values: dict[str, Any] = {k: getattr(previous, k) if v is None else v for k, v in given.items()}
+        if is_traced(values) or isinstance(previous, TracedInertia):
             inertia = TracedInertia(**values)
         else:
             inertia = Inertia(**values, strict=self.strict)
@@ -303,8 +303,8 @@ class AbstractRobot(Displayed, abc.ABC):
 
     def _changed(self: Made, **parts: Any) -> Made:
         """Return the robot with other links, joints, gravity or closures."""
-        held = {name: list(getattr(self, name).values()) for name in ("links", "joints", "closures")}
-        return type(self)(**{"name": self.name, "gravity": self.gravity, "strict": self.strict, **held, **parts})
+        current = {name: list(getattr(self, name).values()) for name in ("links", "joints", "closures")}
+        return type(self)(**{"name": self.name, "gravity": self.gravity, "strict": self.strict, **current, **parts})
 
     def _checked_closure(self, closure: Closure) -> Closure:
         """Return a closure with what it leaves to the pose at coordinates zero."""

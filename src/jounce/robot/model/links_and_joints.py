@@ -98,17 +98,17 @@ def leaders(mimics: Mapping[str, Mimic]) -> dict[str, Mimic]:
 
     Circles are left as they are, for the robot to refuse.
     """
-    found: dict[str, Mimic] = {}
+    mimic_of: dict[str, Mimic] = {}
     for name in mimics:
         chain: dict[str, Mimic] = {}  # from a follower to the first joint that is known, or leads
-        while name in mimics and name not in found and name not in chain:
+        while name in mimics and name not in mimic_of and name not in chain:
             chain[name] = mimics[name]
             name = mimics[name].joint
         circle = name in chain
         for follower, mimic in reversed(chain.items()):
-            leader = None if circle else found.get(mimic.joint)
-            found[follower] = mimic if leader is None else mimic.after(leader)
-    return found
+            leader = None if circle else mimic_of.get(mimic.joint)
+            mimic_of[follower] = mimic if leader is None else mimic.after(leader)
+    return mimic_of
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -169,7 +169,7 @@ class ViserScene:
         camera.fov, camera.near, camera.far = field, 0.01 * distance, 20.0 * distance
 
     def _set_grid(self, normal: int, position: Vector, size: float) -> None:
-        """Draw a grid of round cells through a place, across one of the axes."""
+        """Draw a grid of round cells through a position, across one of the axes."""
         cell = rounded_down(0.12 * size)
         section = 5 * cell
         width = float(np.ceil(2.2 * size / section)) * section

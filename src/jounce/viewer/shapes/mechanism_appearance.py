@@ -78,12 +78,12 @@ def _points(mechanism: Mechanism, seen: Skeleton) -> list[BodyPoint]:
     points = []
     for name, output in mechanism.outputs.items():
         if isinstance(output, PointOutput):
-            place = np.asarray(resolve(output.point, mechanism.parameter_values), float)
-            points.append(BodyPoint(output.bodies[0], tuple(place.tolist()), name))
+            position = np.asarray(resolve(output.point, mechanism.parameter_values), float)
+            points.append(BodyPoint(output.bodies[0], tuple(position.tolist()), name))
     known = {(point.body, point.point) for point in points}
     for body, link in seen.links.items():
-        for place, names in zip(link.points, link.names, strict=True):
-            if body != GROUND and (body, tuple(place.tolist())) not in known:
+        for position, names in zip(link.points, link.names, strict=True):
+            if body != GROUND and (body, tuple(position.tolist())) not in known:
                 words = ", ".join(names) or "centre of mass"
-                points.append(BodyPoint(body, tuple(place.tolist()), f"{body}: {words}"))
+                points.append(BodyPoint(body, tuple(position.tolist()), f"{body}: {words}"))
     return points

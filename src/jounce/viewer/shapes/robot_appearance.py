@@ -97,22 +97,22 @@ def _bars(robot: Robot, size: float) -> Shapes:
     thin = 0.016 * size
     colours = {link: BODY_COLOURS[k % len(BODY_COLOURS)] for k, link in enumerate(robot.moving_links)}
     colours[robot.base] = DARK
-    found: Shapes = {}
+    shapes: Shapes = {}
     for body, ends in _ends(robot).items():
         bars = [capsule(np.zeros(3), end, thin) for end in ends if np.linalg.norm(end) > 1e-3 * size]
-        found[body] = [ColouredMesh(merged(bars), colours[body])] if bars else []
+        shapes[body] = [ColouredMesh(merged(bars), colours[body])] if bars else []
         if body == robot.base:
-            found[body].append(ColouredMesh(cylinder(0.06 * size, 0.02 * size, upward(robot.gravity)), DARK))
+            shapes[body].append(ColouredMesh(cylinder(0.06 * size, 0.02 * size, upward(robot.gravity)), DARK))
         elif not bars:
-            found[body].append(ColouredMesh(sphere(1.4 * thin), colours[body]))
+            shapes[body].append(ColouredMesh(sphere(1.4 * thin), colours[body]))
     for joint in robot.joints.values():
         if joint.moving and joint.turning:
-            found[joint.child].append(ColouredMesh(cylinder(1.35 * thin, 4.2 * thin, joint.axis), DARK))
+            shapes[joint.child].append(ColouredMesh(cylinder(1.35 * thin, 4.2 * thin, joint.axis), DARK))
         elif joint.moving:
             block = box([3 * thin, 3 * thin, 5 * thin], rotation=rotation_to(joint.axis))
-            found[joint.child].append(ColouredMesh(block, DARK))
-            found[joint.child].append(ColouredMesh(cylinder(0.6 * thin, 10 * thin, joint.axis), GREY))
-    return found
+            shapes[joint.child].append(ColouredMesh(block, DARK))
+            shapes[joint.child].append(ColouredMesh(cylinder(0.6 * thin, 10 * thin, joint.axis), GREY))
+    return shapes
 
 
 def _points(robot: Robot) -> Iterator[BodyPoint]:

@@ -229,7 +229,7 @@ def coordinates(robot: Robot, trajectory: JointTrajectory, time: Times, order: i
     q = np.zeros((len(time), order + 1, len(robot.joint_names)))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)  # the page shows how rough they are
-        found = trajectory.derivatives(time, order)
+        derivatives = trajectory.derivatives(time, order)
     for k, name in enumerate(trajectory.names):
-        q[..., robot.joint_names.index(name)] = found[..., k]
+        q[..., robot.joint_names.index(name)] = derivatives[..., k]
     return q
