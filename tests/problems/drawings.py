@@ -352,7 +352,7 @@ def assert_same(mechanism, kept, found, drawings, moved):
         if isinstance(output, ATTITUDES):
             expected, values = attitudes(output, expected, values, drawings)
         elif isinstance(output, PotentialEnergyOutput):  # from another origin
-            expected[:, 0] += weight(mechanism, output.alone) @ world.origin
+            expected[:, 0] += weight(mechanism, output.single_body) @ world.origin
         elif expected.ndim == 3:
             expected = expected @ drawings[frame_of(mechanism, output)].axes
         if isinstance(output, jn.PointOutput):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jounce.reporting.maxima import Highest
+from jounce.reporting.maxima import RunningMaxima
 
 
 def brute_force(time, curve):
@@ -21,7 +21,7 @@ def brute_force(time, curve):
 def test_stretches_have_the_maxima_of_the_whole(cuts, seed):
     curves = np.random.default_rng(seed).integers(0, 4, size=(12, 5)).astype(float)  # many are equal
     time = np.linspace(2.0, 3.1, 12) ** 2
-    found = Highest(2)
+    found = RunningMaxima(2)
     for part in zip(np.split(time, cuts), np.split(curves, cuts), strict=True):
         found.add(*part, np.ones(5))
     low, high = found.around_maxima()

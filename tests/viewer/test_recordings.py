@@ -24,7 +24,7 @@ def rim(recording):
 def test_bodies_are_where_the_law_puts_them(recording):
     expected = derivatives_of_the_rim(recording.time)
     assert recording.bodies == ("ground", "wheel")
-    np.testing.assert_allclose(recording.placed("wheel", [RADIUS, 0]), expected[:, 0], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(recording.global_point("wheel", [RADIUS, 0]), expected[:, 0], rtol=0, atol=1e-14)
     turned = rotated(recording.quaternion[:, 1], np.array([1.0, 0, 0]))
     np.testing.assert_allclose(turned * RADIUS, expected[:, 0], rtol=0, atol=1e-14)
     assert not recording.position[:, 0].any()

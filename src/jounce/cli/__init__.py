@@ -196,10 +196,10 @@ def application() -> Any:
         result_action="return_value",
         suppress_keyboard_interrupt=False,
     )
-    for place, command in enumerate(COMMANDS):
+    for index, command in enumerate(COMMANDS):
         _, _, examples = cleandoc(command.__doc__ or "").partition("Examples\n--------\n")
         app.command(
-            command if command in LIGHT else _computing(command), help_epilogue=f"Examples:\n{examples}", sort_key=place
+            command if command in LIGHT else _computing(command), help_epilogue=f"Examples:\n{examples}", sort_key=index
         )
     return app
 

@@ -64,25 +64,25 @@ def cam(
     from jounce.reporting.facts.cam_facts import cam_facts, cam_words
 
     output.check()
-    told = heading.units
+    unit_choice = heading.units
     if figure is not None:
         from jounce.plot import check_figure
 
         check_figure(figure, overwrite=output.overwrite)
     with expecting(file, "cam"):
-        found = load_cam(file, allow=allowed(allow), set_=set_ or (), count=count)
+        profile = load_cam(file, allow=allowed(allow), set_=set_ or (), count=count)
     for target in (output.out, figure):
         spare_inputs(target, overwrite=output.overwrite)
-    shown = units_chosen(found.shown_units, units)
+    shown = units_chosen(profile.shown_units, units)
     with errors_about(file):
-        facts = cam_facts(found)
+        facts = cam_facts(profile)
     if not output.json:
         say(cam_words(facts, shown))
-    output.write(lambda: in_units(found.dataset, shown), header_units=told)
+    output.write(lambda: in_units(profile.dataset, shown), header_units=unit_choice)
     if figure is not None:
         from jounce.plot import draw_cam, save
 
-        drawn = draw_cam(found, shown)
+        drawn = draw_cam(profile, shown)
         written(lambda: save(drawn, figure, overwrite=output.overwrite))
     output.tell("cam", lambda: {"file": file, **facts, "written": output.out})
     if figure is not None and not output.json:

@@ -98,11 +98,11 @@ def _mechanism(source: Path, target: Path, imports: list[Path] | None, allow: Se
     with expecting(source, "mechanism"):
         data, samples = converted(source, target, allow)
     text = dumped(data, target.suffix.lower(), str(target))
-    for beside in samples:  # all, before the first is written
-        check_target(beside, overwrite=overwrite)
-        refuse_existing(beside, overwrite=overwrite)
-    for beside, path in samples.items():
-        with replacing(beside, overwrite=overwrite) as scratch:
+    for table_file in samples:  # all, before the first is written
+        check_target(table_file, overwrite=overwrite)
+        refuse_existing(table_file, overwrite=overwrite)
+    for table_file, path in samples.items():
+        with replacing(table_file, overwrite=overwrite) as scratch:
             scratch.write_bytes(read_file(path, MAX_SAMPLES, what="the samples"))
     _put(text, target, allow, overwrite)
     say(f"Written to {', '.join(str(path) for path in (target, *samples))}")

@@ -82,13 +82,17 @@ def trace(
     with errors_about(file), options_named():
         curves = [traced(mechanism, time, driver=driver, order=order, count=points, length=length)]
         if circuits:
-            found = assemblies(mechanism, time, driver=curves[0].driver).circuits
+            chosen_circuits = assemblies(mechanism, time, driver=curves[0].driver).circuits
             here = curves[0].coordinates_at(0.0)
-            curves += [x.sampled(order, points) for x in found if not any(c.passes(here) for c in x.connected())]
-    return told(curves, file, figure, show, output)
+            curves += [
+                x.sampled(order, points) for x in chosen_circuits if not any(c.passes(here) for c in x.connected())
+            ]
+    return write_curves(curves, file, figure, show, output)
 
 
-def told(curves: list[Curve], file: Path, figure: Path | None, show: list[str] | None, output: TableOutput) -> int:
+def write_curves(
+    curves: list[Curve], file: Path, figure: Path | None, show: list[str] | None, output: TableOutput
+) -> int:
     """Print what there is to tell of curves, write the first of them, draw all, and return the exit status."""
     from jounce.reporting.facts.curve_facts import curve_facts, curve_summary, curve_tables
 

@@ -134,14 +134,14 @@ def optimize(
 
 def _bounds(given: dict[str, str]) -> dict[str, tuple[Any, Any]]:
     """Return the bounds of parameters, as text with units."""
-    found = {}
+    bounds = {}
     for name, text in given.items():
         low, colon, high = (part.strip() for part in text.partition(":"))
         if not (low and colon and high) or ":" in high:
             message = "a parameter is varied by NAME=LOW:HIGH, such as BC=12cm:16cm"
             raise JounceError(message, name="--vary", value=f"{name}={text}")
-        found[name] = low, high
-    return found
+        bounds[name] = low, high
+    return bounds
 
 
 def _points(name: str, path: str) -> Any:

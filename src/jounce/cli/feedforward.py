@@ -91,13 +91,13 @@ def feedforward(
         for target in (output.out, figure):
             spare_inputs(target, overwrite=output.overwrite)
         with errors_about(file if trajectory is None else trajectory, file):
-            found = computed(system, motion, springs, rates=rates, losses=not no_losses)
-            report = found.report
-            errors = link_errors(found) if simulate or figure is not None else None
+            result = computed(system, motion, springs, rates=rates, losses=not no_losses)
+            report = result.report
+            errors = link_errors(result) if simulate or figure is not None else None
     if not output.json:
-        say(facts.feedforward_words(found, getattr(found.system, "held", {})))
+        say(facts.feedforward_words(result, getattr(result.system, "resting_joints", {})))
         show_table(facts.drives_table(report), "bold red")
-        if (table := facts.expansion_table(found)) is not None:
+        if (table := facts.expansion_table(result)) is not None:
             show_table(table)
     recorded_cautions(caught, json=output.json)
     if not output.json:
@@ -107,10 +107,10 @@ def feedforward(
     if figure is not None and errors is not None:
         from jounce.plot import draw_feedforward, save
 
-        drawn = draw_feedforward(found, errors)
+        drawn = draw_feedforward(result, errors)
         written(lambda: save(drawn, figure, overwrite=output.overwrite))
-    output.write(lambda: found.dataset)
-    output.tell("feedforward", lambda: facts.feedforward_result(found, file, trajectory, errors, output.out))
+    output.write(lambda: result.dataset)
+    output.tell("feedforward", lambda: facts.feedforward_result(result, file, trajectory, errors, output.out))
     return 0 if report.kept else 1
 
 

@@ -125,7 +125,7 @@ def _check_target(kind: str, out: Path, overwrite: bool) -> None:
     (check_animation if kind == "animation" else check_figure)(out, overwrite=overwrite)
 
 
-def _check_names(mechanism: Mechanism, kind: str, wanted: Sequence[str], file: Path) -> None:
+def _check_names(mechanism: Mechanism, kind: str, names: Sequence[str], file: Path) -> None:
     """Raise MechanismError for a name that does not exist, before anything is solved."""
     known = [*mechanism.outputs]
     if kind == "reactions":
@@ -133,10 +133,10 @@ def _check_names(mechanism: Mechanism, kind: str, wanted: Sequence[str], file: P
     elif not known and kind in ("outputs", *PORTRAITS):
         raise MechanismError("there is nothing to draw; name some outputs", path=file, name="outputs")
     what = "joint, driver or force" if kind == "reactions" else "output"
-    for name in wanted:
+    for name in names:
         check_name(what, name, known, MechanismError, path=file, name="joints" if kind == "reactions" else "outputs")
-    if kind in PORTRAITS and len(wanted) > 1:
-        raise MechanismError("one output is drawn at a time", path=file, name="--output", value=list(wanted))
+    if kind in PORTRAITS and len(names) > 1:
+        raise MechanismError("one output is drawn at a time", path=file, name="--output", value=list(names))
 
 
 def _moved(mechanism: Mechanism, file: Path, order: int) -> Motion:

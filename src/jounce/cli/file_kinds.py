@@ -74,7 +74,7 @@ def _kind_of_data(data: Any) -> str | None:
 
 
 @contextmanager
-def expecting(path: str | PathLike[str], *wanted: str) -> Iterator[None]:
+def expecting(path: str | PathLike[str], *kinds: str) -> Iterator[None]:
     """Where a file of a kind cannot be read, say which kind it is instead, and what takes it.
 
     Raises
@@ -86,7 +86,7 @@ def expecting(path: str | PathLike[str], *wanted: str) -> Iterator[None]:
         yield
     except (MechanismFileError, RobotError, TrajectoryError) as error:
         kind = kind_of(path)
-        if kind is None or kind in wanted:
+        if kind is None or kind in kinds:
             raise
         advice = ADVICE[kind].format(path=path, stem=Path(fspath(path)).stem)
         raise type(error)(advice, path=path) from None

@@ -88,8 +88,8 @@ def inspect(
         for table in robot_tables(facts) if robot else mechanism_tables(facts, bodies_table(facts)):
             show_table(table)
         say(f"\n{start_summary(facts)}")
-        if found := facts.get("range"):
+        if range_found := facts.get("range"):
             from jounce.reporting.facts.range_facts import range_words
 
-            say(f"\n{range_words(dict(found))}")
+            say(f"\n{range_words(dict(range_found))}")
     return 0 if facts["ok"] else 1

@@ -58,15 +58,15 @@ def run(
       jounce run examples/four_bar.yaml --units angle=deg,length=mm
     """
     output.check()
-    told = heading.units
+    units = heading.units
     mechanism = reading.mechanism(file)
     spare_inputs(output.out, overwrite=output.overwrite)
     refine = not no_refine
     if _is_long(mechanism, file):
-        motion = _streamed(mechanism, file, order, tolerance, output, refine=refine, heading=told)
-        return _told("run", motion, file, output, refine=refine)
+        motion = _streamed(mechanism, file, order, tolerance, output, refine=refine, heading=units)
+        return _write_result("run", motion, file, output, refine=refine)
     motion = solved(mechanism, file, order, tolerance)
-    return _finished("run", motion, file, output, refine=refine, heading=told)
+    return _finished("run", motion, file, output, refine=refine, heading=units)
 
 
 def simulate(
@@ -111,11 +111,11 @@ def simulate(
     """
     output.check()
     chosen = method_of(method, step)
-    told = heading.units
+    units = heading.units
     mechanism = reading.mechanism(file)
     spare_inputs(output.out, overwrite=output.overwrite)
     motion = simulated(mechanism, file, order, method=chosen, tolerance=tolerance, longest_step=longest_step)
-    return _finished("simulate", motion, file, output, refine=not no_refine, heading=told)
+    return _finished("simulate", motion, file, output, refine=not no_refine, heading=units)
 
 
 def _is_long(mechanism: Mechanism, file: Path) -> bool:
@@ -138,12 +138,12 @@ def _streamed(
     """Solve stretch by stretch, and write each of them before the next is solved."""
     from jounce.io import in_units
     from jounce.kinematics import solve_in_stretches
-    from jounce.reporting.peaks import looked_at
+    from jounce.reporting.peaks import parts_with_peaks
 
     with Bar("solving") as bar:
         with errors_about(file):
             motion = solve_in_stretches(mechanism, order=order, tolerance=tolerance, progress=bar)
-        parts = (in_units(part.dataset, mechanism.shown_units) for part in looked_at(motion, refine=refine))
+        parts = (in_units(part.dataset, mechanism.shown_units) for part in parts_with_peaks(motion, refine=refine))
         output.write_parts(parts, len(motion.time), header_units=heading)
     return motion
 
@@ -164,10 +164,10 @@ def _finished(
 
         output.write(lambda: in_units(motion.dataset, motion.mechanism.shown_units), header_units=heading)
 
-    return _told(command, motion, file, output, refine=refine, write=write)
+    return _write_result(command, motion, file, output, refine=refine, write=write)
 
 
-def _told(
+def _write_result(
     command: str,
     motion: Motion | Stretches,
     file: Path,

@@ -296,14 +296,14 @@ def positive_quantity(option: str, text: str, dimensions: Collection[Dimension],
     except ValueError:
         number = text
     try:
-        found = parse_value(number)
+        quantity = parse_value(number)
     except JounceError as error:
         raise error.located(name=option, value=text) from None
-    if found.dimension is not None and found.dimension not in dimensions:
+    if quantity.dimension is not None and quantity.dimension not in dimensions:
         raise UnitError(f"must be {words}", name=option, value=text)
-    if not isinstance(found.value, float) or found.value <= 0:
+    if not isinstance(quantity.value, float) or quantity.value <= 0:
         raise JounceError("must be greater than zero", name=option, value=text)
-    return found.value
+    return quantity.value
 
 
 CURVE_OPTIONS = {"driver": "--driver", "order": "--order", "count": "--points", "length": "--length", "time": "--time"}

@@ -111,8 +111,8 @@ def retime(
             result = _of_robot(
                 file, path, limits, frequency, asked | {"repair": repair, "hand_over": hand_over}, reading, output
             )
-    _told(result, (file, path), figure, output)
-    return 0 if result.found.report.kept else 1
+    _write_result(result, (file, path), figure, output)
+    return 0 if result.retimed.report.kept else 1
 
 
 def deviation_of(text: str) -> float:
@@ -124,7 +124,7 @@ def deviation_of(text: str) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class _Result:
-    found: RetimedTrajectory
+    retimed: RetimedTrajectory
     free: float  # duration before it was fitted to rows, s
     before: float | None
     read: Any = None
@@ -140,11 +140,11 @@ def _of_mechanism(file: Path, limits: Path | None, rate: float, asked: Any, read
         raise JounceError("a mechanism has no limits of its own; give a file of limits with --limits", path=file)
     bounds = load_drive_limits(limits, mechanism)
     with errors_about(file):
-        found = find(mechanism, None, bounds, **asked)
+        retimed = find(mechanism, None, bounds, **asked)
     from jounce.mechanism import TimeGrid, time_grid
 
-    found.times = time_grid(TimeGrid(0.0, found.stop, 1 / rate), {})
-    return _Result(found, found.stop, found.path.stop - found.path.start)
+    retimed.times = time_grid(TimeGrid(0.0, retimed.stop, 1 / rate), {})
+    return _Result(retimed, retimed.stop, retimed.path.stop - retimed.path.start)
 
 
 def _of_robot(
@@ -164,52 +164,52 @@ def _of_robot(
         given = load_path(path, reading.degree, allowed(reading.allow))
     spare_inputs(output.out, overwrite=output.overwrite)
     with errors_about(path, file):
-        found = find(model, given, bounds, **asked)
-        free, read = found.stop, None
+        retimed = find(model, given, bounds, **asked)
+        free, read = retimed.stop, None
         if output.out is not None:
-            found, read = _at_rate(model, found, bounds, rate, reading.degree)
-    return _Result(found, free, given.stop - given.start if isinstance(given, JointTrajectory) else None, read)
+            retimed, read = _at_rate(model, retimed, bounds, rate, reading.degree)
+    return _Result(retimed, free, given.stop - given.start if isinstance(given, JointTrajectory) else None, read)
 
 
-def _told(result: _Result, files: tuple[Path, Path | None], figure: Path | None, output: TableOutput) -> None:
+def _write_result(result: _Result, files: tuple[Path, Path | None], figure: Path | None, output: TableOutput) -> None:
     """Print, draw and write a result."""
     from jounce.reporting.retiming_facts import binding_table, retimed_words, retiming_result
 
-    found = result.found
+    retimed = result.retimed
     for file in (output.out, figure):
         spare_inputs(file, overwrite=output.overwrite)
     if not output.json:
         names = [file.name for file in files if file is not None]
-        say(retimed_words(found, result.before, result.free, names, result.read))
-        show_table(binding_table(found))
-    output.write(lambda: sampled(found))
+        say(retimed_words(retimed, result.before, result.free, names, result.read))
+        show_table(binding_table(retimed))
+    output.write(lambda: sampled(retimed))
     if figure is not None:
         from jounce.plot import save
         from jounce.plot.retiming import draw_retiming
 
-        title = f"{found.report.robot}: {files[1].name}" if files[1] is not None else found.report.robot
-        written(lambda: save(draw_retiming(found, title), figure, overwrite=output.overwrite))
-    told = (output.out, figure)
-    output.tell("retime", lambda: retiming_result(found, result.before, result.free, files, told))
+        title = f"{retimed.report.robot}: {files[1].name}" if files[1] is not None else retimed.report.robot
+        written(lambda: save(draw_retiming(retimed, title), figure, overwrite=output.overwrite))
+    written_files = (output.out, figure)
+    output.tell("retime", lambda: retiming_result(retimed, result.before, result.free, files, written_files))
 
 
-def _at_rate(model: Any, found: RetimedTrajectory, bounds: Any, rate: float, degree: int) -> tuple[Any, Any]:
+def _at_rate(model: Any, retimed: RetimedTrajectory, bounds: Any, rate: float, degree: int) -> tuple[Any, Any]:
     """Return the trajectory that rows at a rate describe, its limits kept by splines through them."""
     from jounce.planning.retiming.sampling import fit_to_samples
 
     try:
-        return fit_to_samples(model, found, bounds, rate, degree=degree)
+        return fit_to_samples(model, retimed, bounds, rate, degree=degree)
     except JounceError as error:
         raise error.located(name="--rate") from None
 
 
-def sampled(found: RetimedTrajectory) -> Any:
+def sampled(retimed: RetimedTrajectory) -> Any:
     """Return the positions of the joints, and their derivatives to jerk, at the instants of a trajectory."""
     import xarray
 
     from jounce.units.shown_units import time_axes
 
-    values = found.derivatives(found.times, ROWS)
-    variables = {name: (("time", "derivative"), values[:, :, k]) for k, name in enumerate(found.names)}
-    axes = time_axes(found.times, ROWS + 1)
-    return xarray.Dataset(variables, coords=axes, attrs={"title": found.report.robot, "source": "jounce"})
+    values = retimed.derivatives(retimed.times, ROWS)
+    variables = {name: (("time", "derivative"), values[:, :, k]) for k, name in enumerate(retimed.names)}
+    axes = time_axes(retimed.times, ROWS + 1)
+    return xarray.Dataset(variables, coords=axes, attrs={"title": retimed.report.robot, "source": "jounce"})

@@ -148,19 +148,19 @@ def torques(
     model, motion = reading.robot(robot), reading.trajectory(trajectory)
     spare_inputs(output.out, overwrite=output.overwrite)
     with errors_about(trajectory, robot):
-        found = trajectory_torques(model, motion, rates, drives=not no_drives)
+        dataset = trajectory_torques(model, motion, rates, drives=not no_drives)
         ends = trajectory_ends(model, motion)
-        beside = _beside_breaks(model, motion, rates, drives=not no_drives)
-    largest = table_peaks(found, beside)
+        one_sided = _torques_at_breaks(model, motion, rates, drives=not no_drives)
+    largest = table_peaks(dataset, one_sided)
     if not output.json:
-        say(torques_summary(found, motion, ends, robot, trajectory))
+        say(torques_summary(dataset, motion, ends, robot, trajectory))
         show_peaks(largest)
-    output.write(lambda: found)
-    output.tell("torques", lambda: torques_result(found, largest, motion, ends, (robot, trajectory), output.out))
+    output.write(lambda: dataset)
+    output.tell("torques", lambda: torques_result(dataset, largest, motion, ends, (robot, trajectory), output.out))
     return 0
 
 
-def _beside_breaks(robot: Any, motion: Any, rates: int, *, drives: bool) -> Any:
+def _torques_at_breaks(robot: Any, motion: Any, rates: int, *, drives: bool) -> Any:
     """Return the torques on both sides of where laws jump or bend, at the instants of these; None without any."""
     from jounce.dynamics.limits.trajectories import trajectory_torques
     from jounce.trajectory.breaks import both_sides, law_breaks
@@ -172,5 +172,5 @@ def _beside_breaks(robot: Any, motion: Any, rates: int, *, drives: bool) -> Any:
         return None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)  # told of all instants
-        found = trajectory_torques(robot, motion, rates, times=sides, drives=drives)
-    return found.assign_coords(time=breaks[which])
+        torques_there = trajectory_torques(robot, motion, rates, times=sides, drives=drives)
+    return torques_there.assign_coords(time=breaks[which])

@@ -68,7 +68,7 @@ def servo(
     from jounce.reporting.text.law_facts import law_facts, law_words
 
     output.check()
-    frequency, told = frequency_of(rate), heading.units
+    frequency, units = frequency_of(rate), heading.units
     mechanism = reading.mechanism(file)
     spare_inputs(output.out, overwrite=output.overwrite)
     names = list(dict.fromkeys(driver or mechanism.drivers))
@@ -79,17 +79,17 @@ def servo(
         if not names:
             raise JounceError("there is no driver", name="drivers")
         motion = _at_rate(mechanism, frequency, order, bar)
-        dataset, beside = _driven(motion, names), _beside_breaks(mechanism, motion, names)
+        dataset, one_sided = _driven(motion, names), _values_at_breaks(mechanism, motion, names)
     first, last = float(motion.time[0]), float(motion.time[-1])
     laws = [law for law in law_facts(mechanism, first, last) if law["driver"] in names]
-    found = table_peaks(dataset, beside)
+    peaks = table_peaks(dataset, one_sided)
     if not output.json:
         count = f"{len(motion.time)} rows from {first:g} s to {last:g} s, {frequency:g} a second"
         shorter = filter(None, [last_step_words(motion.time)])
         say("\n".join([mechanism.title or file.name, count, *shorter, *law_words(laws)]))
-        show_peaks(shown_peaks(found, shown))
-    output.write(lambda: in_units(dataset, shown), header_units=told)
-    output.tell("servo", lambda: _result(file, frequency, names, laws, found, output.out))
+        show_peaks(shown_peaks(peaks, shown))
+    output.write(lambda: in_units(dataset, shown), header_units=units)
+    output.tell("servo", lambda: _result(file, frequency, names, laws, peaks, output.out))
     return outcome(motion, file)
 
 
@@ -110,7 +110,7 @@ def _at_rate(mechanism: Mechanism, frequency: float, order: int, bar: Bar) -> Mo
     return solve(mechanism, grid, order, strict=False, progress=bar, keep=True)
 
 
-def _beside_breaks(mechanism: Mechanism, motion: Motion, names: list[str]) -> Any:
+def _values_at_breaks(mechanism: Mechanism, motion: Motion, names: list[str]) -> Any:
     """Return the coordinates of drivers on both sides of where laws jump or bend; None without any."""
     import numpy as np
 
@@ -147,8 +147,10 @@ def _units_of(mechanism: Mechanism, names: list[str]) -> ShownUnits:
     return ShownUnits(chosen, known)
 
 
-def _result(file: Path, frequency: float, names: list[str], laws: Any, found: Any, out: Path | None) -> dict[str, Any]:
-    from jounce.reporting.json.results import told_peak
+def _result(
+    file: Path, frequency: float, names: list[str], laws: Any, peaks_found: Any, out: Path | None
+) -> dict[str, Any]:
+    from jounce.reporting.json.results import peak_facts
 
-    peaks = [told_peak(peak) for peak in found]
+    peaks = [peak_facts(peak) for peak in peaks_found]
     return {"file": file, "rate": frequency, "drivers": names, "laws": laws, "peaks": peaks, "written": out}

@@ -102,25 +102,25 @@ def modes(
     with _errors_about(file):
         rest = equilibrium(subject, time, method=method, **settings)
         small = linearise(rest, coordinates=coordinate, release=release or ())
-        found = small.modes
+        modes_found = small.modes
         facts = modes_facts(small, file, without or [])
-        moved = None if animation is None else found.motion(mode, amplitude)
+        moved = None if animation is None else modes_found.motion(mode, amplitude)
     if not json:
         say(f"{rest.mechanism.title or file.name}\n{equilibrium_words(facts['equilibrium'])}\n")
-        for table in (*equilibrium_tables(rest), modes_table(found)):
+        for table in (*equilibrium_tables(rest), modes_table(modes_found)):
             show_table(table)
     if out is not None:
         from jounce.reporting.facts.modes_facts import write_modes
 
-        written(lambda: write_modes(found, rest.mechanism.space, out, overwrite=overwrite))
+        written(lambda: write_modes(modes_found, rest.mechanism.space, out, overwrite=overwrite))
     if moved is not None and animation is not None:
         from jounce.plot import animate
 
         with errors_about(file), Bar("drawing") as bar:
-            span = float(moved.time[-1])
-            written(lambda: animate(moved, animation, speed=span / 2, progress=bar, overwrite=overwrite))
+            duration = float(moved.time[-1])
+            written(lambda: animate(moved, animation, speed=duration / 2, progress=bar, overwrite=overwrite))
         if not json:
-            say(f"\nMode {mode} is in {animation}, {_slowly(span)}")
+            say(f"\nMode {mode} is in {animation}, {_slowly(duration)}")
     tell("modes", lambda: {**facts, "written": out}, out, json=json)
     return 0
 

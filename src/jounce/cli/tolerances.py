@@ -78,10 +78,10 @@ def tolerance(
         spare_inputs(target, overwrite=output.overwrite)
     names = None if of is None else [name.strip() for name in of.split(",") if name.strip()]
     with errors_about(file), Bar("solving", "designs") as bar:
-        wanted = None if names is None else [column_of(mechanism, name) for name in names]
+        selection = None if names is None else [column_of(mechanism, name) for name in names]
         settings = {"of": names, "samples": samples, "linear": not no_linear, "indices": indices, "progress": bar}
         spread = spread_of(mechanism, forms, order=order, **settings)
-    columns = columns_of(spread, wanted)
+    columns = columns_of(spread, selection)
     facts = spread_facts(spread, columns)
     if not output.json:
         say(spread_summary(facts, file.name, samples))

@@ -81,8 +81,8 @@ def view(
                 if given and not modes:
                     raise JounceError("goes with --modes", name=name)
             opened = {"port": port, "order": order, "open_page": not no_open, "allow": folders}
-            held = "all" if hold == ["all"] else hold or ()
-            page = show(subject, trajectory, modes=modes, without=without or (), hold=held, **opened)
+            held_joints = "all" if hold == ["all"] else hold or ()
+            page = show(subject, trajectory, modes=modes, without=without or (), hold=held_joints, **opened)
     say(f"{page.page.recording.title or file.name}: {page.url} (Ctrl-C ends)")
     with raising():
         page.wait()

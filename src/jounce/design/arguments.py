@@ -6,7 +6,7 @@ from jounce.design.language import EXERTED, MEASURES, Node, operated
 from jounce.errors import ExpressionError
 from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
 
-HIGHEST_DERIVATIVE = HIGHEST_ORDER - 2  # that goals may ask for: its rate and how that bends are needed, too
+MAX_DERIVATIVE = HIGHEST_ORDER - 2  # that goals may ask for: its rate and how that bends are needed, too
 
 
 class Arguments:
@@ -16,7 +16,7 @@ class Arguments:
     ----------
     fixed : dict of str to float
         Parameters that do not vary.
-    span : tuple of float
+    interval : tuple of float
         First and last instant of the motion, s.
 
     Attributes
@@ -25,8 +25,8 @@ class Arguments:
         Instants that were asked for, s.
     """
 
-    def __init__(self, fixed: Mapping[str, float], span: tuple[float, float]):
-        self.fixed, self.span = fixed, span
+    def __init__(self, fixed: Mapping[str, float], interval: tuple[float, float]):
+        self.fixed, self.interval = fixed, interval
         self.asked: list[float] = []
 
     def constant(self, node: Node) -> float | None:
@@ -42,24 +42,24 @@ class Arguments:
 
     def argument(self, node: Node, what: str) -> float:
         """Return a number that must be the same in all designs."""
-        found = self.constant(node)
-        if found is None:
+        value = self.constant(node)
+        if value is None:
             message = f"{what} '{node.text}' must be a number that is the same in all designs"
             raise ExpressionError(message)
-        return found
+        return value
 
     def derivative(self, node: Node) -> int:
         """Return the order of a derivative."""
         order = self.argument(node, "the derivative")
-        if order != int(order) or not 0 <= order <= HIGHEST_DERIVATIVE:
-            message = f"the derivative must be a whole number from 0 to {HIGHEST_DERIVATIVE}, got {order:g}"
+        if order != int(order) or not 0 <= order <= MAX_DERIVATIVE:
+            message = f"the derivative must be a whole number from 0 to {MAX_DERIVATIVE}, got {order:g}"
             raise ExpressionError(message)
         return int(order)
 
     def instant(self, node: Node) -> float:
         """Return an instant of the motion, s, and remember that it is asked for."""
         instant = self.argument(node, "the instant")
-        first, last = self.span
+        first, last = self.interval
         if not first <= instant <= last:
             message = f"the instant {instant:g} s is not within the motion, which is from {first:g} to {last:g} s"
             raise ExpressionError(message)

@@ -48,8 +48,8 @@ class Grid:
 
     def values(self, start: int, stop: int) -> dict[str, Float[np.ndarray, " design"]]:
         """Return the parameters of a stretch of designs."""
-        places = np.unravel_index(np.arange(start, stop), self.shape)
-        return {name: axis[place] for (name, axis, place) in zip(self.variations, self._axes, places, strict=True)}
+        indices = np.unravel_index(np.arange(start, stop), self.shape)
+        return {name: axis[index] for (name, axis, index) in zip(self.variations, self._axes, indices, strict=True)}
 
     @property
     def _axes(self) -> list[np.ndarray]:
@@ -100,11 +100,11 @@ def sobol_shares(dimension: int, start: int, stop: int) -> Float[np.ndarray, "po
     from scipy.stats.qmc import Sobol as Sequence
 
     settings: dict[str, Any] = {"scramble": True, "bits": BITS, "seed": SEED}  # newer releases call it rng, too
-    found = Sequence(dimension, **settings)
+    sequence = Sequence(dimension, **settings)
     if start:
-        found.fast_forward(start)
-        return found.random(stop - start) + 2.0 ** -(BITS + 1)
-    whole = found.random(1 << max(stop - 1, 0).bit_length())  # other numbers of first points are warned of
+        sequence.fast_forward(start)
+        return sequence.random(stop - start) + 2.0 ** -(BITS + 1)
+    whole = sequence.random(1 << max(stop - 1, 0).bit_length())  # other numbers of first points are warned of
     return whole[:stop] + 2.0 ** -(BITS + 1)
 
 

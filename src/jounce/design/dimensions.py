@@ -29,8 +29,8 @@ def _dimension(node: Node, quantities: Quantities) -> Dimension | None:
     if node.word.startswith("path"):
         return LENGTH
     if node.word not in MEASURES:
-        found = [_dimension(part, quantities) for part in node.parts]
-        return found[0] if node.word in ("+", "-", "neg", "pos") and len({*found}) == 1 else None
+        dimensions = [_dimension(part, quantities) for part in node.parts]
+        return dimensions[0] if node.word in ("+", "-", "neg", "pos") and len({*dimensions}) == 1 else None
     rest = node.parts[1:]
     steps = rest[0] if node.word in OVER_TIME and rest else rest[0] if len(rest) == 2 else None
     if steps is not None and steps.kind != "number":
@@ -40,7 +40,7 @@ def _dimension(node: Node, quantities: Quantities) -> Dimension | None:
     if subject.kind == "call" and subject.word in EXERTED:
         unit = "N" if subject.word.startswith("force") else "N*m"
     elif subject.kind == "name" and quantities.known.get(subject.word) == "quantities":
-        unit = quantities.mechanism.outputs[quantities.place(subject.word)[0]].unit
+        unit = quantities.mechanism.outputs[quantities.output_of(subject.word)[0]].unit
     else:
         return None
     return times(parse_unit(unit)[1], TIME, -order) if unit else None

@@ -66,8 +66,8 @@ class Node:
 
     def names(self) -> set[str]:
         """Return the names in it."""
-        found = {self.word} if self.kind == "name" else set()
-        return found.union(*(part.names() for part in self.parts))
+        names = {self.word} if self.kind == "name" else set()
+        return names.union(*(part.names() for part in self.parts))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -131,13 +131,13 @@ def parsed_relations(text: str) -> list[Relation]:
         message = "a condition is a comparison by <=, >= or ==, such as 'peak(psi, 4) <= 20'"
         raise ExpressionError(message, value=text)
     sides = [_side(piece) for piece in pieces[::2]]
-    found = []
+    relations = []
     for k, sign in enumerate(pieces[1::2]):
         (left, first), (right, second) = sides[k : k + 2][:: -1 if ">" in sign else 1]
         equal = sign in ("==", "=")
         own = text.strip() if len(pieces) == 3 else f"{left.text} {'==' if equal else '<='} {right.text}"
-        found.append(Relation(own, left, right, equal, (first, second)))
-    return found
+        relations.append(Relation(own, left, right, equal, (first, second)))
+    return relations
 
 
 def _side(text: str) -> tuple[Node, Dimension | None]:

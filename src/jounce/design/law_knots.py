@@ -28,20 +28,20 @@ def law_knots(
     first, last : float
         s.
     """
-    found = _common(mechanism, bounds, first, last, None)
-    if len(found) > MOST_KNOTS:
-        found = _common(mechanism, bounds, first, last, False)
-    return found if len(found) <= MOST_KNOTS else found[:0]
+    knots = _common(mechanism, bounds, first, last, None)
+    if len(knots) > MOST_KNOTS:
+        knots = _common(mechanism, bounds, first, last, False)
+    return knots if len(knots) <= MOST_KNOTS else knots[:0]
 
 
 def _common(
     mechanism: Mechanism, bounds: Mapping[str, tuple[float, float]], first: float, last: float, forces: bool | None
 ) -> Float[np.ndarray, " knots"]:
     """Return the knots of all designs, those of laws of forces as `breaks_of_laws` takes them."""
-    found = breaks_of_laws(mechanism, first, last, HIGHEST, forces=forces)
+    breaks = breaks_of_laws(mechanism, first, last, HIGHEST, forces=forces)
     ends = [mechanism.with_parameters(**{name: bound}) for name, pair in bounds.items() for bound in pair]
-    for design in ends if len(found) else ():
+    for design in ends if len(breaks) else ():
         there = breaks_of_laws(design, first, last, HIGHEST, forces=forces)
-        apart = np.abs(found[:, None] - there).min(axis=1, initial=np.inf)
-        found = found[apart <= SAME * (abs(first) + abs(last))]
-    return found
+        distances = np.abs(breaks[:, None] - there).min(axis=1, initial=np.inf)
+        breaks = breaks[distances <= SAME * (abs(first) + abs(last))]
+    return breaks

@@ -75,8 +75,10 @@ class Cells:
     def at(self, time: float) -> tuple[int, float]:
         """Return the nearest instant, and how far a time is from it, s."""
         nearest = int(np.argmin(np.abs(self.instants - time)))
-        span = float(self.instants[-1] - self.instants[0])
-        if np.diff(self.instants[nearest : nearest + 2]).min(initial=np.inf) < NEAR * span:  # from the right, at a knot
+        duration = float(self.instants[-1] - self.instants[0])
+        if (
+            np.diff(self.instants[nearest : nearest + 2]).min(initial=np.inf) < NEAR * duration
+        ):  # from the right, at a knot
             nearest += 1
         return nearest, float(time - self.instants[nearest])
 
@@ -91,10 +93,10 @@ def derivative(jet: Jet, order: int) -> Series:
 
 def value(series: Series, shift: Any) -> Any:
     """Return the values of series at times seen from their instants."""
-    found = jnp.zeros_like(series[-1] * shift)
+    result = jnp.zeros_like(series[-1] * shift)
     for coefficient in series[::-1]:
-        found = found * shift + coefficient
-    return found
+        result = result * shift + coefficient
+    return result
 
 
 def slope_of(series: Series) -> Float[Numbers, "lower *cell"]:
@@ -109,8 +111,8 @@ def top(series: Float[Numbers, "order cell"], cells: Cells) -> Float[Numbers, " 
     series = jax.lax.stop_gradient(series)
     share = np.linspace(0.0, 1.0, SAMPLES)[:, None]
     width = cells.high - cells.low
-    places = cells.low[None] + share * width[None]
-    best = jnp.argmax(value(series[:, None], jnp.asarray(places)), axis=0)
+    positions = cells.low[None] + share * width[None]
+    best = jnp.argmax(value(series[:, None], jnp.asarray(positions)), axis=0)
     spacing = width / (SAMPLES - 1)
     start = jnp.asarray(cells.low) + best.astype(float) * spacing
     low, high = jnp.maximum(start - spacing, cells.low), jnp.minimum(start + spacing, cells.high)
@@ -159,19 +161,19 @@ def gaps(
 ) -> Float[Numbers, "component point"]:
     """Return how far points are from where a point of the motion is at their times, or comes nearest."""
     if times is not None:
-        places = [cells.at(float(time)) for time in times]
-        index, shift = np.array([k for k, _ in places]), np.array([h for _, h in places])
+        positions = [cells.at(float(time)) for time in times]
+        index, shift = np.array([k for k, _ in positions]), np.array([h for _, h in positions])
         there = value(series[:, :, index], jnp.asarray(shift)[None])
         return there - points.T
     fixed = jax.lax.stop_gradient(series)
 
     def nearest(point: Any) -> tuple[Any, Any]:
         gap = jnp.concatenate([fixed[:1] - point[None, :, None], fixed[1:]])
-        apart = sum((square(gap[:, k]) for k in range(1, gap.shape[1])), square(gap[:, 0]))
-        shift = top(-apart[:, cells.index], cells)
-        least = value(apart[:, cells.index], shift)
-        place = jnp.argmin(least)
-        return jnp.asarray(cells.index)[place], shift[place]
+        squared_distance = sum((square(gap[:, k]) for k in range(1, gap.shape[1])), square(gap[:, 0]))
+        shift = top(-squared_distance[:, cells.index], cells)
+        least = value(squared_distance[:, cells.index], shift)
+        nearest_index = jnp.argmin(least)
+        return jnp.asarray(cells.index)[nearest_index], shift[nearest_index]
 
     index, shift = jax.vmap(nearest)(jnp.asarray(points))
     there = value(series[:, :, index], shift[None])
@@ -205,18 +207,18 @@ def at_instants(
     values: Sequence[float], instants: Float[np.ndarray, " given"], knots: Float[np.ndarray, " knots"] = NO_KNOTS
 ) -> Float[np.ndarray, " time"]:
     """Return a grid that has the instants at which something is asked, and those on both sides of the knots of laws."""
-    wanted = np.unique(np.concatenate([instants, np.asarray(values, float)]))
-    gaps = np.diff(wanted)
-    close = np.concatenate([[False], gaps < NEAR * (wanted[-1] - wanted[0] or 1.0)])
-    wanted = wanted[~close]
-    apart = ~_near(wanted, knots, wanted)
-    apart[[0, -1]] = True
-    return with_sides(wanted[apart], knots)
+    merged = np.unique(np.concatenate([instants, np.asarray(values, float)]))
+    gaps = np.diff(merged)
+    close = np.concatenate([[False], gaps < NEAR * (merged[-1] - merged[0] or 1.0)])
+    merged = merged[~close]
+    distinct = ~_near(merged, knots, merged)
+    distinct[[0, -1]] = True
+    return with_sides(merged[distinct], knots)
 
 
 def _near(
     some: Float[np.ndarray, " some"], others: Float[np.ndarray, " others"], grid: Float[np.ndarray, " time"]
 ) -> Bool[np.ndarray, " some"]:
     """Tell which instants are one with one of some others."""
-    apart = np.abs(some[:, None] - others).min(axis=1, initial=np.inf)
-    return apart < NEAR * (grid[-1] - grid[0] or 1.0)
+    distances = np.abs(some[:, None] - others).min(axis=1, initial=np.inf)
+    return distances < NEAR * (grid[-1] - grid[0] or 1.0)

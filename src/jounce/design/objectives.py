@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.design.arguments import HIGHEST_DERIVATIVE, Arguments
+from jounce.design.arguments import MAX_DERIVATIVE, Arguments
 from jounce.design.dimensions import check_dimensions
 from jounce.design.language import (
     EXERTED,
@@ -34,7 +34,7 @@ from jounce.design.measures import (
     square,
     value,
 )
-from jounce.design.quantities import Quantities, Quantity, told_about
+from jounce.design.quantities import Quantities, Quantity, naming_errors
 from jounce.errors import ExpressionError, did_you_mean
 from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
@@ -128,18 +128,18 @@ class Goals:
         self.bounded: list[bool] = []
         self.order = 0
         self._arguments = Arguments(self.quantities.fixed, (float(instants[0]), float(instants[-1])))
-        with told_about("minimise", whole=True):
+        with naming_errors("minimise", whole=True):
             self.quantities.text = minimise
             node = parsed(minimise)
             self.objective_value = self._number(node, 1)
             self.objective = self._squared(node) or self.objective_value
-        self.conditions = [found for text in subject_to for found in self._conditions(text)]
+        self.conditions = [condition for text in subject_to for condition in self._conditions(text)]
         self.order = min(self.order + BEYOND, HIGHEST_ORDER)
         self.set_instants(instants)
-        kept = {
+        outputs_left = {
             name: x for name, x in mechanism.outputs.items() if name in {a[0] for a in self.quantities.atoms.values()}
         }
-        self.mechanism = with_outputs(mechanism, {**kept, **self.quantities.added})
+        self.mechanism = with_outputs(mechanism, {**outputs_left, **self.quantities.added})
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
         """Take another grid."""
@@ -149,11 +149,11 @@ class Goals:
 
     def series(self, outputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return the Taylor coefficients of the quantities, (order + 1, time), from outputs of a motion."""
-        found = {}
+        series = {}
         for text, (name, component, lost) in self.quantities.atoms.items():
             values = outputs[name] if component is None else outputs[name][..., component]
-            found[text] = taylor_coefficients(jnp.moveaxis(jnp.asarray(values), 1, 0)[lost:])
-        return found
+            series[text] = taylor_coefficients(jnp.moveaxis(jnp.asarray(values), 1, 0)[lost:])
+        return series
 
     def measured(self, parameters: Mapping[str, Any], outputs: Mapping[str, Any]) -> tuple[list[Any], Any]:
         """Return the values whose largest are the extremes, one array for each, and the smooth measures, (measures,).
@@ -174,8 +174,8 @@ class Goals:
         """Return the objective, then the conditions as numbers that must be zero, or not above it, (goals,)."""
         names = self._values(parameters)
         objective = self.objective_value if as_asked else self.objective
-        found = [objective(names, extremes, smooth), *(c.number(names, extremes, smooth) for c in self.conditions)]
-        return jnp.stack([jnp.asarray(x, float) for x in found])
+        numbers = [objective(names, extremes, smooth), *(c.number(names, extremes, smooth) for c in self.conditions)]
+        return jnp.stack([jnp.asarray(x, float) for x in numbers])
 
     def sides(self, parameters: Mapping[str, Any], extremes: Any, smooth: Any) -> list[tuple[float, float]]:
         """Return the values of both sides of each condition."""
@@ -194,18 +194,18 @@ class Goals:
         lost = max(
             (self.quantities.atoms[name][2] for name in node.names() if name in self.quantities.atoms), default=0
         )
-        if order + lost > HIGHEST_DERIVATIVE:
-            message = f"derivatives go up to the order {HIGHEST_DERIVATIVE}, got {order + lost} of '{node.text}'"
+        if order + lost > MAX_DERIVATIVE:
+            message = f"derivatives go up to the order {MAX_DERIVATIVE}, got {order + lost} of '{node.text}'"
             raise ExpressionError(message)
         self.order = max(self.order, order + lost)
 
-        def found(names: Mapping[str, Any]) -> Any:
+        def series(names: Mapping[str, Any]) -> Any:
             jet = quantity(names)
             if not hasattr(jet, "coefficients"):  # a number, which does not change
                 jet = names["t"] * 0.0 + jet
             return derivative(jet, order)
 
-        return found
+        return series
 
     # numbers
 
@@ -269,13 +269,13 @@ class Goals:
     def _mean(
         self, series: Callable[..., Any], window: tuple[Any, Any], *, root: bool, squared: bool = False
     ) -> Quantity:
-        def found(names: Mapping[str, Any]) -> Any:
+        def mean_of(names: Mapping[str, Any]) -> Any:
             cells, values = Cells.of(self.instants, *window), series(names)
             length = float(np.sum(cells.high - cells.low))
             mean = integral(square(values) if root else values, cells) / length
             return safe_root(mean) if root and not squared else mean
 
-        return found
+        return mean_of
 
     def _smooth_number(self, measure: Quantity) -> Numbers:
         (index,) = self._smooth_block(measure, 1)
@@ -319,10 +319,10 @@ class Goals:
 
     def _path(self, node: Node, sign: int | None) -> Numbers:
         """Return the error of a path: the root of the mean square distance of points from it, or the largest."""
-        apart, _ = self._gaps(node)
+        deviation, _ = self._gaps(node)
 
         def squares(names: Mapping[str, Any]) -> Any:
-            return jnp.sum(apart(names) ** 2, axis=0)
+            return jnp.sum(deviation(names) ** 2, axis=0)
 
         if node.word == "path_error":
             return self._smooth_number(lambda names: safe_root(jnp.mean(squares(names))))
@@ -353,11 +353,11 @@ class Goals:
         names = [f"{point}_{label}" for label in labels]
         quantities = [self._series(Node("name", name), 0) for name in names]
 
-        def found(known: Mapping[str, Any]) -> Any:
+        def gaps_of(known: Mapping[str, Any]) -> Any:
             whole = jnp.stack([quantity(known) for quantity in quantities], axis=1)
             return gaps(whole, target.points, target.times, self._whole)
 
-        return found, len(target.points)
+        return gaps_of, len(target.points)
 
     def _is_point(self, name: str) -> bool:
         return bool(self._original.outputs[name].component_labels(self._original))
@@ -368,9 +368,9 @@ class Goals:
             return None
         subject, *rest = node.parts
         if node.word == "path_error":
-            apart, count = self._gaps(node)
+            deviation, count = self._gaps(node)
             size = len(self._original.outputs[subject.word].component_labels(self._original))
-            block = self.gaps = self._smooth_block(apart, size * count)
+            block = self.gaps = self._smooth_block(deviation, size * count)
             return lambda *known: jnp.sum(known[2][block.start : block.stop] ** 2) / count
         series = self._series(subject, self._arguments.derivative(rest[0]) if rest else 0)
         return self._smooth_number(self._mean(series, self._arguments.window(rest), root=True, squared=True))
@@ -378,16 +378,16 @@ class Goals:
     # conditions
 
     def _conditions(self, text: str) -> list[Condition]:
-        found = []
-        with told_about("subject_to", whole=True):
+        conditions = []
+        with naming_errors("subject_to", whole=True):
             self.quantities.text = text
             for relation in parsed_relations(text):
                 check_dimensions(relation, self.quantities)
                 up = None if relation.equal else 1
                 left = self._number(relation.left, up)
                 right = self._number(relation.right, None if relation.equal else -1)
-                found.append(Condition(relation, _difference(left, right), left, right))
-        return found
+                conditions.append(Condition(relation, _difference(left, right), left, right))
+        return conditions
 
 
 def _difference(left: Numbers, right: Numbers) -> Numbers:

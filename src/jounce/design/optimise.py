@@ -124,13 +124,13 @@ def optimise(
     for number, variant in chosen:
         study = Study(variant, asked, clearance, iterations, seed, progress)
         try:
-            found = study.best(starts, samples)
+            best_result = study.best(starts, samples)
         except DesignError as error:
             if len(chosen) == 1:
                 raise
             first_error = first_error or error
             continue
-        whole = study.result(mechanism, found, assembly=number)
+        whole = study.result(mechanism, best_result, assembly=number)
         if best is None or (whole.success, -whole.objective) > (best.success, -best.objective):
             best = whole
     if best is None:
@@ -149,7 +149,7 @@ def _bounds(mechanism: Mechanism, vary: Mapping[str, Any]) -> dict[str, tuple[fl
     """
     if not isinstance(vary, Mapping) or not vary:
         raise MechanismError("a design differs in at least one parameter", name="vary", value=vary)
-    found = {}
+    bounds = {}
     for name, given in vary.items():
         check_name("parameter", name, mechanism.parameters, MechanismError, name="vary")
         try:
@@ -159,8 +159,8 @@ def _bounds(mechanism: Mechanism, vary: Mapping[str, Any]) -> dict[str, tuple[fl
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             message = "bounds must be two finite numbers, the lower one first"
             raise MechanismError(message, name=f"vary.{name}", value=given)
-        found[name] = low, high
-    return found
+        bounds[name] = low, high
+    return bounds
 
 
 def _bound(mechanism: Mechanism, name: str, given: Any) -> float:
@@ -195,21 +195,21 @@ def _instants(
 def _curve(name: str, given: Any) -> PrescribedPath:
     """Return points, and their times where they have some."""
     timed = isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1 and np.ndim(given[1]) == 2
-    place, wanted = f"curves.{name}", "points, (points, components), or a pair of times and points, all finite"
-    times = seconds(place, given[0], MechanismError, wanted) if timed else None
-    points = real_numbers(place, given[1] if timed else given, MechanismError, wanted)
+    location, expected = f"curves.{name}", "points, (points, components), or a pair of times and points, all finite"
+    times = seconds(location, given[0], MechanismError, expected) if timed else None
+    points = real_numbers(location, given[1] if timed else given, MechanismError, expected)
     whole = points.ndim == 2 and len(points) and np.isfinite(points).all()
     if not whole or (times is not None and (times.shape != points.shape[:1] or not np.isfinite(times).all())):
-        raise MechanismError(f"must be {wanted}", name=place, value=given)
+        raise MechanismError(f"must be {expected}", name=location, value=given)
     return PrescribedPath(points, times)
 
 
-def _assemblies(mechanism: Mechanism, wanted: Any) -> list[tuple[int | None, Mechanism]]:
+def _assemblies(mechanism: Mechanism, selection: Any) -> list[tuple[int | None, Mechanism]]:
     """Return the assemblies to try, each with its number, as the starting guess of a mechanism."""
-    if wanted is None:
+    if selection is None:
         return [(None, mechanism)]
-    found = all_assemblies(mechanism, circuits=False)
-    numbers = range(1, len(found) + 1) if wanted == "all" else wanted
+    assemblies = all_assemblies(mechanism, circuits=False)
+    numbers = range(1, len(assemblies) + 1) if selection == "all" else selection
     if isinstance(numbers, str) or not all(isinstance(n, int) for n in numbers) or not numbers:
-        raise MechanismError("must be numbers of assemblies, or 'all'", name="assemblies", value=wanted)
-    return [(n, dataclasses.replace(found.number(n).mechanism, assembly=None)) for n in numbers]
+        raise MechanismError("must be numbers of assemblies, or 'all'", name="assemblies", value=selection)
+    return [(n, dataclasses.replace(assemblies.number(n).mechanism, assembly=None)) for n in numbers]

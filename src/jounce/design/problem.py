@@ -26,9 +26,9 @@ LOCKS = (AssemblyError, MobilityError, SolveError)
 class Locked(Exception):  # noqa: N818 - no error of a user's
     """A design cannot be put together, or locks."""
 
-    def __init__(self, place: Float[np.ndarray, " parameter"], error: Exception):
+    def __init__(self, point: Float[np.ndarray, " parameter"], error: Exception):
         super().__init__(str(error))
-        self.place, self.error = place, error
+        self.point, self.error = point, error
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Evaluation:
 
     Attributes
     ----------
-    place : array of shape (parameters,)
+    point : array of shape (parameters,)
         From 0 to 1 between the bounds.
     rows, smooth : array
         As `Goals.measured` gives them, all rows in one array.
@@ -48,7 +48,7 @@ class Evaluation:
     margin_slopes : array of shape (time, parameters)
     """
 
-    place: Float[np.ndarray, " parameter"]
+    point: Float[np.ndarray, " parameter"]
     rows: Float[np.ndarray, " row"]
     smooth: Float[np.ndarray, " measure"]
     row_slopes: Float[np.ndarray, "row parameter"]
@@ -82,39 +82,39 @@ class Problem:
         self.width = self.high - self.low
         self.evaluations = 0
         self.owner = np.zeros(0, int)
-        self._kept: dict[bytes, Evaluation] = {}
+        self._cached: dict[bytes, Evaluation] = {}
         self._scale: np.ndarray | None = None
         self._compile()
 
     def _compile(self) -> None:
         """Compile what follows from a motion, for the grid of the goals."""
-        self._kept.clear()
+        self._cached.clear()
         # as functions of their own: JAX takes a method for the same as before, whatever its object holds by now
         self._measured = jax.jit(lambda *known: self._with_slopes(*known))
         self._numbers = jax.jit(lambda *known: self._goals_with_slopes(*known))
-        self._each = jax.jit(jax.vmap(self._alone))
+        self._each = jax.jit(jax.vmap(self._one_design))
 
     def set_instants(self, instants: Float[np.ndarray, " time"]) -> None:
         """Take another grid."""
         self.goals.set_instants(instants)
         self._compile()
 
-    def values(self, place: Float[np.ndarray, " parameter"]) -> dict[str, float]:
-        """Return the parameters at a place, SI; those on a bound to the bit."""
-        found = np.where(place >= 1.0 - ON_BOUND, self.high, self.low + self.width * place)
-        found = np.where(place <= ON_BOUND, self.low, found)
-        return dict(zip(self.names, found.tolist(), strict=True))
+    def values(self, point: Float[np.ndarray, " parameter"]) -> dict[str, float]:
+        """Return the parameters at a point, SI; those on a bound to the bit."""
+        parameters = np.where(point >= 1.0 - ON_BOUND, self.high, self.low + self.width * point)
+        parameters = np.where(point <= ON_BOUND, self.low, parameters)
+        return dict(zip(self.names, parameters.tolist(), strict=True))
 
-    def place(self, values: Mapping[str, float]) -> Float[np.ndarray, " parameter"]:
+    def point_of(self, values: Mapping[str, float]) -> Float[np.ndarray, " parameter"]:
         """Return where parameters are between their bounds, from 0 to 1."""
         given = np.array([values[name] for name in self.names])
         return np.clip((given - self.low) / self.width, 0.0, 1.0)
 
-    def design(self, place: Float[np.ndarray, " parameter"]) -> Mechanism:
-        """Return the mechanism at a place, with the outputs that goals need."""
-        return self.goals.mechanism.with_parameters(**self.values(place))
+    def design(self, point: Float[np.ndarray, " parameter"]) -> Mechanism:
+        """Return the mechanism at a point, with the outputs that goals need."""
+        return self.goals.mechanism.with_parameters(**self.values(point))
 
-    def evaluate(self, place: Float[np.ndarray, " parameter"]) -> Evaluation:
+    def evaluate(self, point: Float[np.ndarray, " parameter"]) -> Evaluation:
         """Return a design's measures and their slopes.
 
         Raises
@@ -122,16 +122,16 @@ class Problem:
         Locked
             The design cannot be put together, or locks.
         """
-        key = place.tobytes()
-        if key not in self._kept:
-            if len(self._kept) > 64:
-                self._kept.clear()
-            self._kept[key] = self._evaluated(place)
-        return self._kept[key]
+        key = point.tobytes()
+        if key not in self._cached:
+            if len(self._cached) > 64:
+                self._cached.clear()
+            self._cached[key] = self._evaluated(point)
+        return self._cached[key]
 
-    def _evaluated(self, place: Float[np.ndarray, " parameter"]) -> Evaluation:
+    def _evaluated(self, point: Float[np.ndarray, " parameter"]) -> Evaluation:
         self.evaluations += 1
-        values = jnp.asarray(list(self.values(place).values()))
+        values = jnp.asarray(list(self.values(point).values()))
 
         def moved(values: Any) -> Any:
             given = dict(zip(self.names, values, strict=True))
@@ -141,26 +141,26 @@ class Problem:
             matrix = _jacobian(
                 _bare(motion.solved_model.system), cut(coordinates, 0), jnp.asarray(motion.time), pose_type=pose_type
             )
-            found = dict(motion.outputs), matrix
-            return found, (*found, motion.status)
+            result = dict(motion.outputs), matrix
+            return result, (*result, motion.status)
 
         try:
             slopes, (outputs, matrix, status) = jax.jacfwd(moved, has_aux=True)(values)
         except LOCKS as error:
-            raise Locked(place, error) from None
+            raise Locked(point, error) from None
         if (failed := np.flatnonzero(np.asarray(status))).size:
             outcome = Status(int(status[failed[0]]))
             message = f"at t = {self.goals.instants[failed[0]]:g} s {outcome.advice}"
-            raise Locked(place, SolveError(message, status=outcome))
+            raise Locked(point, SolveError(message, status=outcome))
         output_slopes, matrix_slopes = jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0) * _along(self.width, x), slopes)
         (rows, smooth), (row_slopes, smooth_slopes) = self._measured(values, outputs, output_slopes)
         if not all(np.isfinite(x).all() for x in (*rows, smooth, *row_slopes, smooth_slopes)):
-            raise Locked(place, SolveError(Status.UNDEFINED.advice, status=Status.UNDEFINED))
+            raise Locked(point, SolveError(Status.UNDEFINED.advice, status=Status.UNDEFINED))
         self.owner = np.repeat(np.arange(len(rows)), [len(x) for x in rows])
         margins, margin_slopes = _margins(np.asarray(matrix), np.asarray(matrix_slopes), self._row_scale(matrix))
-        none = np.zeros(0), np.zeros((0, len(place)))
+        none = np.zeros(0), np.zeros((0, len(point)))
         return Evaluation(
-            np.array(place),
+            np.array(point),
             np.concatenate([*map(np.asarray, rows), none[0]]),
             np.asarray(smooth),
             np.concatenate([*(np.asarray(x).T for x in row_slopes), none[1]]),
@@ -176,27 +176,27 @@ class Problem:
             self._scale = 1.0 / np.where(sizes > 0, sizes, 1.0)
         return self._scale
 
-    def extremes(self, found: Evaluation) -> tuple[Float[np.ndarray, " extreme"], Int[np.ndarray, " extreme"]]:
+    def extremes(self, evaluation: Evaluation) -> tuple[Float[np.ndarray, " extreme"], Int[np.ndarray, " extreme"]]:
         """Return the extremes of a design, and which of its rows each of them is."""
         count = len(self.goals.bounded)
         values, chosen = np.zeros(count), np.zeros(count, int)
         for k in range(count):
             (mine,) = np.nonzero(self.owner == k)
-            chosen[k] = mine[np.argmax(found.rows[mine])]
-            values[k] = found.rows[chosen[k]]
+            chosen[k] = mine[np.argmax(evaluation.rows[mine])]
+            values[k] = evaluation.rows[chosen[k]]
         return values, chosen
 
-    def numbers(self, place: Any, extremes: Any, smooth: Any) -> tuple[np.ndarray, list[np.ndarray]]:
+    def numbers(self, point: Any, extremes: Any, smooth: Any) -> tuple[np.ndarray, list[np.ndarray]]:
         """Return objective and conditions, and their slopes by the parameters, extremes and smooth measures."""
-        values = jnp.asarray(list(self.values(place).values()))
-        found, slopes = self._numbers(values, jnp.asarray(extremes), jnp.asarray(smooth))
-        by_place, *others = (np.asarray(x) for x in slopes)
-        return np.asarray(found), [by_place * self.width, *others]
+        values = jnp.asarray(list(self.values(point).values()))
+        goals, slopes = self._numbers(values, jnp.asarray(extremes), jnp.asarray(smooth))
+        by_parameter, *others = (np.asarray(x) for x in slopes)
+        return np.asarray(goals), [by_parameter * self.width, *others]
 
-    def asked(self, place: Any, found: Evaluation) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
+    def asked(self, point: Any, evaluation: Evaluation) -> tuple[float, np.ndarray, list[tuple[float, float]]]:
         """Return the objective as it was asked for, the conditions as numbers, and both sides of each condition."""
-        values, smooth = self.values(place), jnp.asarray(found.smooth)
-        extremes = jnp.asarray(self.extremes(found)[0])
+        values, smooth = self.values(point), jnp.asarray(evaluation.smooth)
+        extremes = jnp.asarray(self.extremes(evaluation)[0])
         numbers = np.asarray(self.goals.numbers(values, extremes, smooth, as_asked=True))
         return float(numbers[0]), numbers[1:], self.goals.sides(values, extremes, smooth)
 
@@ -204,7 +204,7 @@ class Problem:
         """Return objective and conditions of many designs, from their outputs, the design first."""
         return np.asarray(self._each(jnp.asarray(rows), {name: jnp.asarray(x) for name, x in outputs.items()}))
 
-    def _alone(self, values: Any, outputs: Any) -> Any:
+    def _one_design(self, values: Any, outputs: Any) -> Any:
         given = dict(zip(self.names, values, strict=True))
         rows, smooth = self.goals.measured(given, outputs)
         extremes = jnp.stack([jnp.max(x) for x in rows]) if rows else jnp.zeros(0)

@@ -48,14 +48,14 @@ class Quantities:
 
     def _what_there_is(self) -> dict[str, str]:
         """Return what names mean, by kind: a quantity, a parameter, a driver or a joint."""
-        found: dict[str, str] = {}
+        dimensions: dict[str, str] = {}
         for name, output in self.mechanism.outputs.items():
             labels = output.component_labels(self.mechanism)
-            found |= {f"{name}_{label}": "quantities" for label in labels} or {name: "quantities"}
+            dimensions |= {f"{name}_{label}": "quantities" for label in labels} or {name: "quantities"}
             if labels:
-                found[name] = "points and vectors"
-        found |= dict.fromkeys(self.mechanism.parameters, "parameters")
-        return found
+                dimensions[name] = "points and vectors"
+        dimensions |= dict.fromkeys(self.mechanism.parameters, "parameters")
+        return dimensions
 
     def check_meaning(self, name: str) -> None:
         """Raise ExpressionError for a name that means several things: whichever was taken could be the wrong one."""
@@ -68,8 +68,8 @@ class Quantities:
             differentiated = order and (stem in labels or (stem == output and not labels))
             meanings += [f"a derivative of {stem}"] * bool(differentiated)
         if len(meanings) > 1:
-            told = f"{', '.join(meanings[:-1])} and {meanings[-1]}"
-            raise ExpressionError(f"'{name}' is {told} of this mechanism; give one of them another name")
+            listed = f"{', '.join(meanings[:-1])} and {meanings[-1]}"
+            raise ExpressionError(f"'{name}' is {listed} of this mechanism; give one of them another name")
 
     def atom(self, text: str) -> Quantity:
         """Return a quantity of the mechanism by its name, with a derivative such as ``psi_d2``."""
@@ -80,11 +80,11 @@ class Quantities:
             raise ExpressionError(message)
         if self.known.get(name) != "quantities":
             raise refuse_name(text, self.known, self.text)
-        output, component = self.place(name)
+        output, component = self.output_of(name)
         self.atoms[text] = (output, component, lost)
         return lambda names: names[text]
 
-    def place(self, name: str) -> tuple[str, int | None]:
+    def output_of(self, name: str) -> tuple[str, int | None]:
         """Return the output of a quantity, and which of its components it is."""
         if name in self.mechanism.outputs:
             return name, None
@@ -100,27 +100,27 @@ class Quantities:
         if subject.kind != "name" or subject.word not in known:
             raise refuse_name(subject.text, known, self.text)
         output = _exerted_by(mechanism, subject.word, kind, component)
-        place = f"{kind}({subject.word})"
-        with told_about(place):
+        name = f"{kind}({subject.word})"
+        with naming_errors(name):
             output.check(mechanism)
-        self.added[place] = output
+        self.added[name] = output
         labels = output.component_labels(mechanism)
         if not component and labels:
-            each = [self._component(place, k, label) for k, label in enumerate(labels)]
+            each = [self._component(name, k, label) for k, label in enumerate(labels)]
             squares = [Node("call", "**", (Node("name", x), Node("number", 2.0))) for x in each]
             total = squares[0]
             for x in squares[1:]:
                 total = Node("call", "+", (total, x))
             return self.jet(Node("call", "sqrt", (total,)))
         if component and component not in labels:
-            message = f"'{node.text}' does not exist; {place} has {'components ' if labels else 'no components '}"
+            message = f"'{node.text}' does not exist; {name} has {'components ' if labels else 'no components '}"
             raise ExpressionError(f"{message}{', '.join(labels)}".rstrip())
-        text = self._component(place, labels.index(component) if component else None, component)
+        text = self._component(name, labels.index(component) if component else None, component)
         return lambda names: names[text]
 
-    def _component(self, place: str, index: int | None, label: str) -> str:
-        text = f"{place}_{label}" if label else place
-        self.atoms[text] = (place, index, 0)
+    def _component(self, output: str, index: int | None, label: str) -> str:
+        text = f"{output}_{label}" if label else output
+        self.atoms[text] = (output, index, 0)
         return text
 
     def jet(self, node: Node) -> Quantity:
@@ -173,7 +173,7 @@ def _exerted_by(mechanism: Mechanism, name: str, kind: str, component: str) -> A
 
 
 @contextmanager
-def told_about(name: str, whole: bool = False) -> Iterator[None]:
+def naming_errors(name: str, whole: bool = False) -> Iterator[None]:
     """Give errors the place that they are about, before the one that they know, or as the whole of it."""
     try:
         yield

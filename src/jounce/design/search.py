@@ -20,19 +20,19 @@ ACCURACY = 1e-13  # of SLSQP, relative
 EACH = 2  # designs evaluated for each iteration that is allowed, at most
 ROUNDS = 12  # regions that are tried, at most
 SMALLEST_REGION = 1e-7  # of the width between bounds
-HELD = 1e-7  # by which a condition may be broken, relative to its size
+CONDITION_TOLERANCE = 1e-7  # by which a condition may be broken, relative to its size
 SMALL = 1e-6  # of the first objective, below which one counts as zero
 FITTED = 1e-6  # of the residual of the first-order conditions after least squares
 LOCKED = 1e3  # what SLSQP is told of a design that locks, relative: its line search then goes back
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Found:
+class SearchResult:
     """Where a search ended.
 
     Attributes
     ----------
-    place : array of shape (parameters,)
+    point : array of shape (parameters,)
         From 0 to 1 between the bounds.
     evaluation : Evaluation
     objective : float
@@ -46,11 +46,11 @@ class Found:
     multipliers : array of shape (conditions,)
         Slope of the objective by each condition.
     bound_multipliers : array of shape (parameters,)
-        Slope of the objective by a lower bound (positive) or an upper one (negative), by the place.
+        Slope of the objective by a lower bound (positive) or an upper one (negative), by the point.
     singular_multiplier : float
     """
 
-    place: Vector
+    point: Vector
     evaluation: Evaluation
     objective: float
     broken: Vector
@@ -63,7 +63,11 @@ class Found:
     @property
     def feasible(self) -> bool:
         """Whether all conditions hold."""
-        return bool(np.isfinite(self.objective) and (self.broken <= HELD).all() and self.near_singular <= HELD)
+        return bool(
+            np.isfinite(self.objective)
+            and (self.broken <= CONDITION_TOLERANCE).all()
+            and self.near_singular <= CONDITION_TOLERANCE
+        )
 
 
 class _Enough(Exception):  # noqa: N818 - no error of a user's
@@ -97,83 +101,83 @@ class Search:
         self.sizes = np.ones(len(self.equal))
         self.scale = self.asked_scale = 1.0
 
-    def from_place(self, place: Vector, *, elastic: bool = False) -> Found:
-        """Search from a place that does not lock.
+    def from_point(self, point: Vector, *, elastic: bool = False) -> SearchResult:
+        """Search from a point that does not lock.
 
         Parameters
         ----------
         elastic : bool, default False
             Make the worst broken condition least, instead of the objective.
         """
-        here = self.problem.evaluate(place)
+        here = self.problem.evaluate(point)
         self._set_scales(here)
-        best, radius = place, 1.0
+        best, radius = point, 1.0
         if self.problem.goals.gaps is not None and not elastic:
-            fitted = self.found(self._fitted(place))
+            fitted = self.result_at(self._fitted(point))
             if fitted.feasible and (fitted.residual <= FITTED or fitted.objective <= ACCURACY * self.scale):
                 return fitted
-            best = fitted.place
+            best = fitted.point
         for _ in range(ROUNDS):
             run = _Run(self, best, radius, elastic=elastic)
             locked, inside = run.run()
             moved = float(np.abs(run.best - best).max(initial=0.0))
             better, best = run.merit_of(run.best) < run.merit_of(best), run.best
             if locked is not None:
-                radius = min(radius / 4, max(float(np.abs(locked.place - best).max()) / 2, SMALLEST_REGION))
+                radius = min(radius / 4, max(float(np.abs(locked.point - best).max()) / 2, SMALLEST_REGION))
                 if radius <= SMALLEST_REGION:
                     break
             elif inside or (not better and moved < ACTIVE):
-                if elastic or radius <= SMALLEST_REGION or self.found(best).residual <= FITTED:
+                if elastic or radius <= SMALLEST_REGION or self.result_at(best).residual <= FITTED:
                     break
                 radius /= 4  # no optimum: from here on in shorter steps, which lock less
             else:
                 radius *= 4
-        return self.found(best)
+        return self.result_at(best)
 
-    def _fitted(self, place: Vector) -> Vector:
-        """Return a better place by least squares, which knows more of distances from points than their sum."""
+    def _fitted(self, point: Vector) -> Vector:
+        """Return a better point by least squares, which knows more of distances from points than their sum."""
         from scipy.optimize import least_squares  # here, to start quickly
 
         chosen = np.array(self.problem.goals.gaps)
 
-        def gaps(place: Vector) -> Vector:
+        def gaps(point: Vector) -> Vector:
             try:
-                here = self.problem.evaluate(place)
+                here = self.problem.evaluate(point)
             except Locked:
                 return np.full(len(chosen), LOCKED * np.sqrt(self.scale))
             if self.watch is not None:
-                self.watch(self.problem.asked(place, here)[0], 0.0)
+                self.watch(self.problem.asked(point, here)[0], 0.0)
             return here.smooth[chosen]
 
-        def slopes(place: Vector) -> Float[np.ndarray, "gap parameter"]:
-            return self.problem.evaluate(place).smooth_slopes[chosen]
+        def slopes(point: Vector) -> Float[np.ndarray, "gap parameter"]:
+            return self.problem.evaluate(point).smooth_slopes[chosen]
 
         tolerances: Any = {"xtol": ACCURACY, "ftol": ACCURACY, "gtol": ACCURACY, "jac": slopes}
-        start = np.clip(place, 1e-10, 1 - 1e-10)
-        found = least_squares(gaps, start, bounds=(0.0, 1.0), max_nfev=self.iterations, **tolerances)
-        near = np.where(found.x < ACTIVE, 0.0, np.where(found.x > 1 - ACTIVE, 1.0, found.x))
-        return min((place, found.x, near), key=self._fitness)
+        start = np.clip(point, 1e-10, 1 - 1e-10)
+        fit = least_squares(gaps, start, bounds=(0.0, 1.0), max_nfev=self.iterations, **tolerances)
+        near = np.where(fit.x < ACTIVE, 0.0, np.where(fit.x > 1 - ACTIVE, 1.0, fit.x))
+        return min((point, fit.x, near), key=self._fitness)
 
-    def _fitness(self, place: Vector) -> tuple[float, float]:
-        """Return by what places are compared: how near they are to a singular position, then the objective."""
+    def _fitness(self, point: Vector) -> tuple[float, float]:
+        """Return by what points are compared: how near they are to a singular position, then the objective."""
         try:
-            here = self.problem.evaluate(place)
+            here = self.problem.evaluate(point)
         except Locked:
             return np.inf, np.inf
-        numbers, _ = self.problem.numbers(place, self.problem.extremes(here)[0], here.smooth)
+        numbers, _ = self.problem.numbers(point, self.problem.extremes(here)[0], here.smooth)
         worst = max(self.near_singular(here), float(self.broken(numbers[1:]).max(initial=0.0)))
-        return (worst if worst > HELD else 0.0), float(numbers[0])
+        return (worst if worst > CONDITION_TOLERANCE else 0.0), float(numbers[0])
 
-    def found(self, place: Vector) -> Found:
-        """Return what is known of a place: values, broken conditions, multipliers."""
-        here = self.problem.evaluate(place)
+    def result_at(self, point: Vector) -> SearchResult:
+        """Return what is known of a point: values, broken conditions, multipliers."""
+        here = self.problem.evaluate(point)
         extremes, chosen = self.problem.extremes(here)
-        numbers, slopes = self.problem.numbers(place, extremes, here.smooth)
+        numbers, slopes = self.problem.numbers(point, extremes, here.smooth)
         broken = self.broken(numbers[1:], self._sizes_at(here))
         near = self.near_singular(here)
         kkt = Multipliers(self._known(float(numbers[0])), here, numbers, slopes, extremes, chosen)
         residual, conditions, bounds, singular = kkt.solved()
-        return Found(place, here, float(numbers[0]), broken, near, residual, conditions, bounds, singular)
+        return SearchResult(point, here, float(numbers[0]), broken, near, residual, conditions, bounds, singular)
 
     def _known(self, objective: float) -> Known:
         goals, size = self.problem.goals, abs(objective)
@@ -184,12 +188,12 @@ class Search:
 
     def broken(self, numbers: Vector, sizes: Vector | None = None) -> Vector:
         """Return by how much conditions are broken, relative to their sizes, those of the start unless given."""
-        found = np.where(self.equal, np.abs(numbers), np.maximum(numbers, 0.0))
-        return found / (self.sizes if sizes is None else sizes)
+        excess = np.where(self.equal, np.abs(numbers), np.maximum(numbers, 0.0))
+        return excess / (self.sizes if sizes is None else sizes)
 
     def _sizes_at(self, here: Evaluation) -> Vector:
         """Return the sizes of conditions at a design; where one side is zero, those of the start tell of them."""
-        pairs = np.abs(np.array(self.problem.asked(here.place, here)[2])).reshape(-1, 2)
+        pairs = np.abs(np.array(self.problem.asked(here.point, here)[2])).reshape(-1, 2)
         return np.where((pairs > 0).all(axis=1), np.minimum(pairs.max(axis=1, initial=0.0), self.sizes), self.sizes)
 
     def near_singular(self, here: Evaluation) -> float:
@@ -199,8 +203,8 @@ class Search:
 
     def _set_scales(self, here: Evaluation) -> None:
         extremes, _ = self.problem.extremes(here)
-        objective, _, sides = self.problem.asked(here.place, here)
-        numbers, _ = self.problem.numbers(here.place, extremes, here.smooth)
+        objective, _, sides = self.problem.asked(here.point, here)
+        numbers, _ = self.problem.numbers(here.point, extremes, here.smooth)
         self.scale = abs(float(numbers[0])) or abs(objective) or 1.0
         self.asked_scale = abs(objective) or self.scale
         self.sizes = np.array([max(map(abs, pair)) or 1.0 for pair in sides])
@@ -264,15 +268,15 @@ class _Run:
 
     def merit_parts(self, here: Evaluation) -> tuple[float, float]:
         """Return the objective and the worst broken condition, both relative."""
-        numbers, _ = self.problem.numbers(here.place, self._extremes(here), here.smooth)
+        numbers, _ = self.problem.numbers(here.point, self._extremes(here), here.smooth)
         broken = self.search.broken(numbers[1:])
         worst = max(float(broken.max(initial=0.0)), self.search.near_singular(here))
         return float(numbers[0]) / self.search.scale, worst
 
-    def merit_of(self, place: Vector) -> tuple[float, float]:
+    def merit_of(self, point: Vector) -> tuple[float, float]:
         """Return by what designs are compared: how far conditions are broken, then the objective."""
-        objective, worst = self.merit_parts(self.problem.evaluate(place))
-        return (worst, 0.0) if self.elastic else (worst if worst > HELD / 2 else 0.0, objective)
+        objective, worst = self.merit_parts(self.problem.evaluate(point))
+        return (worst, 0.0) if self.elastic else (worst if worst > CONDITION_TOLERANCE / 2 else 0.0, objective)
 
     def _locks(self, variables: Vector) -> bool:
         """Tell whether a design locks, of which no slopes are there."""
@@ -282,18 +286,18 @@ class _Run:
             return True
         return False
 
-    def _seen(self, place: Vector) -> Evaluation:
+    def _seen(self, point: Vector) -> Evaluation:
         before = self.problem.evaluations
-        here = self.problem.evaluate(place)
+        here = self.problem.evaluate(point)
         if self.problem.evaluations != before:
             self.evaluations += 1
             if self.evaluations > EACH * self.search.iterations:
                 raise _Enough
-            merit = self.merit_of(place)
+            merit = self.merit_of(point)
             if merit < self._best_merit:
-                self.best, self._best_merit = np.array(place), merit
+                self.best, self._best_merit = np.array(point), merit
             if self.search.watch is not None:
-                self.search.watch(self.problem.asked(here.place, here)[0], self.merit_parts(here)[1])
+                self.search.watch(self.problem.asked(here.point, here)[0], self.merit_parts(here)[1])
         return here
 
     # what SLSQP asks
@@ -312,8 +316,8 @@ class _Run:
     def _goals(self, variables: Vector) -> tuple[Vector, Float[np.ndarray, "goal variable"]]:
         """Return objective and conditions, and their slopes by the variables."""
         here, extremes = self._split(variables)
-        numbers, (by_place, by_extreme, by_smooth) = self.problem.numbers(here.place, extremes, here.smooth)
-        slopes = by_place + by_smooth @ here.smooth_slopes
+        numbers, (by_parameter, by_extreme, by_smooth) = self.problem.numbers(here.point, extremes, here.smooth)
+        slopes = by_parameter + by_smooth @ here.smooth_slopes
         _, chosen = self.problem.extremes(here)
         free = np.setdiff1d(np.arange(len(extremes)), self.extremes)
         slopes = slopes + by_extreme[:, free] @ here.row_slopes[chosen[free]]

@@ -15,7 +15,7 @@ from jounce.design.objectives import Goals
 from jounce.design.problem import LOCKS, Locked, Problem
 from jounce.design.result import Comparison, OptimisedDesign
 from jounce.design.samples import Samples, sampled
-from jounce.design.search import HELD, SMALL, Found, Search
+from jounce.design.search import CONDITION_TOLERANCE, SMALL, Search, SearchResult
 from jounce.errors import DesignError, SolveError
 from jounce.kinematics import Motion, Status, assemblies as all_assemblies, solve
 from jounce.mechanism import Mechanism
@@ -26,7 +26,7 @@ FINER = 4  # times as many, on which its end is looked at
 AGREED = 1e-6  # of objective and conditions on both grids, relative
 REFINEMENTS = 3
 OPTIMAL = 1e-5  # of the residual of the first-order conditions
-SAME_PLACE = 1e-6  # of the spread of the bodies, or rad
+SAME_POSITION = 1e-6  # of the spread of the bodies, or rad
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Study:
 
     def _watch(self, objective: float, broken: float) -> None:
         """Tell of a design that was evaluated, with the objective as it was asked for."""
-        if broken <= HELD:
+        if broken <= CONDITION_TOLERANCE:
             self.least = min(self.least, objective)
         if self.progress is not None:
             self.progress(self.done, self.total, self.least)
@@ -75,9 +75,9 @@ class Study:
     def here(self) -> Float[np.ndarray, " parameter"]:
         """The mechanism as it is, within the bounds."""
         values = self.mechanism.parameter_values
-        return self.problem.place({name: values[name] for name in self.problem.names})
+        return self.problem.point_of({name: values[name] for name in self.problem.names})
 
-    def best(self, starts: int, samples: int | None) -> Found:
+    def best(self, starts: int, samples: int | None) -> SearchResult:
         """Return the best design that searches from several starts end with.
 
         Raises
@@ -86,44 +86,44 @@ class Study:
             If none can be put together and moved, or conditions cannot be met.
         """
         self._note_bounds()
-        places, lock = [self.here], None
+        points, lock = [self.here], None
         try:
             self.problem.evaluate(self.here)
         except Locked as error:
-            places, lock = [], error
-        if starts > 1 or not places:
+            points, lock = [], error
+        if starts > 1 or not points:
             taken = sampled(self.problem, samples, self.seed)
             self.notes += taken.notes(self.asked.bounds)
-            places += taken.best(starts - len(places))
-            if not places:
+            points += taken.best(starts - len(points))
+            if not points:
                 raise _nothing_moves(lock, taken)
         if lock is not None:
             self.notes.append(f"the mechanism as it is cannot be moved: {lock}")
-        self.total = len(places)
-        ends = list(self._ends(places))
+        self.total = len(points)
+        ends = list(self._ends(points))
         if not ends:
             raise DesignError("every search began at a design that locks; give a starting guess within the bounds")
         feasible = [end for end in ends if end.feasible]
         if not feasible:
             feasible = self._made_feasible(ends)
-        found = min(feasible, key=lambda end: end.objective)
-        return self._refined(found)
+        result = min(feasible, key=lambda end: end.objective)
+        return self._refined(result)
 
-    def _ends(self, places: Sequence[Any]) -> Iterator[Found]:
-        for place in places:
+    def _ends(self, points: Sequence[Any]) -> Iterator[SearchResult]:
+        for point in points:
             try:
-                end = self.search.from_place(place)
+                end = self.search.from_point(point)
             except Locked:  # a sample that moves may be one of another assembly when it is solved alone
                 continue
             self.size = min(self.size, self.search.asked_scale)
-            objective = self.problem.asked(end.place, end.evaluation)[0]
+            objective = self.problem.asked(end.point, end.evaluation)[0]
             self.searches.append(objective if end.feasible else math.nan)
             self.done += 1
             if self.progress is not None:
                 self.progress(self.done, self.total, self.least)
             yield end
 
-    def _made_feasible(self, ends: Sequence[Found]) -> list[Found]:
+    def _made_feasible(self, ends: Sequence[SearchResult]) -> list[SearchResult]:
         """Return designs that meet the conditions, found by meeting them first.
 
         Raises
@@ -132,8 +132,8 @@ class Study:
             If none is found: the worst condition is as little broken as it can be.
         """
         nearest = sorted(ends, key=lambda end: max(float(end.broken.max(initial=0.0)), end.near_singular))[:3]
-        met = [self.search.from_place(end.place, elastic=True) for end in nearest]
-        ends = [self.search.from_place(end.place) for end in met if end.feasible]
+        met = [self.search.from_point(end.point, elastic=True) for end in nearest]
+        ends = [self.search.from_point(end.point) for end in met if end.feasible]
         feasible = [end for end in (*ends, *met) if end.feasible]
         if feasible:
             return feasible
@@ -141,36 +141,36 @@ class Study:
         design = self.result(self.mechanism, least, infeasible=True)
         raise DesignError(f"no design within the bounds was found that {self._unmet(least)}", design=design)
 
-    def _unmet(self, least: Found) -> str:
+    def _unmet(self, least: SearchResult) -> str:
         """Word which conditions the design breaks that breaks the worst of them least."""
-        _, numbers, sides = self.problem.asked(least.place, least.evaluation)
+        _, numbers, sides = self.problem.asked(least.point, least.evaluation)
         words = []
         for condition, number, broken, (left, right) in zip(
             self.goals.conditions, numbers, least.broken, sides, strict=True
         ):
-            if broken > HELD:
+            if broken > CONDITION_TOLERANCE:
                 text, near, bound = condition.relation.text, left, right
                 if condition.relation.bound_left:
                     near, bound = right, left
                 words.append(f"meets '{text}': nearest is {near:.6g} against {bound:.6g}, off by {abs(number):.3g}")
-        if least.near_singular > HELD:
+        if least.near_singular > CONDITION_TOLERANCE:
             words.append("stays clear of a singular position at all instants")
-        where = ", ".join(f"{name} = {x:.6g}" for name, x in self.problem.values(least.place).items())
+        where = ", ".join(f"{name} = {x:.6g}" for name, x in self.problem.values(least.point).items())
         return f"{'; and none that '.join(words)} (SI, at {where}); widen the bounds or ease the conditions"
 
-    def _refined(self, found: Found) -> Found:
+    def _refined(self, result: SearchResult) -> SearchResult:
         """Search on, on finer grids, until what is found does not depend on the grid."""
         for _ in range(REFINEMENTS):
-            if self.grid_error(found) <= AGREED:
+            if self.grid_error(result) <= AGREED:
                 break
             self.problem.set_instants(_split(self.problem.goals.instants, 2))
-            found = self.search.from_place(found.place)
-        return found
+            result = self.search.from_point(result.point)
+        return result
 
-    def grid_error(self, found: Found) -> float:
+    def grid_error(self, result: SearchResult) -> float:
         """Return by how much objective and conditions differ on a finer grid, relative; infinite if that one locks."""
-        coarse, numbers, _ = self.problem.asked(found.place, found.evaluation)
-        values = self.problem.values(found.place)
+        coarse, numbers, _ = self.problem.asked(result.point, result.evaluation)
+        values = self.problem.values(result.point)
         try:
             objective, fine, _ = self._on(_split(self.goals.instants, FINER), self.goals.mechanism, values)
         except LOCKS:
@@ -189,7 +189,7 @@ class Study:
         AssemblyError, MobilityError, SolveError
             The design cannot be put together, or locks.
         """
-        goals, kept = self.goals, self.goals.instants
+        goals, previous = self.goals, self.goals.instants
         try:
             goals.set_instants(instants)
             motion = solve(mechanism.with_parameters(**values), goals.instants, goals.order, strict=False)
@@ -201,7 +201,7 @@ class Study:
             numbers = np.asarray(goals.numbers(values, extremes, np.asarray(smooth), as_asked=True))
             return float(numbers[0]), numbers[1:], goals.sides(values, extremes, np.asarray(smooth))
         finally:
-            goals.set_instants(kept)
+            goals.set_instants(previous)
 
     def _note_bounds(self) -> None:
         """Note what was given outside the bounds."""
@@ -211,52 +211,52 @@ class Study:
                 self.notes.append(f"{name} is {values[name]:.6g} in the mechanism, outside of its bounds")
 
     def result(
-        self, original: Mechanism, found: Found, *, assembly: int | None = None, infeasible: bool = False
+        self, original: Mechanism, end: SearchResult, *, assembly: int | None = None, infeasible: bool = False
     ) -> OptimisedDesign:
         """Return what was found, compared with the mechanism as it is, on a finer grid."""
         fine = _split(self.goals.instants, FINER)
-        error = self.grid_error(found)
-        parameters = self.problem.values(found.place)
-        mechanism = self._assembled(original.with_parameters(**parameters), found, assembly)
-        status, message = self._judged(found, error, infeasible=infeasible)
+        error = self.grid_error(end)
+        parameters = self.problem.values(end.point)
+        mechanism = self._assembled(original.with_parameters(**parameters), end, assembly)
+        status, message = self._judged(end, error, infeasible=infeasible)
         try:
             after = self._on(fine, self.goals.mechanism, parameters)
         except LOCKS:
-            after = self.problem.asked(found.place, found.evaluation)
+            after = self.problem.asked(end.point, end.evaluation)
         return OptimisedDesign(
             mechanism,
             parameters,
             after[0],
             status,
             message,
-            tuple(self._comparisons(original, found, after)),
-            float(np.sqrt(found.evaluation.margins.min(initial=np.inf))),
-            found.residual,
+            tuple(self._comparisons(original, end, after)),
+            float(np.sqrt(end.evaluation.margins.min(initial=np.inf))),
+            end.residual,
             error,
             tuple(self.searches),
             self.problem.evaluations,
             tuple(self.notes),
         )
 
-    def _judged(self, found: Found, error: float, *, infeasible: bool) -> tuple[str, str]:
+    def _judged(self, end: SearchResult, error: float, *, infeasible: bool) -> tuple[str, str]:
         """Return the status of a design, and what it means."""
-        if infeasible or not found.feasible:
+        if infeasible or not end.feasible:
             return "infeasible", "conditions do not hold"
         if not error <= AGREED:
             return "feasible", (
                 f"objective and conditions differ by {error:.1e} on a finer grid; motion laws or forces may not be "
                 "smooth, or too few instants are given"
             )
-        if not found.residual <= OPTIMAL:
+        if not end.residual <= OPTIMAL:
             return "feasible", (
-                f"the search ended before no better design was near (first-order residual {found.residual:.1e}); "
+                f"the search ended before no better design was near (first-order residual {end.residual:.1e}); "
                 "take more iterations or starts"
             )
         where = f"; the best of {len(self.searches)} searches" if len(self.searches) > 1 else ""
         return "optimal", f"no design nearby is better, and all conditions hold{where}"
 
     def _comparisons(
-        self, original: Mechanism, found: Found, after: tuple[float, np.ndarray, list[Any]]
+        self, original: Mechanism, end: SearchResult, after: tuple[float, np.ndarray, list[Any]]
     ) -> Iterator[Comparison]:
         """Return objective, conditions and parameters, of the mechanism as it was given and of what was found."""
         known = original.parameter_values  # also outside of the bounds
@@ -267,10 +267,10 @@ class Study:
         except LOCKS:
             nothing = [(math.nan, math.nan)] * len(self.goals.conditions)
             before = math.nan, np.full(len(self.goals.conditions), math.nan), nothing
-        root = found.objective and after[0] and self.goals.objective is not self.goals.objective_value
+        root = end.objective and after[0] and self.goals.objective is not self.goals.objective_value
         factor = 0.5 / after[0] if root else 1.0  # of the slopes of a root, by those of its square
         yield Comparison("objective", self.asked.minimise, before[0], after[0])
-        rows = zip(self.goals.conditions, before[2], after[2], found.multipliers, strict=True)
+        rows = zip(self.goals.conditions, before[2], after[2], end.multipliers, strict=True)
         for condition, first, last, multiplier in rows:
             relation = condition.relation
             fixed_left = relation.bound_left
@@ -279,20 +279,20 @@ class Study:
             high = bound if relation.equal or not fixed_left else None
             slope = float(multiplier * factor * (1.0 if fixed_left else -1.0))
             yield Comparison("condition", relation.text, first[measure], last[measure], low, high, slope)
-        values = self.problem.values(found.place)
+        values = self.problem.values(end.point)
         for k, (name, (low, high)) in enumerate(self.asked.bounds.items()):
-            slope = float(found.bound_multipliers[k]) * factor / float(self.problem.width[k])
+            slope = float(end.bound_multipliers[k]) * factor / float(self.problem.width[k])
             yield Comparison("parameter", name, given[name], values[name], low, high, slope)
 
-    def _assembled(self, mechanism: Mechanism, found: Found, assembly: int | None) -> Mechanism:
+    def _assembled(self, mechanism: Mechanism, end: SearchResult, assembly: int | None) -> Mechanism:
         """Return a mechanism that asks for the assembly that was optimised, by its number in the design found."""
         if assembly is None:
             return mechanism
         first = self.goals.instants[:1]
-        wanted = _placed(solve(self.problem.design(found.place), first, 0))
+        target = _configuration(solve(self.problem.design(end.point), first, 0))
         for each in all_assemblies(mechanism, float(first[0]), circuits=False):
             chosen = dataclasses.replace(mechanism, assembly=each.number)
-            if np.abs(_placed(solve(chosen, first, 0)) - wanted).max() <= SAME_PLACE:
+            if np.abs(_configuration(solve(chosen, first, 0)) - target).max() <= SAME_POSITION:
                 return chosen
         message = "the assembly of the best design was not found again among the assemblies of that design"
         raise DesignError(message, name="assemblies", value=assembly)
@@ -305,7 +305,7 @@ def _nothing_moves(lock: Locked | None, taken: Samples) -> DesignError:
     return DesignError(f"none of {taken.count} designs within the bounds can be put together and moved; {bounds}{why}")
 
 
-def _placed(motion: Motion) -> Float[np.ndarray, " entry"]:
+def _configuration(motion: Motion) -> Float[np.ndarray, " entry"]:
     """Return where all bodies of a motion are at first: positions by their spread, and attitudes without their turns.
 
     Bodies on fixed pivots have the same position in all assemblies.

@@ -115,24 +115,24 @@ def tolerance(
     samples = whole_number("samples", samples, 0, error=MechanismError)
     if indices:
         check_salib(samples)
-    wanted = tuple(mechanism.outputs)
+    selected = tuple(mechanism.outputs)
     if of is not None:
         chosen = [column_of(mechanism, name) for name in of]
-        order = max((found[2] for found in chosen), default=0)
+        order = max((atom[2] for atom in chosen), default=0)
         outputs = {name: output for name, output in mechanism.outputs.items() if name in {c[0] for c in chosen}}
-        wanted, mechanism = tuple(outputs), with_outputs(mechanism, outputs)
+        selected, mechanism = tuple(outputs), with_outputs(mechanism, outputs)
     if not mechanism.outputs:
         raise MechanismError("there is no output whose spread could be computed", name="outputs")
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
     nominal = solve(mechanism, instants, order)
-    found = _Spread(nominal, variations, wanted)
+    atom = _Spread(nominal, variations, selected)
     if linear:
-        found.add_gradients()
+        atom.add_gradients()
     if samples:
-        found.add_samples(samples, progress)
+        atom.add_samples(samples, progress)
     if indices:
-        found.add_indices(samples, progress)
-    return found.dataset()
+        atom.add_indices(samples, progress)
+    return atom.dataset()
 
 
 def column_of(mechanism: Mechanism, name: str) -> tuple[str, str, int]:
@@ -175,15 +175,15 @@ def check_salib(samples: int) -> None:
 class _Spread:
     """What is known of the spread of the outputs of a mechanism about its nominal motion."""
 
-    def __init__(self, nominal: Motion, variations: Mapping[str, Variation], wanted: tuple[str, ...]):
+    def __init__(self, nominal: Motion, variations: Mapping[str, Variation], selected: tuple[str, ...]):
         self.nominal, self.mechanism = nominal, nominal.mechanism
         self.names, self.variations = tuple(variations), spreads(variations)
         self.space = dict(self.mechanism.parameter_values)
         self.deviations = np.array([variation.deviation() for variation in self.variations.values()])
         whole = nominal.dataset
-        whole = whole.drop_vars([name for name in self.mechanism.outputs if name not in wanted])
+        whole = whole.drop_vars([name for name in self.mechanism.outputs if name not in selected])
         self._variables: dict[str, Any] = {str(name): whole[name].variable for name in whole.data_vars}
-        self._outputs = wanted
+        self._outputs = selected
         self._solved: np.ndarray | None = None
         sides, own = Sides(np.zeros((1, 0)), {}), {name: [self.space[name]] for name in self.names}
         if laws_may_break(self.mechanism):
@@ -199,8 +199,8 @@ class _Spread:
 
         def outputs(values: Any) -> dict[str, Any]:
             changed = self.mechanism.with_parameters(**dict(zip(self.names, values, strict=True)))
-            found = solve(changed, self.nominal.time, self.nominal.order).outputs
-            return {name: found[name] for name in self._outputs}
+            solved = solve(changed, self.nominal.time, self.nominal.order).outputs
+            return {name: solved[name] for name in self._outputs}
 
         for name, gradient in jax.jacfwd(outputs)(start).items():
             dims = self._variables[name].dims
@@ -227,12 +227,12 @@ class _Spread:
         whole: Histories = {n: np.full((count, *s), np.nan) for n, s in zip(self._outputs, shapes, strict=True)}
         peaks = {name: np.full((count, *s[1:]), np.nan) for name, s in zip(self._outputs, shapes, strict=True)}
         solved = np.zeros((count, len(self.nominal.time)), bool)
-        for start, stop in _stretches(count, progress):
-            found, sides = self._solved_designs(space.values(start, stop))
-            solved[start:stop] = found["status"].values == Status.OK
+        for start, stop in _batches(count, progress):
+            batch, sides = self._solved_designs(space.values(start, stop))
+            solved[start:stop] = batch["status"].values == Status.OK
             for name in self._outputs:
-                if name in found:
-                    whole[name][start:stop] = self._near_nominal(name, found[name].values)
+                if name in batch:
+                    whole[name][start:stop] = self._near_nominal(name, batch[name].values)
                     peaks[name][start:stop] = self._peaks(name, whole[name][start:stop], sides)
         self._solved = solved.sum(axis=0)
         for name, values in whole.items():
@@ -254,27 +254,27 @@ class _Spread:
             for k, (name, variation) in enumerate(self.variations.items())
         }
         peaks: dict[str, list[np.ndarray]] = {name: [] for name in self._outputs}
-        for start, stop in _stretches(len(shares), progress):
-            found, sides = self._solved_designs({name: x[start:stop] for name, x in values.items()})
-            bad = (found["status"].values != Status.OK).any(axis=1)
+        for start, stop in _batches(len(shares), progress):
+            solved, sides = self._solved_designs({name: x[start:stop] for name, x in values.items()})
+            bad = (solved["status"].values != Status.OK).any(axis=1)
             if bad.any():
                 share = f"{int(bad.sum())} of {stop - start} designs lock or cannot be put together"
                 message = f"{share}, and indices need all of them; narrow the spread"
                 raise MechanismError(message, name="indices")
             for name in self._outputs:
-                peaks[name].append(self._peaks(name, self._near_nominal(name, found[name].values), sides))
+                peaks[name].append(self._peaks(name, self._near_nominal(name, solved[name].values), sides))
         for name, parts in peaks.items():
             whole = np.concatenate(parts)
             flat = whole.reshape(len(whole), -1)
             first, total = np.full((2, len(self.names), flat.shape[1]), np.nan)
             for k in np.flatnonzero(flat.std(axis=0) > 1e-12 * np.abs(flat).max(axis=0)):
                 settings = {"calc_second_order": False, "print_to_console": False, "seed": 1}
-                told = analyse.analyze(problem, flat[:, k], **settings)
-                first[:, k], total[:, k] = told["S1"], told["ST"]
+                indices = analyse.analyze(problem, flat[:, k], **settings)
+                first[:, k], total[:, k] = indices["S1"], indices["ST"]
             dims, shape = self._variables[f"{name}_peak"].dims, (len(self.names), *whole.shape[1:])
             for kind, x, words in (("first", first, "alone"), ("total", total, "alone and with others")):
-                told = f"part of the variance of the peak of {{}} by the parameter {words}"
-                self._put(f"{name}_peak_{kind}_order", ("parameter", *dims), x.reshape(shape), "", told, name)
+                indices = f"part of the variance of the peak of {{}} by the parameter {words}"
+                self._put(f"{name}_peak_{kind}_order", ("parameter", *dims), x.reshape(shape), "", indices, name)
 
     def dataset(self) -> Any:
         """Return all that was found, labelled."""
@@ -283,30 +283,30 @@ class _Spread:
         whole = self.nominal.dataset
         coordinates = {str(name): x for name, x in whole.coords.items()} | {"parameter": list(self.names)}
         coordinates["deviation"] = ("parameter", self.deviations, {"long_name": "standard deviation of the parameter"})
-        found = dict(self._variables)
+        variables = dict(self._variables)
         if self._solved is not None:
-            found["solved"] = ("time", self._solved, {"long_name": "samples solved"})
-        return xarray.Dataset(found, coordinates, {"title": whole.attrs.get("title", ""), "source": "jounce"})
+            variables["solved"] = ("time", self._solved, {"long_name": "samples solved"})
+        return xarray.Dataset(variables, coordinates, {"title": whole.attrs.get("title", ""), "source": "jounce"})
 
     def _solved_designs(self, values: Mapping[str, np.ndarray]) -> tuple[Any, Sides]:
         """Return designs solved side by side, always as many, so that all is compiled once."""
         count = len(next(iter(values.values())))
         filled = {name: np.concatenate([x, np.repeat(x[-1:], TOGETHER - count)]) for name, x in values.items()}
-        found, sides = solve_with_sides(self.mechanism, filled, self.nominal.time, self.nominal.order)
-        return found.isel(design=slice(count)), sides
+        solved, sides = solve_with_sides(self.mechanism, filled, self.nominal.time, self.nominal.order)
+        return solved.isel(design=slice(count)), sides
 
     def _peaks(
         self, name: str, values: Float[np.ndarray, "sample time derivative *axes"], sides: Sides
     ) -> Float[np.ndarray, "sample derivative *axes"]:
         """Return the largest magnitudes of samples of an output, at the instants and beside the breaks of laws."""
         peaks = np.abs(values).max(axis=1)
-        beside = sides.values.get(name)
-        if beside is None or not beside.shape[1]:
+        one_sided = sides.values.get(name)
+        if one_sided is None or not one_sided.shape[1]:
             return peaks
-        beside = np.abs(beside[: len(values)].reshape(len(values), -1, *values.shape[2:]))
+        one_sided = np.abs(one_sided[: len(values)].reshape(len(values), -1, *values.shape[2:]))
         if np.any(getattr(self.mechanism.outputs[name], "wraps", ())):
-            beside[:, :, 0] = np.nan  # no derivative, and counted from where the motion begins
-        return np.where(np.isnan(peaks), peaks, np.fmax(peaks, np.fmax.reduce(beside, axis=1)))
+            one_sided[:, :, 0] = np.nan  # no derivative, and counted from where the motion begins
+        return np.where(np.isnan(peaks), peaks, np.fmax(peaks, np.fmax.reduce(one_sided, axis=1)))
 
     def _near_nominal(
         self, name: str, values: Float[np.ndarray, "sample time derivative *axes"]
@@ -327,17 +327,17 @@ class _Spread:
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # where no sample is known: NaN
-            kept = {"mean": np.nanmean(values, axis=0), "std": np.nanstd(values, axis=0, ddof=1)}
+            statistics = {"mean": np.nanmean(values, axis=0), "std": np.nanstd(values, axis=0, ddof=1)}
             bounds = (
                 np.nanpercentile(values, PERCENTILES, axis=0)
                 if len(values)
                 else np.full((2, *values.shape[1:]), np.nan)
             )
-        kept |= dict(zip(BAND, bounds, strict=True))
+        statistics |= dict(zip(BAND, bounds, strict=True))
         words = {"mean": "mean", "std": "standard deviation", "low": "percentile 2.5", "high": "percentile 97.5"}
-        for kind, x in kept.items():
-            told = f"{words[kind]} of {'the peak of ' if of else ''}{{}} over the samples"
-            self._put(f"{name}_{kind}", dims, x, of or name, told)
+        for kind, x in statistics.items():
+            long_name = f"{words[kind]} of {'the peak of ' if of else ''}{{}} over the samples"
+            self._put(f"{name}_{kind}", dims, x, of or name, long_name)
 
     def _put(
         self, name: str, dims: tuple[Any, ...], values: np.ndarray, units_of: str, words: str, of: str = ""
@@ -351,7 +351,7 @@ class _Spread:
         self._variables[name] = Variable(dims, values, {"units": units, "long_name": words.format(of or units_of)})
 
 
-def _stretches(count: int, progress: Progress | None) -> Iterator[tuple[int, int]]:
+def _batches(count: int, progress: Progress | None) -> Iterator[tuple[int, int]]:
     """Yield the bounds of designs that are solved together, and tell how many are done."""
     for start in range(0, count, TOGETHER):
         stop = min(start + TOGETHER, count)

@@ -134,15 +134,15 @@ def named_forms(texts: Iterable[str]) -> dict[str, str]:
     >>> named_forms(["BC=12cm:16cm", "AB = normal:0.1mm"])
     {'BC': '12cm:16cm', 'AB': 'normal:0.1mm'}
     """
-    found: dict[str, str] = {}
+    forms: dict[str, str] = {}
     for text in texts:
         name, _, form = (part.strip() for part in text.partition("="))
         if not name or not form:
             raise MechanismError(f"a parameter varies by NAME=FORM, where FORM is {FORMS}", name="--vary", value=text)
-        if name in found:
-            raise MechanismError(f"is given more than once, as {found[name]} and as {form}", name=f"--vary {name}")
-        found[name] = form
-    return found
+        if name in forms:
+            raise MechanismError(f"is given more than once, as {forms[name]} and as {form}", name=f"--vary {name}")
+        forms[name] = form
+    return forms
 
 
 def reader_of(mechanism: Mechanism) -> Reader:
@@ -163,7 +163,7 @@ def reader_of(mechanism: Mechanism) -> Reader:
 
 
 def _variation(name: str, form: Any, read: Reader, option: str) -> Variation:
-    place = f"{option} {name}"
+    location = f"{option} {name}"
     if isinstance(form, Interval | Uniform | Normal | Values):
         return form
     try:
@@ -171,7 +171,7 @@ def _variation(name: str, form: Any, read: Reader, option: str) -> Variation:
     except JounceError as error:
         if error.name is not None and not error.name.startswith("parameters."):
             raise
-        raise type(error)(error.message, name=place, value=form if error.value is None else error.value) from None
+        raise type(error)(error.message, name=location, value=form if error.value is None else error.value) from None
 
 
 def _from_text(name: str, text: str, read: Reader) -> Variation:
@@ -204,10 +204,10 @@ def _from_numbers(form: Any) -> Variation:
         if len(form) not in (2, 3):
             raise MechanismError("must be (low, high), (low, high, count), or a list of values", value=form)
         return _interval(*(_number(bound) for bound in form[:2]), *form[2:])
-    wanted = "(low, high), (low, high, count), or a list of finite numbers"
-    values = np.array(real_numbers(None, form, MechanismError, wanted))
+    expected = "(low, high), (low, high, count), or a list of finite numbers"
+    values = np.array(real_numbers(None, form, MechanismError, expected))
     if values.ndim != 1 or not values.size or not np.isfinite(values).all():
-        raise MechanismError(f"must be {wanted}", value=form)
+        raise MechanismError(f"must be {expected}", value=form)
     return Values(values)
 
 
@@ -242,10 +242,10 @@ def spreads(variations: Mapping[str, Variation]) -> dict[str, Normal | Uniform |
     MechanismError
         One is a list of values, or has a count.
     """
-    found: dict[str, Normal | Uniform | Interval] = {}
+    distributions: dict[str, Normal | Uniform | Interval] = {}
     for name, variation in variations.items():
         if isinstance(variation, Values) or getattr(variation, "count", None) is not None:
             message = "is drawn from a range, not a list: LOW:HIGH without COUNT, normal:SIGMA or uniform:HALFWIDTH"
             raise MechanismError(message, name=f"vary {name}")
-        found[name] = variation
-    return found
+        distributions[name] = variation
+    return distributions

@@ -68,11 +68,11 @@ def required_masses(mechanism: Mechanism, what: str = "energies") -> Masses:
     MechanismError
         If no body has a mass or an inertia, or a body has an inertia and no mass is given.
     """
-    found = masses_of(mechanism)
-    known = [part for part in (found.mass, found.moments) if not isinstance(part, Tracer)]
+    masses = masses_of(mechanism)
+    known = [part for part in (masses.mass, masses.moments) if not isinstance(part, Tracer)]
     if len(known) == 2 and not any(map(np.any, known)):
         raise MechanismError(f"no body has a mass; {what} need some", name="bodies")
-    return found
+    return masses
 
 
 def check_loads(mechanism: Mechanism, name: str = "bodies") -> None:

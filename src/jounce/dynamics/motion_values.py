@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Coordinates = Mapping[str, Float[Numbers, "_ ... _"]]
 """Taylor coefficients of the coordinates of poses, by name: as `Motion.poses` has them."""
 
-Found = TypeVar("Found")
+Values = TypeVar("Values")
 
 
 def check_motion(motion: object) -> None:
@@ -33,13 +33,13 @@ def check_motion(motion: object) -> None:
         raise MechanismError("must be a jn.Motion, as jn.solve and jn.simulate give it", name="motion", value=motion)
 
 
-def along_motion(motion: Motion, function: Callable[[Int[np.ndarray, " chunk"]], Found]) -> Found:
+def along_motion(motion: Motion, function: Callable[[Int[np.ndarray, " chunk"]], Values]) -> Values:
     """Return what a function of indices of instants gives for all of a motion, at once where JAX traces it."""
     count = len(motion.time)
     return function(np.arange(count)) if motion.traced else in_chunks(function, count)
 
 
-def in_lots(function: Callable[..., Found], size: int, *arrays: Any) -> Found:
+def in_lots(function: Callable[..., Values], size: int, *arrays: Any) -> Values:
     """Return what a function of arrays with the instants last gives, for a few of these after another.
 
     What is factored is read many times over: the matrices of a few instants stay in the processor's cache meanwhile.
@@ -63,13 +63,13 @@ def in_lots(function: Callable[..., Found], size: int, *arrays: Any) -> Found:
         whole = array if count % size == 0 else array[..., filled]
         return jnp.moveaxis(whole.reshape(*array.shape[:-1], lots, size), -2, 0)
 
-    def joined(found: Any) -> Any:
-        return jnp.moveaxis(found, 0, -2).reshape(*found.shape[1:-1], lots * size)[..., :count]
+    def joined(parts: Any) -> Any:
+        return jnp.moveaxis(parts, 0, -2).reshape(*parts.shape[1:-1], lots * size)[..., :count]
 
     return jax.tree.map(joined, jax.lax.map(lambda some: function(*some), jax.tree.map(split, arrays)))
 
 
-def held(motion: Motion, values: Any) -> Any:
+def concrete_values(motion: Motion, values: Any) -> Any:
     """Return values along a motion as an array of NumPy, or as they are where JAX traces the motion."""
     return values if motion.traced else np.asarray(values)
 
@@ -99,8 +99,12 @@ def part_of(coordinates: Coordinates, bodies: tuple[int, ...] | None, levels: in
     """
     if bodies is not None and not any(bodies):
         levels = 1
-    found = cut(coordinates, levels - 1)
-    return found if bodies is None else {name: values[..., np.array(bodies), :] for name, values in found.items()}
+    coordinates_of_level = cut(coordinates, levels - 1)
+    return (
+        coordinates_of_level
+        if bodies is None
+        else {name: values[..., np.array(bodies), :] for name, values in coordinates_of_level.items()}
+    )
 
 
 def derivatives_along(motion: Motion, coefficients: Float[Numbers, "order *shape time"]) -> Numbers:

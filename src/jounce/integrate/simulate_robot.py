@@ -107,8 +107,8 @@ def _problem(
     length = robot_size(robot)
     scale = np.array([1.0 if robot.joints[name].turning else length for name in names])
     body = None if base is None else base_body(robot)
-    pushes, places, global_axes = wrench_laws(robot, wrenches, free=base is not None)
-    equations = TreeEquations(tree, mask, body, places, global_axes, drives)
+    pushes, frames, global_axes = wrench_laws(robot, wrenches, free=base is not None)
+    equations = TreeEquations(tree, mask, body, frames, global_axes, drives)
     return RobotProblem(equations, joint_laws(names, torque), prescribed, scale, np.float64(length), pushes)
 
 
@@ -160,7 +160,7 @@ class _Run:
     def go(self, start: RobotState, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
         """March from the first to the last instant."""
         begun, stop = float(instants[0]), float(instants[-1])
-        sense = 1.0 if stop >= begun else -1.0
+        direction = 1.0 if stop >= begun else -1.0
         running, none = (np.asarray(value) for value in (int(Outcome.RUNNING), 0))
         nothing = np.zeros(1)
         current, total = Progress(np.array([begun]), start, running, none, none, nothing, nothing), 0
@@ -169,16 +169,16 @@ class _Run:
             count = int(taken)
             total += count
             if count:
-                kept = jax.tree.map(lambda x, count=count: np.asarray(x)[:count], steps)
-                self.parts.append(self.events.noted(kept))
+                cut = jax.tree.map(lambda x, count=count: np.asarray(x)[:count], steps)
+                self.parts.append(self.events.noted(cut))
             if total > MOST:
                 self.ending = (Status.COLLAPSED, f"after {total} steps")
                 break
             if progress is not None:
-                progress(int(np.sum(sense * instants <= sense * float(current.time[0]))), len(instants))
+                progress(int(np.sum(direction * instants <= direction * float(current.time[0]))), len(instants))
         if not self.parts:
-            still = jax.tree.map(lambda x: np.asarray(x)[None, None, :, 0], start)
-            self.parts.append(RobotSteps(np.array([begun]), np.zeros(1), still, np.zeros(1, bool)))
+            at_rest = jax.tree.map(lambda x: np.asarray(x)[None, None, :, 0], start)
+            self.parts.append(RobotSteps(np.array([begun]), np.zeros(1), at_rest, np.zeros(1, bool)))
         if int(current.outcome) in (Outcome.COLLAPSED, Outcome.LOST):
             self.ending = self._explained(current)
 

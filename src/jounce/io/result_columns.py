@@ -41,16 +41,19 @@ def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
 
     along = next(name for name in ALONG if name in dataset.dims)
     first = (name for name in CURVE_AXES if name in dataset.coords) if along == "point" else (along,)
-    found = {name: np.asarray(dataset[name], float) for name in first}
+    columns_found = {name: np.asarray(dataset[name], float) for name in first}
     for name, variable in dataset.data_vars.items():
         if variable.dims == (along,) and along == "angle":
-            found[str(name)] = np.asarray(variable, float)
+            columns_found[str(name)] = np.asarray(variable, float)
         axes = tuple(dim for dim in variable.dims if dim not in (along, "derivative"))
         if not {along, "derivative"} <= set(variable.dims) or (axes and axes not in AXES):
             continue
         parts: list[tuple[str, Any]] = [(str(name), variable)]
         if axes:
-            labels = ["".join(map(str, found)) for found in itertools.product(*(variable[a].values for a in axes))]
+            labels = [
+                "".join(map(str, columns_found))
+                for columns_found in itertools.product(*(variable[a].values for a in axes))
+            ]
             flat = variable.transpose(*axes, "derivative", along)
             whole = flat.values.reshape(-1, *flat.shape[-2:])
             dims = ("derivative", along)
@@ -59,18 +62,18 @@ def columns(dataset: xarray.Dataset) -> dict[str, Float[np.ndarray, " time"]]:
             values = part.transpose("derivative", along).values
             for order, row in zip(dataset["derivative"].values, values, strict=True):
                 column = f"{stem}_d{order}" if order else stem
-                if column in found:
+                if column in columns_found:
                     raise OutputError(f"two outputs make a column of the same name, '{column}'")
-                found[column] = np.asarray(row, float)
-    if along == "time" and _derivative_count(list(found)[1:]) > dataset.sizes.get("derivative", 1):
-        taken = next(name for name in found if re.search("_d[0-9]+$", name))
+                columns_found[column] = np.asarray(row, float)
+    if along == "time" and _derivative_count(list(columns_found)[1:]) > dataset.sizes.get("derivative", 1):
+        taken = next(name for name in columns_found if re.search("_d[0-9]+$", name))
         raise OutputError(f"the output '{taken}' reads as a derivative in a table; give it another name, or write .nc")
-    return found
+    return columns_found
 
 
 def column_units(dataset: xarray.Dataset, names: Iterable[str]) -> list[str | None]:
     """Return the units of columns of a table; None where they are not known."""
-    found = []
+    units = []
     for name in names:
         stem, order = re.fullmatch(r"(.*?)(?:_d([0-9]+))?", name, re.DOTALL).groups()  # type: ignore[union-attr]
         holder = next((n for n in (name, stem, stem.rpartition("_")[0]) if n in dataset.variables), None)
@@ -78,8 +81,8 @@ def column_units(dataset: xarray.Dataset, names: Iterable[str]) -> list[str | No
         unit = "s" if unit is None and name == "time" else unit
         if unit and order and CURVE_AXES[0] in dataset.coords:
             unit = None  # its derivatives are by arc length
-        found.append(derivative_unit(unit, int(order or 0)) if unit else None)
-    return found
+        units.append(derivative_unit(unit, int(order or 0)) if unit else None)
+    return units
 
 
 def dataset_of(header: list[str], table: Float[np.ndarray, "time columns"], units: dict[str, str]) -> xarray.Dataset:

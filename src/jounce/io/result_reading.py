@@ -71,8 +71,8 @@ def _dataset(content: bytes, path: str) -> xarray.Dataset:
             warnings.simplefilter("ignore")  # of xarray, about its own decoding, where others wrote attributes
             return xarray.load_dataset(io.BytesIO(content), engine="h5netcdf", decode_times=False)
     except Exception as error:  # noqa: BLE001 - what the libraries below raise for a file that they do not understand
-        said = ascii(f"{type(error).__name__}: {error}"[:LONGEST])[1:-1]
-        raise OutputError(f"is damaged, or no file of results: {said}", path=path) from None
+        message = ascii(f"{type(error).__name__}: {error}"[:LONGEST])[1:-1]
+        raise OutputError(f"is damaged, or no file of results: {message}", path=path) from None
 
 
 def _table(content: bytes, path: str) -> xarray.Dataset:

@@ -205,10 +205,12 @@ def _write_rows(dataset: xarray.Dataset, stream: TextIO, header_units: bool | No
     line = ",".join(["%.17g"] * rows.shape[1]) + "\n"
     if headed:
         units = column_units(dataset, table)
-        told = header_units
-        if told is None:  # a name that ends in brackets reads as one with a unit, unless its own unit follows
-            told = not all(map(is_si, units)) or any(name_and_unit(name)[1] is not None for name in table)
-        names = [heading(name, unit) if told and unit else name for name, unit in zip(table, units, strict=True)]
+        chosen_units = header_units
+        if chosen_units is None:  # a name that ends in brackets reads as one with a unit, unless its own unit follows
+            chosen_units = not all(map(is_si, units)) or any(name_and_unit(name)[1] is not None for name in table)
+        names = [
+            heading(name, unit) if chosen_units and unit else name for name, unit in zip(table, units, strict=True)
+        ]
         csv.writer(stream, lineterminator="\n").writerow(map(written_name, names))
     for start in range(0, len(rows), 1000):
         stream.writelines(line % tuple(row) for row in rows[start : start + 1000].tolist())

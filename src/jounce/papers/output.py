@@ -23,8 +23,8 @@ def write(path: Path, content: bytes) -> Path:
     OutputError
         If it cannot be written.
     """
-    with replacing(path) as beside:
-        beside.write_bytes(content)
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
     return path
 
 

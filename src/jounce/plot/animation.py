@@ -49,13 +49,13 @@ def check_animation(path: str | PathLike[str], *, overwrite: bool = False) -> No
 
 def _ffmpeg() -> str | None:
     """Return the program ffmpeg: that of the system, or the one that comes with imageio-ffmpeg."""
-    found = shutil.which("ffmpeg")
-    if found is None:
+    program = shutil.which("ffmpeg")
+    if program is None:
         with suppress(ImportError, RuntimeError):
             from imageio_ffmpeg import get_ffmpeg_exe
 
-            found = get_ffmpeg_exe()
-    return found
+            program = get_ffmpeg_exe()
+    return program
 
 
 def frame_instants(
@@ -90,10 +90,10 @@ def frame_instants(
     (51, 101, 51)
     """
     time = np.asarray(time, float)
-    span = abs(float(time[-1] - time[0]))
+    duration = abs(float(time[-1] - time[0]))
     rate, given = _above_zero("fps", fps), 1.0 if speed is None else _above_zero("speed", speed)
-    length = span / given
-    if speed is None and span:
+    length = duration / given
+    if speed is None and duration:
         length = float(np.clip(length, SHORTEST, LONGEST))
     count = round(length * rate) + 1
     if count > MOST_FRAMES:
@@ -163,10 +163,10 @@ def animate(
 
     check_names(names)
     check_animation(path, overwrite=overwrite)
-    found, solved = paths_of(motion, paths, order, view), solved_instants(motion)
+    path_lines, solved = paths_of(motion, paths, order, view), solved_instants(motion)
     nearest = nearest_instants(motion.time, frame_instants(motion.time, speed=speed, fps=fps))
     shown = nearest[np.isin(nearest, solved)]
-    instants, places = np.unique(shown if shown.size else solved, return_inverse=True)
+    instants, frames = np.unique(shown if shown.size else solved, return_inverse=True)
     scene, mechanism = scene_of(motion, view=view, instants=instants), motion.mechanism
     program: dict[Any, Any] = {}
     if Path(fspath(path)).suffix.lower() == ".gif":
@@ -174,22 +174,22 @@ def animate(
     else:
         program = {"animation.ffmpeg_path": _ffmpeg()}
         writer = writers.FFMpegWriter(fps=fps, extra_args=["-pix_fmt", "yuv420p"])
-    with style(), mpl.rc_context(program), replacing(path, overwrite=overwrite) as beside:
-        drawing = SketchFigure(scene, found, mechanism.title, None if mechanism.space == "planar" else view)
+    with style(), mpl.rc_context(program), replacing(path, overwrite=overwrite) as temporary:
+        drawing = SketchFigure(scene, path_lines, mechanism.title, None if mechanism.space == "planar" else view)
         drawing.show(0)
-        drawing.write_names(0, names, still=False)
+        drawing.write_names(0, names, fixed=False)
         at_the_corner = {"transform": drawing.axes.transAxes, "ha": "right", "va": "bottom", "color": GREY}
         clock = drawing.axes.text(0.99, 0.01, _clock_text(motion.time, float(motion.time[0])), **at_the_corner)
         drawing.figure.set_layout_engine("none")
         _even_pixels(drawing.figure)
-        with writer.saving(drawing.figure, str(beside), dpi=RESOLUTION), undoing(lambda: _stop(writer)):
-            for done, place in enumerate(places.tolist(), 1):
-                drawing.show(place)
-                drawing.move_names(place)
-                clock.set_text(_clock_text(motion.time, float(motion.time[instants[place]])))
+        with writer.saving(drawing.figure, str(temporary), dpi=RESOLUTION), undoing(lambda: _stop(writer)):
+            for done, frame in enumerate(frames.tolist(), 1):
+                drawing.show(frame)
+                drawing.move_names(frame)
+                clock.set_text(_clock_text(motion.time, float(motion.time[instants[frame]])))
                 writer.grab_frame()
                 if progress is not None:
-                    progress(done, len(places))
+                    progress(done, len(frames))
 
 
 def _stop(writer: Any) -> None:
@@ -207,6 +207,6 @@ def _even_pixels(figure: Any) -> None:
 
 
 def _clock_text(time: Float[np.ndarray, " time"], now: float) -> str:
-    span = abs(float(time[-1] - time[0])) or 1.0
-    digits = max(0, 2 - int(np.floor(np.log10(span))))
+    duration = abs(float(time[-1] - time[0])) or 1.0
+    digits = max(0, 2 - int(np.floor(np.log10(duration))))
     return f"t = {now:.{min(digits, 9)}f} s"

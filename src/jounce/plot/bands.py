@@ -69,8 +69,8 @@ def draw_bands(spread: xarray.Dataset, columns: Sequence[Column], title: str = "
             axes.set_title(words, loc="left")
         for axes in grid[-1]:
             axes.set_xlabel("time  $t$  (s)")
-        told = [axes.get_legend_handles_labels() for axes in grid[0][1:]]
-        handles, labels = ([*first, *second] for first, second in zip(*told, strict=True))
+        legend_entries = [axes.get_legend_handles_labels() for axes in grid[0][1:]]
+        handles, labels = ([*first, *second] for first, second in zip(*legend_entries, strict=True))
         if handles:
             figure.legend(handles, labels, loc="outside lower center", ncols=min(6, len(handles)))
     return figure
@@ -92,8 +92,8 @@ def _draw_row(spread: Any, column: Column, panels: Any, parameters: list[str]) -
     away = scale_of(np.concatenate([*(bound - nominal for bound in bounds), *sides, np.zeros(1)]))
     if bounds:
         value.fill_between(time, *(x * 10.0**-exponent for x in bounds), color=LINE_COLOURS[0], alpha=BAND, linewidth=0)
-        apart = [(x - nominal) * 10.0**-away for x in bounds]
-        deviation.fill_between(time, *apart, color=LINE_COLOURS[0], alpha=BAND, linewidth=0, label="samples")
+        differences = [(x - nominal) * 10.0**-away for x in bounds]
+        deviation.fill_between(time, *differences, color=LINE_COLOURS[0], alpha=BAND, linewidth=0, label="samples")
     for side in sides:
         label = "first order" if side is sides[0] else None
         deviation.plot(time, side * 10.0**-away, color=GREY, linewidth=0.9, linestyle=(0, (4, 2)), label=label)

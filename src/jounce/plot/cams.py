@@ -71,21 +71,21 @@ def draw_cam(cam: PlateCam, units: Mapping[str, str] | ShownUnits | None = None)
 def _draw_profile(axes: Any, cam: PlateCam, shown: ShownUnits) -> None:
     """Draw the cam at the angle zero, with its pitch curve, base circle and follower."""
     unit, factor = shown.of("m")
-    found, turn = cam.table, np.linspace(0, 2 * np.pi, 181)
+    table, turn = cam.table, np.linspace(0, 2 * np.pi, 181)
     base = cam.base_radius * factor
     axes.plot(base * np.cos(turn), base * np.sin(turn), color=PALE_GREY, linewidth=0.8, linestyle=":")
-    x, y = found.profile * factor
+    x, y = table.profile * factor
     if cam.follower.shape == "roller":
-        axes.plot(*(found.pitch * factor), color=GREY, linewidth=0.8, linestyle="--")
+        axes.plot(*(table.pitch * factor), color=GREY, linewidth=0.8, linestyle="--")
     axes.fill(x, y, color=BLUE, alpha=0.12, linewidth=0)
     axes.plot(x, y, color=BLUE, linewidth=1.4)
     lost = (cam.table.lift - cam.followed_lift) > 0
-    back = found.forward < 0
+    back = table.forward < 0
     axes.plot(np.where(lost | back, x, np.nan), np.where(lost | back, y, np.nan), color=VERMILION, linewidth=2.0)
     axes.plot(0, 0, marker="+", color=GREY, markersize=8)
     _draw_follower(axes, cam, factor)
-    sense = SENSES[cam.sense]
-    arc = np.linspace(0.35, 1.15, 31) * sense + (np.pi / 2 if sense < 0 else 0.0)
+    sign = SENSES[cam.sense]
+    arc = np.linspace(0.35, 1.15, 31) * sign + (np.pi / 2 if sign < 0 else 0.0)
     radius = 0.45 * base
     tip, before = (radius * np.array([np.cos(a), np.sin(a)]) for a in (arc[-1], arc[-4]))
     axes.plot(radius * np.cos(arc), radius * np.sin(arc), color=GREY, linewidth=0.9)
@@ -111,9 +111,9 @@ def _draw_follower(axes: Any, cam: PlateCam, factor: float) -> None:
         if not follower.is_flat:
             axes.plot(*np.array([pivot, center]).T, **line)
         else:
-            way = np.array([-math.cos(coordinate), math.sin(coordinate)])
+            direction = np.array([-math.cos(coordinate), math.sin(coordinate)])
             foot = pivot - follower.face_offset * factor * np.array([math.sin(coordinate), math.cos(coordinate)])
-            ends = [foot, foot + way * (np.linalg.norm(touch - foot) + 0.6 * reach)]
+            ends = [foot, foot + direction * (np.linalg.norm(touch - foot) + 0.6 * reach)]
             axes.plot(*np.array([pivot, *ends]).T, **line)
     elif follower.is_flat:
         low, high = (end.value * factor for end in cam.face or ())
@@ -130,7 +130,7 @@ def _draw_follower(axes: Any, cam: PlateCam, factor: float) -> None:
 
 def _draw_curves(panels: Any, cam: PlateCam, shown: ShownUnits) -> None:
     """Draw lift, pressure angle and radius of curvature by the cam angle."""
-    found = cam.table
+    table = cam.table
     angle_unit, by_angle = shown.of("rad", "angle")
     lift_unit, by_lift = shown.of("rad" if cam.follower.turning else "m", "lift")
     pressure_unit, by_pressure = shown.of("rad", "pressure_angle")
@@ -138,11 +138,11 @@ def _draw_curves(panels: Any, cam: PlateCam, shown: ShownUnits) -> None:
     angle = cam.angle * by_angle
     most = MOST_RADII * cam.base_radius
     with np.errstate(divide="ignore", invalid="ignore"):
-        radius = 1.0 / found.curvature
+        radius = 1.0 / table.curvature
     radius = np.where(np.abs(radius) > most, np.nan, radius) * by_length
     rows = [
-        (found.lift * by_lift, f"lift ({lift_unit})"),
-        (found.pressure_angle * by_pressure, f"pressure angle ({pressure_unit})"),
+        (table.lift * by_lift, f"lift ({lift_unit})"),
+        (table.pressure_angle * by_pressure, f"pressure angle ({pressure_unit})"),
         (radius, f"radius ({length_unit})"),
     ]
     for axes, (values, label) in zip(panels, rows, strict=True):
@@ -153,7 +153,7 @@ def _draw_curves(panels: Any, cam: PlateCam, shown: ShownUnits) -> None:
         axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
         set_ticks(axes.yaxis, 4, least=3)
         axes.tick_params(labelbottom=axes is panels[-1])
-    if np.any(cam.followed_lift < found.lift):
+    if np.any(cam.followed_lift < table.lift):
         panels[0].plot(angle, cam.followed_lift * by_lift, color=VERMILION, linewidth=1.0, linestyle="--")
     panels[-1].set_xlabel(f"cam angle ({angle_unit})")
     if angle_unit in ("deg", "degree", "degrees"):

@@ -82,15 +82,15 @@ Panel = tuple[str, tuple[int, ...]]
 
 
 def _panels(curve: Curve, names: Sequence[str]) -> list[Panel]:
-    found: list[Panel] = []
+    panels: list[Panel] = []
     for name in names:
         values = curve.outputs[name]
         if isinstance(curve.mechanism.outputs[name], PointOutput):
             pairs = PROJECTIONS if values.shape[-1] == 3 else PROJECTIONS[:1]
-            found += [(name, pair) for pair in pairs]
+            panels += [(name, pair) for pair in pairs]
         elif values.ndim == 2:
-            found.append((name, ()))
-    return found
+            panels.append((name, ()))
+    return panels
 
 
 def _draw_panel(axes: Any, curves: Sequence[Curve], name: str, pair: tuple[int, ...]) -> None:
@@ -104,9 +104,9 @@ def _draw_panel(axes: Any, curves: Sequence[Curve], name: str, pair: tuple[int, 
         x, y = (values[:, k] for k in pair) if pair else (along, values)
         colour = LINE_COLOURS[number % len(LINE_COLOURS)]
         axes.plot(x, y, color=colour, label=f"circuit {number + 1}")
-        told = [(point.arc_length, MARKS[point.kind]) for point in curve.limits]
-        told += [(point.arc_length, "x") for point in curve.change_points]
-        for arc_length, mark in told:
+        marks = [(point.arc_length, MARKS[point.kind]) for point in curve.limits]
+        marks += [(point.arc_length, "x") for point in curve.change_points]
+        for arc_length, mark in marks:
             at = int(np.argmin(np.abs(curve.arc_lengths - arc_length)))
             axes.plot(x[at], y[at], marker=mark, color=GREY, fillstyle="none", markersize=5.5, linestyle="", zorder=4)
     if pair:

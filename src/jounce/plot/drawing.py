@@ -136,11 +136,11 @@ class Drawing:
     @cached_property
     def unit(self) -> float:
         """Half a pin, m: a share of what all links ever cover, but no more than fits the links."""
-        places = [self.flat(self.at(link.body, link.points)).reshape(-1, 2) for link in self.skeleton.links.values()]
+        points = [self.flat(self.at(link.body, link.points)).reshape(-1, 2) for link in self.skeleton.links.values()]
         for wheel in self.skeleton.wheels:
             center = self.flat(self.at(wheel.body, wheel.center))
-            places += [center - wheel.radius, center + wheel.radius]
-        everywhere = np.concatenate(places)
+            points += [center - wheel.radius, center + wheel.radius]
+        everywhere = np.concatenate(points)
         everywhere = everywhere[np.isfinite(everywhere).all(axis=1)]
         extent = np.linalg.norm(np.ptp(everywhere, axis=0)) if len(everywhere) else 0.0
         return UNIT * float(extent or self.skeleton.size)
@@ -156,13 +156,13 @@ class Drawing:
         turned = self.at(body, vector) - self.frames[body][:, :, 0]
         return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
 
-    def within(self, body: str, places: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:
-        """Return global places in the frame of a body."""
-        return within(self.frames[body], places)
+    def within(self, body: str, points: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:
+        """Return global points in the frame of a body."""
+        return within(self.frames[body], points)
 
-    def flat(self, places: np.ndarray) -> np.ndarray:
-        """Return places or vectors, (..., components), as they are seen, (..., 2)."""
-        return places if self.planar else places @ self.screen[:2].T
+    def flat(self, points: np.ndarray) -> np.ndarray:
+        """Return points or vectors, (..., components), as they are seen, (..., 2)."""
+        return points if self.planar else points @ self.screen[:2].T
 
     def depth(self, vectors: np.ndarray) -> np.ndarray:
         """Return how far vectors, (..., 3), point toward the viewer, (...)."""
@@ -172,18 +172,18 @@ class Drawing:
         """Return three global unit vectors, in rows, of which the first is along an axis of a body."""
         return np.stack([self.toward(body, unit) for unit in frame_along(axis)], axis=1)
 
-    def global_place(self, symbol: Symbol, slot: int | None = None) -> Float[np.ndarray, "time components"]:
+    def global_point(self, symbol: Symbol, slot: int | None = None) -> Float[np.ndarray, "time components"]:
         """Return the point of a symbol on one of its bodies, one that moves unless it is told, in the global frame."""
         slot = symbol.moving_slot if slot is None else slot
         return self.at(symbol.bodies[slot], symbol.points[slot])
 
-    def place(self, symbol: Symbol, slot: int | None = None) -> Flat:
+    def point(self, symbol: Symbol, slot: int | None = None) -> Flat:
         """Return the point of a symbol on one of its bodies as it is seen."""
-        return self.flat(self.global_place(symbol, slot))
+        return self.flat(self.global_point(symbol, slot))
 
     def ends(self, symbol: Symbol) -> tuple[Flat, Flat]:
         """Return the points of a symbol on its first two bodies as they are seen."""
-        return self.place(symbol, 0), self.place(symbol, 1)
+        return self.point(symbol, 0), self.point(symbol, 1)
 
     def line(self, *points: np.ndarray, **look: Any) -> None:
         """Draw a line through points, each (time, 2) or constant, (2,)."""

@@ -19,16 +19,16 @@ def _spring(drawing: Drawing, symbol: Symbol) -> None:
     stand(drawing, symbol)
     ends = drawing.ends(symbol)
     spring(drawing, *ends)
-    for place in ends:
-        drawing.disc(place, 0.4 * drawing.unit, fill=PAPER, width=1.0, layer=SYMBOLS)
+    for end in ends:
+        drawing.disc(end, 0.4 * drawing.unit, fill=PAPER, width=1.0, layer=SYMBOLS)
 
 
 def _cylinder_and_rod(drawing: Drawing, symbol: Symbol) -> None:
     stand(drawing, symbol)
     ends = drawing.ends(symbol)
     actuator(drawing, *ends)
-    for place in ends:
-        (pin if drawing.planar else ball)(drawing, place)
+    for end in ends:
+        (pin if drawing.planar else ball)(drawing, end)
 
 
 def _sliding(drawing: Drawing, symbol: Symbol) -> None:
@@ -39,11 +39,11 @@ def _sliding(drawing: Drawing, symbol: Symbol) -> None:
     body = GROUND if symbol.kind == "coordinate" else symbol.bodies[0]
     along = drawing.flat(drawing.toward(body, symbol.axis_on(0)))
     u, side = drawing.unit, normal_of(unit_vector(along))
-    place = drawing.place(symbol, 1) + 2.0 * u * side
-    drawing.line(place - 2.4 * u * along, place + 2.4 * u * along, width=1.3, layer=MARKS)
+    point = drawing.point(symbol, 1) + 2.0 * u * side
+    drawing.line(point - 2.4 * u * along, point + 2.4 * u * along, width=1.3, layer=MARKS)
     for sign in (-1.0, 1.0):
-        tip = place + sign * 3.4 * u * along
-        back = place + sign * 2.2 * u * along
+        tip = point + sign * 3.4 * u * along
+        back = point + sign * 2.2 * u * along
         drawing.area(tip, back + 0.55 * u * side, back - 0.55 * u * side, fill=INK, width=0.4, layer=MARKS)
 
 
@@ -60,7 +60,7 @@ def _pivot(drawing: Drawing, symbol: Symbol) -> tuple[Flat, Float[np.ndarray, "t
     shared = shared or [s for s in hinges if symbol.bodies[-1] in s.bodies]
     body = next(body for body in reversed(symbol.bodies) if body != GROUND)
     if shared:
-        center = drawing.place(shared[0], shared[0].bodies.index(body) if body in shared[0].bodies else None)
+        center = drawing.point(shared[0], shared[0].bodies.index(body) if body in shared[0].bodies else None)
     else:
         center = drawing.flat(drawing.at(body, drawing.skeleton.links[body].points[0]))
     if drawing.planar:
@@ -71,8 +71,8 @@ def _pivot(drawing: Drawing, symbol: Symbol) -> tuple[Flat, Float[np.ndarray, "t
 
 def _point_force(drawing: Drawing, symbol: Symbol) -> None:
     """Draw a mark where a force acts: its direction changes with time."""
-    place, u = drawing.place(symbol, 0), drawing.unit
-    corners = [place + u * np.array(corner) for corner in ((0.0, 0.9), (0.9, 0.0), (0.0, -0.9), (-0.9, 0.0))]
+    point, u = drawing.point(symbol, 0), drawing.unit
+    corners = [point + u * np.array(corner) for corner in ((0.0, 0.9), (0.9, 0.0), (0.0, -0.9), (-0.9, 0.0))]
     drawing.area(*corners, fill=INK, width=0.6, layer=MARKS)
 
 

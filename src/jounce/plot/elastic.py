@@ -60,9 +60,9 @@ def draw_feedforward(feedforward: Feedforward, errors: LinkErrors, title: str = 
     panels = [(kind, joints) for kind, joints in kinds if joints]
     with style():
         figure = blank_figure(WIDTH, PANEL * (len(panels) + 1) + 0.5, title or feedforward.title)
-        places = figure.subplots(len(panels) + 1, 1, sharex=True, squeeze=False)[:, 0]
+        axes_column = figure.subplots(len(panels) + 1, 1, sharex=True, squeeze=False)[:, 0]
         chosen = evenly_chosen(np.arange(len(feedforward.time)), DRAWN)
-        for axes, (turning, joints) in zip(places, panels, strict=False):
+        for axes, (turning, joints) in zip(axes_column, panels, strict=False):
             axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
             for k in joints:
                 rounds, colour = divmod(int(k), len(LINE_COLOURS))
@@ -72,10 +72,10 @@ def draw_feedforward(feedforward: Feedforward, errors: LinkErrors, title: str = 
             axes.set_ylabel(f"deflection\n({'mrad' if turning else 'mm'})")
             set_ticks(axes.yaxis, 5)
             axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, handlelength=1.8)
-        _draw_errors(errors, places[-1])
-        places[-1].set_xlim(feedforward.time[0], feedforward.time[-1])
-        set_ticks(places[-1].xaxis, 6)
-        places[-1].set_xlabel("time  $t$  (s)")
+        _draw_errors(errors, axes_column[-1])
+        axes_column[-1].set_xlim(feedforward.time[0], feedforward.time[-1])
+        set_ticks(axes_column[-1].xaxis, 6)
+        axes_column[-1].set_xlabel("time  $t$  (s)")
         figure.align_ylabels()
     return figure
 

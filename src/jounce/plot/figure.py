@@ -83,10 +83,10 @@ def draw_columns(motion: Motion, columns: Mapping[str, Column]) -> Figure:
         tall = height * rows * blocks + 0.9 + 0.45 * (blocks - 1)
         figure = blank_figure(width * wide + 0.3, tall, motion.mechanism.title)
         grid = figure.subplots(rows * blocks, wide, sharex=True, squeeze=False)
-        places = grid.reshape(blocks, rows, wide).swapaxes(1, 2).reshape(-1, rows)
-        for panels, name in zip(places, columns, strict=False):
+        cells = grid.reshape(blocks, rows, wide).swapaxes(1, 2).reshape(-1, rows)
+        for panels, name in zip(cells, columns, strict=False):
             _draw_column(motion, name, columns[name], panels, first)
-        for axes in places[len(columns) :].flat:
+        for axes in cells[len(columns) :].flat:
             axes.set_axis_off()
         figure.align_ylabels()
     return figure
@@ -124,10 +124,10 @@ def _draw_column(motion: Motion, name: str, column: Column, panels: Any, first: 
     top.set_title(shown_name(name), loc="left", pad=6)
     if vector:
         lines = panels[-1].get_lines()[: values.shape[2]]
-        beside = len(lines) > len(COLOURS)  # too many for a line above
-        count = -(-len(lines) // 4) if beside else len(lines)
-        place = {"loc": "upper left" if beside else "lower right", "ncols": count}
-        top.legend(handles=lines, bbox_to_anchor=(1.0, 1.0), **place, **LEGEND)
+        at_side = len(lines) > len(COLOURS)  # too many for a line above
+        count = -(-len(lines) // 4) if at_side else len(lines)
+        legend_position = {"loc": "upper left" if at_side else "lower right", "ncols": count}
+        top.legend(handles=lines, bbox_to_anchor=(1.0, 1.0), **legend_position, **LEGEND)
     panels[-1].set_xlabel("time  $t$  (s)")
     panels[-1].tick_params(labelbottom=True)
 
@@ -171,5 +171,5 @@ def save(figure: Any, path: str | PathLike[str], *, overwrite: bool = False) -> 
     """
     check_figure(path, overwrite=overwrite)
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(fspath(path)).suffix.lower())
-    with replacing(path, overwrite=overwrite) as beside, style():
-        figure.savefig(beside, dpi=RESOLUTION, metadata=metadata)
+    with replacing(path, overwrite=overwrite) as temporary, style():
+        figure.savefig(temporary, dpi=RESOLUTION, metadata=metadata)

@@ -75,24 +75,24 @@ def draw_reactions(motion: Motion, names: Sequence[str] | None = None) -> Figure
     known = [*mechanism.joints, *mechanism.drivers, *mechanism.forces]
     for name in names or ():
         check_name("joint, driver or force", name, known, MechanismError, name="output")
-    wanted = names or known
-    found: dict[str, Any] = {}
+    selected = names or known
+    reactions: dict[str, Any] = {}
     for name in mechanism.joints:
-        if name in wanted:
-            found |= {name: loads.JointForceOutput(name), f"{name} (moment)": loads.JointTorqueOutput(name)}
+        if name in selected:
+            reactions |= {name: loads.JointForceOutput(name), f"{name} (moment)": loads.JointTorqueOutput(name)}
     for name, driver in mechanism.drivers.items():
-        if name in wanted:
-            found[f"{name} (driver)"] = (
+        if name in selected:
+            reactions[f"{name} (driver)"] = (
                 loads.DriverTorqueOutput if loads.is_turning(driver) else loads.DriverForceOutput
             )(name)
     for name, force in mechanism.forces.items():
-        if name in wanted:
-            found[f"{name} (applied)"] = (loads.AppliedForceOutput if force.unit == "N" else loads.AppliedTorqueOutput)(
-                name
-            )
-    columns = {name: (output, motion.evaluate(output).values) for name, output in found.items()}
+        if name in selected:
+            reactions[f"{name} (applied)"] = (
+                loads.AppliedForceOutput if force.unit == "N" else loads.AppliedTorqueOutput
+            )(name)
+    columns = {name: (output, motion.evaluate(output).values) for name, output in reactions.items()}
     sizes = {name: _largest(values[:, 0]) for name, (_, values) in columns.items()}
-    moments = {name for name, output in found.items() if isinstance(output, loads.JointTorqueOutput)}
+    moments = {name for name, output in reactions.items() if isinstance(output, loads.JointTorqueOutput)}
     least = NOTHING * skeleton(mechanism).size * max(size for name, size in sizes.items() if name not in moments)
     felt = {name: column for name, column in columns.items() if name not in moments or sizes[name] > least}
     return draw_columns(motion, felt)
@@ -128,17 +128,20 @@ def draw_energy(motion: Motion) -> Figure:
     >>> [line.get_label() for line in draw_energy(press).axes[0].get_lines()][:2]
     ['kinetic', 'potential']
     """
-    found = {"kinetic": kinetic_energy(motion).total.values[:, 0], "potential": potential_energy(motion).values[:, 0]}
+    energies = {
+        "kinetic": kinetic_energy(motion).total.values[:, 0],
+        "potential": potential_energy(motion).values[:, 0],
+    }
     stored = stored_energy(motion).values
     if _largest(stored):
-        found["springs"] = stored
-    found["total"] = np.sum(list(found.values()), axis=0)
+        energies["springs"] = stored
+    energies["total"] = np.sum(list(energies.values()), axis=0)
     with style():
         figure = blank_figure(PANEL[0], 2.9, motion.mechanism.title)
         axes = figure.subplots()
-        _draw_lines(axes, motion, found, "energy", ("J", 0))
+        _draw_lines(axes, motion, energies, "energy", ("J", 0))
         axes.set_xlabel("time  $t$  (s)")
-        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=len(found))
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=len(energies))
     return figure
 
 
@@ -175,9 +178,9 @@ def draw_power(motion: Motion) -> Figure:
         figure = blank_figure(PANEL[0], PANEL[1] * rows + 0.9, motion.mechanism.title)
         panels = np.atleast_1d(figure.subplots(rows, 1, sharex=True))
         for order, axes in enumerate(panels):
-            found = {name: balance[name].values[:, order] for name in named}
+            powers = {name: balance[name].values[:, order] for name in named}
             word = ("power", "rate", "second rate", "third rate")[order] if order < 4 else f"rate {order}"
-            _draw_lines(axes, motion, found, word, ("W", order))
+            _draw_lines(axes, motion, powers, word, ("W", order))
         panels[-1].set_xlabel("time  $t$  (s)")
         figure.align_ylabels()
         handles, labels = panels[0].get_legend_handles_labels()
@@ -187,13 +190,13 @@ def draw_power(motion: Motion) -> Figure:
 
 
 def _draw_lines(
-    axes: Any, motion: Motion, found: dict[str, Float[np.ndarray, " time"]], word: str, unit: tuple[str, int]
+    axes: Any, motion: Motion, lines: dict[str, Float[np.ndarray, " time"]], word: str, unit: tuple[str, int]
 ) -> None:
     """Draw quantities over time in one panel."""
-    values = np.stack(list(found.values()), axis=-1)
+    values = np.stack(list(lines.values()), axis=-1)
     exponent = scale_of(values)
     values = values * 10.0**-exponent
-    for k, name in enumerate(found):
+    for k, name in enumerate(lines):
         dashes = (0, (4, 1.5)) if name == "total" else "-"
         axes.plot(motion.time, values[:, k], color=LINES[name], linestyle=dashes, label=name)
     finish(axes, motion, values)

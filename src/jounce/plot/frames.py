@@ -50,8 +50,8 @@ def assembled(mechanism: Mechanism) -> dict[str, Frame]:
     >>> assembled(jn.load("examples/four_bar.yaml"))["crank"][0, :, 1].round(6).tolist()  # x axis
     [0.866025, 0.5]
     """
-    held = with_outputs_held(mechanism)
-    started = dataclasses.replace(held, drivers={**held.drivers, **held.initial}, initial={})
+    fixed = with_outputs_held(mechanism)
+    started = dataclasses.replace(fixed, drivers={**fixed.drivers, **fixed.initial}, initial={})
     first = 0.0
     if mechanism.time is not None:
         first = float(time_grid(mechanism.time, mechanism.parameter_values)[0])
@@ -103,6 +103,6 @@ def points_at(
     return turned + frame[:, :, 0].reshape(len(frame), *[1] * (points.ndim - 1), -1)
 
 
-def within(frame: Frame, places: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:
-    """Return global places in the frame of a body."""
-    return np.einsum("tkc,tk->tc", frame[:, :, 1:], places - frame[:, :, 0])
+def within(frame: Frame, points: Float[np.ndarray, "time components"]) -> Float[np.ndarray, "time components"]:
+    """Return global points in the frame of a body."""
+    return np.einsum("tkc,tk->tc", frame[:, :, 1:], points - frame[:, :, 0])

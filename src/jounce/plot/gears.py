@@ -52,9 +52,9 @@ def pitch_radii(
     carrier = bodies[2] if len(bodies) > 2 else GROUND
     pins = _pins(mechanism)
     centers = [_center(pins, body, carrier) for body in bodies[:2]]
-    places = [_seen_from(mechanism, pins, body, carrier, center) for body, center in zip(bodies, centers, strict=False)]
-    distance = float(np.linalg.norm(places[1] - places[0]))
-    largest = max(1e-300, *(float(np.max(np.abs(place))) for place in places))
+    points = [_seen_from(mechanism, pins, body, carrier, center) for body, center in zip(bodies, centers, strict=False)]
+    distance = float(np.linalg.norm(points[1] - points[0]))
+    largest = max(1e-300, *(float(np.max(np.abs(point))) for point in points))
     if distance <= 1e-9 * largest or ratio in (0.0, 1.0):
         return centers, None
     second = distance / abs(1.0 - ratio)
@@ -76,25 +76,25 @@ def _pins(mechanism: Any) -> Pins:
 
 def _center(pins: Pins, body: str, carrier: str) -> Center:
     """Return the point of a gear at which it is pinned: to its carrier, to the ground, or to any other body."""
-    held = [pin for pin in pins if body in pin]
-    for wanted in (carrier, GROUND):
-        for pin in held:
-            if wanted in pin and wanted != body:
+    holding = [pin for pin in pins if body in pin]
+    for body_sought in (carrier, GROUND):
+        for pin in holding:
+            if body_sought in pin and body_sought != body:
                 return pin[body]
-    return held[0][body] if held else np.zeros(2)
+    return holding[0][body] if holding else np.zeros(2)
 
 
 def _seen_from(mechanism: Mechanism, pins: Pins, body: str, carrier: str, center: Center) -> Center:
     """Return the centre of a gear in the frame of its carrier: by a pin, by two on one line, else by the guess."""
-    held = [pin for pin in pins if body in pin and np.array_equal(pin[body], center)]
-    for pin in held:
+    holding = [pin for pin in pins if body in pin and np.array_equal(pin[body], center)]
+    for pin in holding:
         if carrier in pin:
             return pin[carrier]
-    for pin in held:
+    for pin in holding:
         (other,) = set(pin) - {body}
         for second in pins:
             if other in second and carrier in second and np.allclose(second[other], pin[other], rtol=0, atol=1e-12):
                 return second[carrier]
     frames = guessed(mechanism)
-    (place,) = points_at(frames[body], center)
-    return within(frames[carrier], place[None])[0]
+    (point,) = points_at(frames[body], center)
+    return within(frames[carrier], point[None])[0]

@@ -155,34 +155,34 @@ class Skeleton:
     @cached_property
     def wheels(self) -> list[Wheel]:
         """Gears and wheels, in the order of their joints; a gear of several pairs counts once."""
-        found: list[Wheel] = []
+        wheels: list[Wheel] = []
         for symbol in self.symbols:
             radii = [radius for radius in symbol.radii if radius is not None]
             for body, center, radius in zip(symbol.bodies, symbol.points, symbol.radii, strict=True):
                 if radius is None:
                     continue
                 near = SAME * self.size
-                same = (w for w in found if w.body == body and np.allclose(w.center, center, rtol=0, atol=near))
+                same = (w for w in wheels if w.body == body and np.allclose(w.center, center, rtol=0, atol=near))
                 if not any(abs(wheel.radius - radius) <= near for wheel in same):
                     partner = sum(radii) - radius if symbol.kind == "gear" else None
-                    found.append(Wheel(body, center, radius, symbol.internal and radius == max(radii), partner))
-        return found
+                    wheels.append(Wheel(body, center, radius, symbol.internal and radius == max(radii), partner))
+        return wheels
 
 
 @dataclass
 class _Points:
     """Points of one body as they are found, with the names of what is there."""
 
-    places: list[np.ndarray] = field(default_factory=list)
+    positions: list[np.ndarray] = field(default_factory=list)
     names: list[list[str]] = field(default_factory=list)
 
-    def add(self, place: Point, name: str, near: float) -> None:
-        for known, names in zip(self.places, self.names, strict=True):
-            if np.linalg.norm(known - place) <= near:
+    def add(self, point: Point, name: str, near: float) -> None:
+        for known, names in zip(self.positions, self.names, strict=True):
+            if np.linalg.norm(known - point) <= near:
                 if name and name not in names:
                     names.append(name)
                 return
-        self.places.append(place)
+        self.positions.append(point)
         self.names.append([name] if name else [])
 
 
@@ -221,23 +221,23 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
         kind: {name: _values(element, parameters, components, f"{kind}.{name}") for name, element in elements.items()}
         for kind, elements in mechanism.elements.items()
     }
-    found = [touch for kind, values in kinds.items() for touch in _touched(mechanism.elements[kind], values)]
+    touching = [touch for kind, values in kinds.items() for touch in _touched(mechanism.elements[kind], values)]
     start = guessed(mechanism)
-    everywhere = [points_at(start[body], place)[0] for _, body, place in found]
+    everywhere = [points_at(start[body], local)[0] for _, body, local in touching]
     size = float(np.linalg.norm(np.ptp(everywhere or [[0.0]], axis=0)))
     if not size:
-        size = 2 * _largest([place for _, _, place in found], mechanism, kinds) or 1.0
+        size = 2 * _largest([local for _, _, local in touching], mechanism, kinds) or 1.0
     bodies = {body: _Points() for body in start}
-    for name, body, place in found:
-        bodies[body].add(place, name, SAME * size)
+    for name, body, local in touching:
+        bodies[body].add(local, name, SAME * size)
     holding = {*mechanism.joints, *mechanism.drivers, *mechanism.forces}
     links = {}
     for body, points in bodies.items():
         _complete(body, points, mechanism, components, SAME * size)
-        places = np.array(points.places)
-        held = [bool(holding.intersection(names)) for names in points.names]  # others are only watched
-        bars = () if body == GROUND else _bars(places, SAME * size, held)
-        links[body] = DrawnLink(body, places, tuple(map(tuple, points.names)), bars)
+        positions = np.array(points.positions)
+        is_held = [bool(holding.intersection(names)) for names in points.names]  # others are only watched
+        bars = () if body == GROUND else _bars(positions, SAME * size, is_held)
+        links[body] = DrawnLink(body, positions, tuple(map(tuple, points.names)), bars)
     joints, drivers, forces = (
         tuple(
             _symbol(mechanism, name, element, kinds[kind][name], components)
@@ -278,25 +278,27 @@ def _touched(elements: Mapping[str, Any], values: Values) -> Iterator[tuple[str,
 
 def _complete(body: str, points: _Points, mechanism: Mechanism, components: int, near: float) -> None:
     """Add the centre of mass, or the origin, to a body that has too few points to be seen."""
-    if body != GROUND and len(points.places) < 2:
+    if body != GROUND and len(points.positions) < 2:
         center = mechanism.bodies[body].center_of_mass
         if center is not None:
             points.add(np.asarray(resolve(center, mechanism.parameter_values), float), "", near)
-    if not points.places:
+    if not points.positions:
         points.add(np.zeros(components), "", near)
 
 
-def _largest(places: list[Point], mechanism: Mechanism, kinds: Mapping[str, Values]) -> float:
+def _largest(points: list[Point], mechanism: Mechanism, kinds: Mapping[str, Values]) -> float:
     """Return the largest length that is known where all points fall into one."""
-    lengths = [float(np.linalg.norm(place)) for place in places]
+    lengths = [float(np.linalg.norm(point)) for point in points]
     for kind, values in kinds.items():
-        for name, found in values.items():
+        for name, values_of_kind in values.items():
             dimensions = facts_of(type(mechanism.elements[kind][name])).dimensions
-            lengths += [abs(float(x)) for field, x in found.items() if x.ndim == 0 and dimensions[field] == "length"]
+            lengths += [
+                abs(float(x)) for field, x in values_of_kind.items() if x.ndim == 0 and dimensions[field] == "length"
+            ]
     return max(lengths, default=0.0)
 
 
-def _bars(points: Points, near: float, held: list[bool]) -> tuple[tuple[int, int], ...]:
+def _bars(points: Points, near: float, is_held: list[bool]) -> tuple[tuple[int, int], ...]:
     """Return the bars of a link: one between two points, the outline of points in one plane, else a tree."""
     count = len(points)
     if count < 2:
@@ -313,12 +315,12 @@ def _bars(points: Points, near: float, held: list[bool]) -> tuple[tuple[int, int
 
         around = ConvexHull(centred @ directions[:2].T).vertices.tolist()
         return tuple(pairwise([*around, around[0]]))
-    corners = np.flatnonzero(held)
+    corners = np.flatnonzero(is_held)
     if 3 <= len(corners) < count:
         inner = _bars(points[corners], near, [True] * len(corners))
         if len(inner) >= 3 and inner[-1][1] == inner[0][0]:  # a plate, with what is watched beside it
             ring = tuple((int(corners[i]), int(corners[j])) for i, j in inner)
-            others = (k for k in range(count) if not held[k])
+            others = (k for k in range(count) if not is_held[k])
             distance = np.linalg.norm(points[:, None] - points[None, corners], axis=-1)
             return (*ring, *((k, int(corners[np.argmin(distance[k])])) for k in others))
     from scipy.sparse.csgraph import minimum_spanning_tree

@@ -27,8 +27,8 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
         drawing.owner = f"joints.{symbol.name}"
         (_PLANAR if drawing.planar else _SPATIAL).get(symbol.kind, _unknown)(drawing, symbol)
         if symbol.kind not in _UNNAMED:
-            place = np.mean(drawing.ends(symbol), axis=0) if symbol.kind == "rod" else drawing.place(symbol)
-            drawing.name(symbol.name, place, INK)
+            center = np.mean(drawing.ends(symbol), axis=0) if symbol.kind == "rod" else drawing.point(symbol)
+            drawing.name(symbol.name, center, INK)
     for kind, symbols in (("drivers", seen.drivers), ("forces", seen.forces)):
         for symbol in symbols:
             drawing.owner = f"{kind}.{symbol.name}"
@@ -37,8 +37,8 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
         bodies = getattr(output, "bodies", ())
         if getattr(output, "point", None) is not None and len(bodies) == 1:
             link = seen.links[bodies[0]]
-            for place in (point for point, names in zip(link.points, link.names, strict=True) if name in names):
-                drawing.owner, flat = f"outputs.{name}", drawing.flat(drawing.at(link.body, place))
+            for center in (point for point, names in zip(link.points, link.names, strict=True) if name in names):
+                drawing.owner, flat = f"outputs.{name}", drawing.flat(drawing.at(link.body, center))
                 drawing.disc(flat, 0.3 * drawing.unit, stroke="", fill=INK, layer=MARKS)
 
 
@@ -60,42 +60,42 @@ def _draw_wheel(drawing: Drawing, wheel: Wheel) -> None:
 
 def _revolute(drawing: Drawing, symbol: Symbol) -> None:
     parts.stand(drawing, symbol)
-    parts.pin(drawing, drawing.place(symbol))
+    parts.pin(drawing, drawing.point(symbol))
 
 
 def _rod(drawing: Drawing, symbol: Symbol) -> None:
     parts.stand(drawing, symbol)
     ends = drawing.ends(symbol)
     drawing.line(*ends, width=2.6, stroke="#666666", layer=BARS)
-    for place in ends:
-        (parts.pin if drawing.planar else parts.ball)(drawing, place)
+    for end in ends:
+        (parts.pin if drawing.planar else parts.ball)(drawing, end)
 
 
 def _slide(drawing: Drawing, symbol: Symbol, beyond: float) -> tuple[int, str]:
     """Draw the rail of a joint; return the slot and the body of what slides on it."""
     block, guide = symbol.block_and_rail
-    place, start = drawing.global_place(symbol, block), symbol.points[guide]
-    parts.rail(drawing, symbol.bodies[guide], place, symbol.axis_on(guide), beyond=beyond, start=start)
+    point, start = drawing.global_point(symbol, block), symbol.points[guide]
+    parts.rail(drawing, symbol.bodies[guide], point, symbol.axis_on(guide), beyond=beyond, start=start)
     return block, symbol.bodies[block]
 
 
 def _prismatic(drawing: Drawing, symbol: Symbol) -> None:
     block, body = _slide(drawing, symbol, 2.6)
     along = parts.unit_vector(drawing.toward(body, symbol.axis_on(block)))
-    _draw_block(drawing, body, drawing.place(symbol, block), along)
+    _draw_block(drawing, body, drawing.point(symbol, block), along)
 
 
-def _draw_block(drawing: Drawing, body: str, place: Flat, along: Flat) -> None:
+def _draw_block(drawing: Drawing, body: str, point: Flat, along: Flat) -> None:
     u, side = drawing.unit, parts.normal_of(along)
-    corners = [place + a * 1.7 * u * along + b * 0.9 * u * side for a, b in parts.CORNERS]
+    corners = [point + a * 1.7 * u * along + b * 0.9 * u * side for a, b in parts.CORNERS]
     colour = drawing.colours.get(body, INK)
     drawing.area(*corners, stroke=colour, fill=tinted(colour, 0.35), width=1.6, layer=BARS)
 
 
 def _pin_in_slot(drawing: Drawing, symbol: Symbol) -> None:
-    held = drawing.global_place(symbol, 1)
-    parts.rail(drawing, symbol.bodies[0], held, symbol.axis_on(0), start=symbol.points[0])
-    parts.pin(drawing, drawing.flat(held))
+    pin_point = drawing.global_point(symbol, 1)
+    parts.rail(drawing, symbol.bodies[0], pin_point, symbol.axis_on(0), start=symbol.points[0])
+    parts.pin(drawing, drawing.flat(pin_point))
 
 
 def _coordinate(drawing: Drawing, symbol: Symbol) -> None:
@@ -103,9 +103,9 @@ def _coordinate(drawing: Drawing, symbol: Symbol) -> None:
     direction = symbol.axes[0]
     if direction is None or symbol.bodies[0] != GROUND:
         return
-    free, place = direction[::-1].copy(), drawing.place(symbol, 1)
-    parts.rail(drawing, GROUND, place, free)
-    _draw_block(drawing, symbol.bodies[1], place, np.broadcast_to(free, place.shape))
+    free, point = direction[::-1].copy(), drawing.point(symbol, 1)
+    parts.rail(drawing, GROUND, point, free)
+    _draw_block(drawing, symbol.bodies[1], point, np.broadcast_to(free, point.shape))
 
 
 def _rack(drawing: Drawing, symbol: Symbol) -> None:
@@ -117,7 +117,7 @@ def _rack(drawing: Drawing, symbol: Symbol) -> None:
 def _rolling(drawing: Drawing, symbol: Symbol) -> None:
     body, start, axis = symbol.bodies[0], symbol.points[0], symbol.axis_on(0)
     along = axis / np.linalg.norm(axis)
-    travel = (drawing.within(body, drawing.global_place(symbol, 1)) - start) @ along
+    travel = (drawing.within(body, drawing.global_point(symbol, 1)) - start) @ along
     frame = drawing.frames[body]
     touch = frame[:, :, 0] + np.einsum("tck,tk->tc", frame[:, :, 1:], start + travel[:, None] * along)
     parts.rail(drawing, body, touch, axis, start=start)
@@ -125,64 +125,64 @@ def _rolling(drawing: Drawing, symbol: Symbol) -> None:
 
 def _spherical(drawing: Drawing, symbol: Symbol) -> None:
     parts.stand(drawing, symbol)
-    place = drawing.place(symbol)
+    point = drawing.point(symbol)
     angle = np.radians(np.linspace(150.0, 390.0, 20))
     socket = 1.3 * drawing.unit * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    drawing.curve(place[:, None] + socket, width=1.2, layer=SYMBOLS)
-    parts.ball(drawing, place)
+    drawing.curve(point[:, None] + socket, width=1.2, layer=SYMBOLS)
+    parts.ball(drawing, point)
 
 
 def _hinge(drawing: Drawing, symbol: Symbol) -> None:
     parts.stand(drawing, symbol)
     slot = symbol.moving_slot
     axes = drawing.frame_along(symbol.bodies[slot], symbol.axis_on(slot))
-    place, reach = drawing.place(symbol, slot), 3.2 * drawing.unit * drawing.flat(axes[:, 0])
-    drawing.line(place - reach, place + reach, width=0.7, dashes=parts.DASH_DOT, layer=SYMBOLS)
-    parts.cylinder(drawing, place, axes, (1.5, 0.75), fill=parts.PAPER, width=1.1, layer=SYMBOLS)
+    point, reach = drawing.point(symbol, slot), 3.2 * drawing.unit * drawing.flat(axes[:, 0])
+    drawing.line(point - reach, point + reach, width=0.7, dashes=parts.DASH_DOT, layer=SYMBOLS)
+    parts.cylinder(drawing, point, axes, (1.5, 0.75), fill=parts.PAPER, width=1.1, layer=SYMBOLS)
 
 
 def _sliding_body(drawing: Drawing, symbol: Symbol, block: int) -> tuple[Flat, Float[np.ndarray, "time 3 3"], Any]:
     """Return place, axes and look of what slides in space."""
     body = symbol.bodies[block]
     axes, colour = drawing.frame_along(body, symbol.axis_on(block)), drawing.colours.get(body, INK)
-    return drawing.place(symbol, block), axes, {"stroke": colour, "fill": tinted(colour, 0.35), "width": 1.2}
+    return drawing.point(symbol, block), axes, {"stroke": colour, "fill": tinted(colour, 0.35), "width": 1.2}
 
 
 def _sleeve(drawing: Drawing, symbol: Symbol) -> None:
     """Draw a sleeve on a shaft, which it may turn about; with a thread it is a nut on a screw."""
     block, _ = _slide(drawing, symbol, 3.5)
-    place, axes, look = _sliding_body(drawing, symbol, block)
+    point, axes, look = _sliding_body(drawing, symbol, block)
     if symbol.kind == "screw":
         shaft = drawing.flat(drawing.frame_along(symbol.bodies[1 - block], symbol.axis_on(1 - block)))
         turns = np.linspace(-3.0, 3.0, 49)
         helix = np.array([turns, 0.45 * np.cos(5 * turns), 0.45 * np.sin(5 * turns)])
-        points = place[:, None] + drawing.unit * np.einsum("kn,tkc->tnc", helix, shaft)
+        points = point[:, None] + drawing.unit * np.einsum("kn,tkc->tnc", helix, shaft)
         drawing.curve(points, width=0.9, layer=SYMBOLS)
-    parts.cylinder(drawing, place, axes, (1.9, 0.9), layer=SYMBOLS, **look)
+    parts.cylinder(drawing, point, axes, (1.9, 0.9), layer=SYMBOLS, **look)
 
 
 def _slider(drawing: Drawing, symbol: Symbol) -> None:
     block, _ = _slide(drawing, symbol, 3.0)
-    place, axes, look = _sliding_body(drawing, symbol, block)
-    parts.box(drawing, place, axes, (1.7, 0.9, 0.9), layer=SYMBOLS, **look)
+    point, axes, look = _sliding_body(drawing, symbol, block)
+    parts.box(drawing, point, axes, (1.7, 0.9, 0.9), layer=SYMBOLS, **look)
 
 
 def _universal(drawing: Drawing, symbol: Symbol) -> None:
     parts.stand(drawing, symbol)
-    place, u = drawing.place(symbol), drawing.unit
+    point, u = drawing.point(symbol), drawing.unit
     for slot, body in enumerate(symbol.bodies):
         colour = drawing.colours.get(body, INK)
         arm = drawing.flat(drawing.toward(body, symbol.axis_on(slot))) * 1.7 * u
-        drawing.line(place - arm, place + arm, stroke=colour, width=2.4, layer=SYMBOLS)
-        for end in (place - arm, place + arm):
+        drawing.line(point - arm, point + arm, stroke=colour, width=2.4, layer=SYMBOLS)
+        for end in (point - arm, point + arm):
             drawing.disc(end, 0.4 * u, stroke=colour, fill=parts.PAPER, width=1.2, layer=SYMBOLS)
 
 
 def _plane(drawing: Drawing, symbol: Symbol) -> None:
     """Draw the plane of a body, as large as the point on it travels, and a ball at the point."""
-    body, place = symbol.bodies[0], drawing.global_place(symbol, 1)
+    body, point = symbol.bodies[0], drawing.global_point(symbol, 1)
     across = frame_along(symbol.axis_on(0))[1:]
-    local = drawing.within(body, place)
+    local = drawing.within(body, point)
     spread = local @ across.T  # time, 2
     middle = np.nanmean(local - spread @ across, axis=0)
     low, high = np.nanmin(spread, axis=0) - 3 * drawing.unit, np.nanmax(spread, axis=0) + 3 * drawing.unit
@@ -190,7 +190,7 @@ def _plane(drawing: Drawing, symbol: Symbol) -> None:
     corners = [middle + (center + half * np.array(corner)) @ across for corner in parts.CORNERS]
     flat = [drawing.flat(drawing.at(body, corner)) for corner in corners]
     drawing.area(*flat, fill="#F2F2F2", stroke="#888888", width=0.8, layer=GUIDES - 1)
-    parts.ball(drawing, drawing.flat(place))
+    parts.ball(drawing, drawing.flat(point))
 
 
 def _nothing(drawing: Drawing, symbol: Symbol) -> None:
@@ -199,12 +199,12 @@ def _nothing(drawing: Drawing, symbol: Symbol) -> None:
 
 def _unknown(drawing: Drawing, symbol: Symbol) -> None:
     """Draw a square at each point, and a dotted line between them: its class states no symbol."""
-    places = [drawing.place(symbol, slot) for slot in range(len(symbol.bodies))]
-    for place in places:
-        corners = [place + 0.7 * drawing.unit * np.array(corner) for corner in parts.CORNERS]
+    points = [drawing.point(symbol, slot) for slot in range(len(symbol.bodies))]
+    for point in points:
+        corners = [point + 0.7 * drawing.unit * np.array(corner) for corner in parts.CORNERS]
         drawing.area(*corners, fill=parts.PAPER, width=1.2, layer=SYMBOLS)
-    if len(places) > 1:
-        drawing.line(*places, width=1.0, dashes=parts.DASHES, layer=GUIDES)
+    if len(points) > 1:
+        drawing.line(*points, width=1.0, dashes=parts.DASHES, layer=GUIDES)
 
 
 _UNNAMED = ("none", "coordinate", "gear", "rack", "rolling")

@@ -71,13 +71,13 @@ def draw_limits(report: LimitReport, title: str = "") -> Figure:
         tall = ROW * lines + 0.75 + legend
         figure = blank_figure(WIDTH, tall, title or report.robot, h_pad=0.06, hspace=0.02, wspace=0.03)
         grid = figure.subplots(lines, columns, sharex=True, squeeze=False)
-        places = [*grid.T.reshape(-1)]  # the derivatives of the position below each other
-        for axes in places[len(rows) :]:
+        axes_list = [*grid.T.reshape(-1)]  # the derivatives of the position below each other
+        for axes in axes_list[len(rows) :]:
             axes.set_axis_off()
-        for quantity, axes in zip(rows.tolist(), places, strict=False):
+        for quantity, axes in zip(rows.tolist(), axes_list, strict=False):
             _draw_panel(report, quantity, np.flatnonzero(limited[quantity]).tolist(), axes)
         figure.align_ylabels()
-        for axes in (*grid[-1], places[len(rows) - 1]):
+        for axes in (*grid[-1], axes_list[len(rows) - 1]):
             axes.set_xlabel("time  $t$  (s)")
             axes.tick_params(labelbottom=True)
         _draw_legend(report, joints.tolist(), figure)
@@ -91,8 +91,8 @@ def _per_line(report: LimitReport, joints: Any) -> int:
 
 
 def _line_style(joint: int) -> dict[str, Any]:
-    rounds, place = divmod(joint, len(LINE_COLOURS))
-    return {"color": LINE_COLOURS[place], "linestyle": DASHES[rounds % len(DASHES)]}
+    rounds, index = divmod(joint, len(LINE_COLOURS))
+    return {"color": LINE_COLOURS[index], "linestyle": DASHES[rounds % len(DASHES)]}
 
 
 def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any) -> None:
@@ -119,8 +119,8 @@ def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any
     axes.set_ylabel(f"{words}\n(share of limit)")
     name = shown_name(worst.joint)
     size = "infinite" if worst.infinite else f"{worst.value:.5g} {unit_label(worst.unit, 0)}"
-    told = f"worst: {name}, {size} (limit {worst.limit:.5g})"
-    axes.set_title(told, loc="left", pad=4, fontsize=7.5, color=BROKEN if worst.broken else GREY)
+    note = f"worst: {name}, {size} (limit {worst.limit:.5g})"
+    axes.set_title(note, loc="left", pad=4, fontsize=7.5, color=BROKEN if worst.broken else GREY)
 
 
 def _rows_of(report: LimitReport, quantity: int) -> list[LimitRow]:

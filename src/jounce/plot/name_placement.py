@@ -29,7 +29,7 @@ def place_names(
     instant: int,
     obstacles: Sequence[Points],
     unit: float,
-    still: bool = True,
+    fixed: bool = True,
 ) -> list[tuple[Label, Any]]:
     """Write names of a scene; each takes the free place that is nearest.
 
@@ -45,7 +45,7 @@ def place_names(
         Corners of the lines that should stay free.
     unit : float
         Of the drawing, m.
-    still : bool, default True
+    fixed : bool, default True
         Whether the drawing stays so, and lines may lead from names to their places.
 
     Returns
@@ -65,35 +65,38 @@ def place_names(
     boxes = np.array([_box(text, renderer) for text in axes.texts]).reshape(-1, 4)
     texts = []
     for label in labels:
-        place = label.anchor[min(instant, len(label.anchor) - 1)]
-        if not np.isfinite(place).all():
+        anchor = label.anchor[min(instant, len(label.anchor) - 1)]
+        if not np.isfinite(anchor).all():
             continue
-        text = axes.text(*place, shown_name(label.text), color=label.colour, fontsize=8, ha="center", va="center")
+        text = axes.text(*anchor, shown_name(label.text), color=label.colour, fontsize=8, ha="center", va="center")
         text.set(zorder=9, path_effects=[withStroke(linewidth=1.8, foreground="white")])
         text.set_gid(printable(f"name.{label.owner}"))
         if label.owner.startswith("bodies."):
             text.set_fontweight("bold")
         edges = _box(text, renderer)
         half = (edges[2:] - edges[:2]) / 2 + 1.0
-        center, distance = _best(to_pixels(place), half, pixels, taken, boxes, frame)
+        center, distance = _best(to_pixels(anchor), half, pixels, taken, boxes, frame)
         boxes = np.vstack([boxes, [*(center - half), *(center + half)]])
         at = axes.transData.inverted().transform(center)
         text.set_position(at)
         texts.append((label, text))
-        if distance > LEADER and still:
-            axes.plot([place[0], at[0]], [place[1], at[1]], color=label.colour, linewidth=0.5, alpha=0.6, zorder=5.5)
+        if distance > LEADER and fixed:
+            axes.plot([anchor[0], at[0]], [anchor[1], at[1]], color=label.colour, linewidth=0.5, alpha=0.6, zorder=5.5)
     return texts
 
 
 def _best(
-    place: Pixels, half: Pixels, pixels: float, taken: Points, boxes: Boxes, frame: Float[np.ndarray, "4"]
+    anchor: Pixels, half: Pixels, pixels: float, taken: Points, boxes: Boxes, frame: Float[np.ndarray, "4"]
 ) -> tuple[Pixels, float]:
     """Return the centre of a name in pixels, and how far it is from its place in units, by the least cost."""
     angle = 2 * np.pi * np.arange(1, DIRECTIONS + 1) / DIRECTIONS
-    way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    reach = np.minimum((half / np.maximum(np.abs(way), 1e-9)).min(axis=1), half.max())  # to the edge of the name
+    directions = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    reach = np.minimum((half / np.maximum(np.abs(directions), 1e-9)).min(axis=1), half.max())  # to the edge of the name
     distance = np.repeat(DISTANCES, DIRECTIONS)
-    center = place + np.tile(way, (len(DISTANCES), 1)) * (distance * pixels + np.tile(reach, len(DISTANCES)))[:, None]
+    center = (
+        anchor
+        + np.tile(directions, (len(DISTANCES), 1)) * (distance * pixels + np.tile(reach, len(DISTANCES)))[:, None]
+    )
     low, high = center - half, center + half
     covered = ((taken > low[:, None] - 1.5) & (taken < high[:, None] + 1.5)).all(axis=2).sum(axis=1)
     overlap = np.minimum(high[:, None], boxes[:, 2:]) - np.maximum(low[:, None], boxes[:, :2])

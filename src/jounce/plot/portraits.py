@@ -57,7 +57,7 @@ def hodograph(motion: Motion, output: str, order: int = 1) -> Figure:
     values = _values(motion, output, (order,))[0]
     outputs = motion.mechanism.outputs
     if values.ndim != 2 or outputs[output].axes:
-        vectors = [name for name, found in motion.outputs.items() if found.ndim == 3 and not outputs[name].axes]
+        vectors = [name for name, series in motion.outputs.items() if series.ndim == 3 and not outputs[name].axes]
         message = f"a hodograph needs an output with components; {did_you_mean(output, vectors)}"
         raise MechanismError(message, name="output", value=output)
     pairs = PROJECTIONS if values.shape[1] == 3 else PROJECTIONS[:1]
@@ -160,8 +160,8 @@ def _mark_start(axes: Any, x: Float[np.ndarray, " time"], y: Float[np.ndarray, "
     steps = np.hypot(np.diff(x) / spread[0], np.diff(y) / spread[1])
     if not np.isfinite(steps).any() or np.nansum(steps) == 0:
         return
-    way = np.cumsum(np.nan_to_num(steps))
-    at = min(int(np.searchsorted(way, 0.12 * way[-1])) + 1, len(x) - 1)
+    distance = np.cumsum(np.nan_to_num(steps))
+    at = min(int(np.searchsorted(distance, 0.12 * distance[-1])) + 1, len(x) - 1)
     begin = max(at - 1, 0)
     if np.isfinite([x[begin], y[begin], x[at], y[at]]).all():
         look = {"arrowstyle": "-|>", "color": GREY, "mutation_scale": 11, "linewidth": 0}

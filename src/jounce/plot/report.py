@@ -101,9 +101,9 @@ def report(
         "SCRIPT": _part("report.js") + _part("plots.js"),
         "DATA": data.replace("<", "\\u003c"),  # no name can end the script early
     }
-    page = re.sub("@([A-Z]+)@", lambda place: parts[place[1]], _part("report.html"))  # once: titles are not looked at
-    with replacing(path, overwrite=overwrite) as beside:
-        beside.write_text(page, encoding="utf-8")
+    page = re.sub("@([A-Z]+)@", lambda match: parts[match[1]], _part("report.html"))  # once: titles are not looked at
+    with replacing(path, overwrite=overwrite) as temporary:
+        temporary.write_text(page, encoding="utf-8")
 
 
 def _part(name: str) -> str:
@@ -149,12 +149,12 @@ def _data(motion: Motion, view: View, source: str) -> dict[str, Any]:
     }
 
 
-def _speed(span: float) -> float:
+def _speed(duration: float) -> float:
     """Return the speed, of those offered, with which a motion takes some seconds."""
-    if span <= 0 or SHORTEST <= span <= LONGEST:
+    if duration <= 0 or SHORTEST <= duration <= LONGEST:
         return 1.0
-    wanted = span / (2 * SHORTEST if span < SHORTEST else LONGEST)
-    return min(SPEEDS, key=lambda speed: abs(math.log(speed / wanted)))
+    target = duration / (2 * SHORTEST if duration < SHORTEST else LONGEST)
+    return min(SPEEDS, key=lambda speed: abs(math.log(speed / target)))
 
 
 def _number(value: float | np.ndarray) -> float | None:
@@ -182,10 +182,10 @@ def _output(
 
 
 def _peak(peak: Peak) -> dict[str, Any]:
-    found = {name: getattr(peak, name) for name in ("output", "derivative", "unit")}
+    facts = {name: getattr(peak, name) for name in ("output", "derivative", "unit")}
     times = {name: _number(getattr(peak, name)) for name in ("minimum_at", "maximum_at")}
     shown = dict(zip(("minimum", "maximum"), map(_number, peak.shown), strict=True))
-    return found | times | shown | {"largest": list(peak.largest)}
+    return facts | times | shown | {"largest": list(peak.largest)}
 
 
 def _messages(motion: Motion) -> list[str]:
@@ -201,13 +201,13 @@ def _messages(motion: Motion) -> list[str]:
 
 
 def _bodies(mechanism: Mechanism) -> list[dict[str, Any]]:
-    parameters, found = mechanism.parameter_values, []
+    parameters, rows = mechanism.parameter_values, []
     for k, (name, body) in enumerate(mechanism.bodies.items()):
         position = ", ".join(f"{value:.6g}" for value in np.asarray(resolve(body.position, parameters), float))
         mass = None if body.mass is None else _number(np.asarray(resolve(body.mass, parameters), float))
         colour = BODY_COLOURS[k % len(BODY_COLOURS)]
-        found.append({"name": name, "mass": mass, "position": position, "colour": colour})
-    return found
+        rows.append({"name": name, "mass": mass, "position": position, "colour": colour})
+    return rows
 
 
 def _scene(
@@ -226,12 +226,12 @@ def _scene(
     step = max(limits[1] - limits[0], limits[3] - limits[2]) / STEPS
     bar = rounded_down(0.25 * (limits[1] - limits[0]))
 
-    def places(points: np.ndarray) -> list[int | None]:
+    def pixels(points: np.ndarray) -> list[int | None]:
         return [round(v) if math.isfinite(v) else None for v in (points / step).reshape(-1).tolist()]
 
     def moved(points: np.ndarray) -> list[int | None]:
-        still = np.nanmax(np.abs(points - points[:1]), initial=0.0) < 0.5 * step
-        return places(points[:1] if still else points)
+        fixed = np.nanmax(np.abs(points - points[:1]), initial=0.0) < 0.5 * step
+        return pixels(points[:1] if fixed else points)
 
     return {
         "limits": limits,
@@ -249,7 +249,7 @@ def _scene(
             if label.owner != f"bodies.{GROUND}"
         ],
         "paths": [
-            {"output": outputs.index(name), "points": places(flat[shown])}
+            {"output": outputs.index(name), "points": pixels(flat[shown])}
             for name, flat in (paths.flat.items() if paths else ())
         ],
     }

@@ -22,12 +22,12 @@ WIDTH, BAR, RATE = 7.0, 0.24, 1.7  # inches
 MOST = 24  # bars: those of the highest price
 
 
-def draw_retiming(found: RetimedTrajectory, title: str = "") -> Figure:
+def draw_retiming(retimed: RetimedTrajectory, title: str = "") -> Figure:
     """Draw which limits bind a trajectory where, with their prices, above the rate along its path.
 
     Parameters
     ----------
-    found : RetimedTrajectory
+    retimed : RetimedTrajectory
         As `retime` returns it.
     title : str, optional
         The name of the robot unless given.
@@ -43,7 +43,7 @@ def draw_retiming(found: RetimedTrajectory, title: str = "") -> Figure:
     TrajectoryError
         If no limit binds.
     """
-    active = found.active
+    active = retimed.active
     binds, price = active["binds"].values, active["price"].values.sum(axis=0)
     bound = np.flatnonzero(binds.any(axis=0))
     if not bound.size:
@@ -51,32 +51,32 @@ def draw_retiming(found: RetimedTrajectory, title: str = "") -> Figure:
     chosen = sorted(bound[np.argsort(-price[bound])][:MOST].tolist())
     names = [str(x) for x in active["limit"].values]
     words = list(dict.fromkeys(_quantity(name) for name in names))
-    times = active["time"].values * found.stop / active["time"].values[-1]
+    times = active["time"].values * retimed.stop / active["time"].values[-1]
     edges = np.concatenate([times[:1], (times[1:] + times[:-1]) / 2, times[-1:]])
     with style():
-        figure = blank_figure(WIDTH, RATE + BAR * len(chosen) + 1.0, title or found.report.robot, h_pad=0.06)
+        figure = blank_figure(WIDTH, RATE + BAR * len(chosen) + 1.0, title or retimed.report.robot, h_pad=0.06)
         rate, bars = figure.subplots(2, 1, sharex=True, height_ratios=[RATE, BAR * len(chosen) + 0.3])
-        _draw_rate(found, rate)
+        _draw_rate(retimed, rate)
         for row, k in enumerate(chosen):
             colour = LINE_COLOURS[words.index(_quantity(names[k])) % len(LINE_COLOURS)]
             for first, last in _runs(binds[:, k]):
-                span = max(edges[last + 1] - edges[first], 0.002 * found.stop)
-                bars.broken_barh([(edges[first], span)], (row - 0.36, 0.72), facecolors=colour)
-            told = f"{10 * price[k]:.2g} ms" if price[k] > 0 else "0"
-            bars.text(1.01, row, told, transform=bars.get_yaxis_transform(), va="center", fontsize=7, color=GREY)
+                duration = max(edges[last + 1] - edges[first], 0.002 * retimed.stop)
+                bars.broken_barh([(edges[first], duration)], (row - 0.36, 0.72), facecolors=colour)
+            price_text = f"{10 * price[k]:.2g} ms" if price[k] > 0 else "0"
+            bars.text(1.01, row, price_text, transform=bars.get_yaxis_transform(), va="center", fontsize=7, color=GREY)
         bars.set_yticks(range(len(chosen)), [shown_name(names[k]) for k in chosen], fontsize=7)
         bars.set_ylim(len(chosen) - 0.4, -0.6)
         bars.set_xlabel("time  $t$  (s)")
         bars.set_title("limits that bind; right: saved if 1 % higher", loc="left", fontsize=7.5, color=GREY, pad=4)
         set_ticks(bars.xaxis, 6)
-        bars.set_xlim(0, found.stop)
+        bars.set_xlim(0, retimed.stop)
     return figure
 
 
-def _draw_rate(found: RetimedTrajectory, axes: Any) -> None:
-    times = np.linspace(0.0, found.stop, 1001)
-    s = np.asarray(found.progress(Jet.variable(jnp.asarray(times), 1)).derivatives())
-    length = found.path.stop - found.path.start
+def _draw_rate(retimed: RetimedTrajectory, axes: Any) -> None:
+    times = np.linspace(0.0, retimed.stop, 1001)
+    s = np.asarray(retimed.progress(Jet.variable(jnp.asarray(times), 1)).derivatives())
+    length = retimed.path.stop - retimed.path.start
     axes.plot(times, s[1] / length, color=LINE_COLOURS[0])
     axes.set_ylabel("rate along the path\n(1/s)")
     axes.set_ylim(0, None)

@@ -96,10 +96,10 @@ def drawing_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Insta
         Indices of the instants of a motion; all unless given.
     """
     mechanism = moving if isinstance(moving, Mechanism) else moving.mechanism
-    places = assembled(moving) if isinstance(moving, Mechanism) else frames(moving)
+    frames_of_bodies = assembled(moving) if isinstance(moving, Mechanism) else frames(moving)
     if instants is not None:
-        places = {body: frame[instants] for body, frame in places.items()}
-    drawing = Drawing(skeleton(mechanism), places, view)
+        frames_of_bodies = {body: frame[instants] for body, frame in frames_of_bodies.items()}
+    drawing = Drawing(skeleton(mechanism), frames_of_bodies, view)
     for link in drawing.skeleton.links.values():
         if link.body != GROUND:
             _draw_link(drawing, link)
@@ -110,14 +110,14 @@ def drawing_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Insta
 def _draw_link(drawing: Drawing, link: DrawnLink) -> None:
     """Draw the bars of a body, or its plate, and write its name."""
     colour, drawing.owner = drawing.colours[link.body], f"bodies.{link.body}"
-    places = drawing.flat(drawing.at(link.body, link.points))  # time, n, 2
+    points = drawing.flat(drawing.at(link.body, link.points))  # time, n, 2
     ring = _ring(link)
     if ring:
-        drawing.curve(places[:, ring], closed=True, stroke=colour, fill=tinted(colour), width=2.0, layer=PLATES)
+        drawing.curve(points[:, ring], closed=True, stroke=colour, fill=tinted(colour), width=2.0, layer=PLATES)
     for edge in link.edges[len(ring) :]:
-        drawing.curve(places[:, [*edge]], stroke=colour, width=2.0 if ring else 4.0, layer=BARS)
+        drawing.curve(points[:, [*edge]], stroke=colour, width=2.0 if ring else 4.0, layer=BARS)
     longest = max(link.edges, key=lambda edge: np.linalg.norm(np.diff(link.points[[*edge]], axis=0)), default=(0,))
-    drawing.name(link.body, places[:, ring or [*longest]].mean(axis=1), colour)
+    drawing.name(link.body, points[:, ring or [*longest]].mean(axis=1), colour)
 
 
 def _ring(link: DrawnLink) -> list[int]:

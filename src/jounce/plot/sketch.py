@@ -64,7 +64,7 @@ def check_names(names: str) -> None:
     check_choice("choice", names, NAMES, MechanismError, name="names")
 
 
-def paths_of(motion: Motion, wanted: Sequence[str] | None, order: int, view: View) -> Paths | None:
+def paths_of(motion: Motion, selection: Sequence[str] | None, order: int, view: View) -> Paths | None:
     """Return the paths of outputs of a motion: those wanted, or of all points; None where there are none.
 
     Raises
@@ -73,14 +73,14 @@ def paths_of(motion: Motion, wanted: Sequence[str] | None, order: int, view: Vie
         An output is no position of a point, or the order is above that of the motion.
     """
     points = [name for name, output in motion.mechanism.outputs.items() if isinstance(output, PointOutput)]
-    for name in wanted or ():
+    for name in selection or ():
         if name not in points:
             message = f"only the position of a point has a path; {did_you_mean(name, points)}"
             raise MechanismError(message, name="paths", value=name)
     if not 0 <= order <= motion.order:
         message = f"the motion has derivatives up to order {motion.order}; solve it with a higher order"
         raise MechanismError(message, name="order", value=order)
-    chosen = points if wanted is None else list(wanted)
+    chosen = points if selection is None else list(selection)
     return Paths(motion, chosen, order, view) if chosen and len(motion.time) > 1 else None
 
 
@@ -161,12 +161,12 @@ class SketchFigure:
             else:
                 artist.set_center(points[0])
 
-    def write_names(self, instant: int, names: str, *, still: bool = True) -> None:
+    def write_names(self, instant: int, names: str, *, fixed: bool = True) -> None:
         """Write names near what they belong to, so that none covers another; lines lead to them in a still."""
         kinds = {"all": ("bodies", "joints"), "none": ()}.get(names, (names,))
-        wanted = [label for label in self.scene.labels if label.owner.partition(".")[0] in kinds]
+        selected = [label for label in self.scene.labels if label.owner.partition(".")[0] in kinds]
         obstacles = [outline(shape, instant) for shape in self.scene.shapes if shape.layer > WHEELS]
-        for label, text in place_names(self.figure, self.axes, wanted, instant, obstacles, self.scene.unit, still):
+        for label, text in place_names(self.figure, self.axes, selected, instant, obstacles, self.scene.unit, fixed):
             self.texts.append((text, label, np.array(text.get_position()) - label.anchor[instant]))
 
     def move_names(self, instant: int) -> None:
@@ -227,15 +227,15 @@ def sketch(
     if isinstance(moving, Mechanism):
         if paths or order:
             raise MechanismError("a mechanism has no paths before it moves; solve it first", name="paths")
-        scene, found = scene_of(moving, view=view), None
+        scene, path_lines = scene_of(moving, view=view), None
     else:
-        found, solved = paths_of(moving, paths, order, view), solved_instants(moving)
-        wanted = np.array([moving.time[solved[0]] if instant is None else instant])
-        at = solved[nearest_instants(moving.time[solved], wanted)[0]]
+        path_lines, solved = paths_of(moving, paths, order, view), solved_instants(moving)
+        shown_instants = np.array([moving.time[solved[0]] if instant is None else instant])
+        at = solved[nearest_instants(moving.time[solved], shown_instants)[0]]
         chosen = np.union1d(evenly_chosen(solved, MOST), at)  # what slides goes as far as in the whole motion
         scene = scene_of(moving, view=view, instants=chosen).only(int(np.searchsorted(chosen, at)))
     with style():
-        figure = SketchFigure(scene, found, mechanism.title, None if mechanism.space == "planar" else view)
+        figure = SketchFigure(scene, path_lines, mechanism.title, None if mechanism.space == "planar" else view)
         figure.show(0)
         figure.write_names(0, names)
     return figure.figure
@@ -265,7 +265,7 @@ def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
 
 def draw_scale(axes: Any, view: View | None = None) -> None:
     """Draw a bar of a round length in the place of the one that is there, and the axes of a view in space."""
-    for artist in axes.findobj(lambda found: found.get_gid() == "scale"):
+    for artist in axes.findobj(lambda artist_found: artist_found.get_gid() == "scale"):
         artist.remove()
     (left, right), (lower, upper) = axes.get_xlim(), axes.get_ylim()
     length = rounded_down(0.22 * (right - left))

@@ -60,44 +60,44 @@ def stand(drawing: Drawing, symbol: Symbol) -> None:
     """Draw the stand of a joint whose one body is the ground, once where several joints share it."""
     if GROUND not in symbol.bodies[:2]:
         return
-    u, place = drawing.unit, drawing.place(symbol, symbol.bodies.index(GROUND))
-    if any(np.allclose(known, place, rtol=0, atol=0.1 * u, equal_nan=True) for known in drawing.supports):
+    u, point = drawing.unit, drawing.point(symbol, symbol.bodies.index(GROUND))
+    if any(np.allclose(known, point, rtol=0, atol=0.1 * u, equal_nan=True) for known in drawing.supports):
         return
-    drawing.supports.append(place)
-    left, right = (place + np.array([sign * 1.1, -2.0]) * u for sign in (-1, 1))
-    drawing.area(place, left, right, fill=PAPER, width=1.1, layer=GUIDES)
+    drawing.supports.append(point)
+    left, right = (point + np.array([sign * 1.1, -2.0]) * u for sign in (-1, 1))
+    drawing.area(point, left, right, fill=PAPER, width=1.1, layer=GUIDES)
     wide = np.array([0.7 * u, 0.0])
     _hatching(drawing, left - wide, right + wide, DOWN, 6)
 
 
-def pin(drawing: Drawing, place: Flat) -> None:
+def pin(drawing: Drawing, point: Flat) -> None:
     """Draw a pin."""
-    drawing.disc(place, 0.8 * drawing.unit, fill=PAPER, width=1.3, layer=SYMBOLS)
+    drawing.disc(point, 0.8 * drawing.unit, fill=PAPER, width=1.3, layer=SYMBOLS)
 
 
-def ball(drawing: Drawing, place: Flat) -> None:
+def ball(drawing: Drawing, point: Flat) -> None:
     """Draw the ball of a spherical joint."""
     u = drawing.unit
-    drawing.disc(place, 0.85 * u, fill="#BBBBBB", width=1.2, layer=SYMBOLS)
-    drawing.disc(place + np.array([-0.25, 0.25]) * u, 0.22 * u, stroke="", fill=PAPER, layer=SYMBOLS)
+    drawing.disc(point, 0.85 * u, fill="#BBBBBB", width=1.2, layer=SYMBOLS)
+    drawing.disc(point + np.array([-0.25, 0.25]) * u, 0.22 * u, stroke="", fill=PAPER, layer=SYMBOLS)
 
 
 def rail(
     drawing: Drawing,
     body: str,
-    places: Float[np.ndarray, "time components"],
+    points: Float[np.ndarray, "time components"],
     axis: Point,
     *,
     beyond: float = 2.6,
     start: Point | None = None,
 ) -> None:
-    """Draw the line of a body along which global places move, hatched where it is the ground.
+    """Draw the line of a body along which global points move, hatched where it is the ground.
 
-    The places stand on the line, at least about; `beyond` is how far it goes on, in units. A moving body has its line
+    The points stand on the line, at least about; `beyond` is how far it goes on, in units. A moving body has its line
     from where it is held, `start` in its frame.
     """
     u = drawing.unit
-    local = drawing.within(body, places)
+    local = drawing.within(body, points)
     along = axis / np.linalg.norm(axis)
     travel = local @ along
     foot = local - travel[:, None] * along
@@ -138,18 +138,18 @@ def spring(drawing: Drawing, first: Flat, second: Flat, *, turns: int = 6) -> No
 def actuator(drawing: Drawing, first: Flat, second: Flat) -> None:
     """Draw a cylinder that stands at the first place, and its rod, which reaches to the second."""
     u = drawing.unit
-    span = np.linalg.norm(second - first, axis=-1)
-    finite = span[np.isfinite(span)]
+    distance = np.linalg.norm(second - first, axis=-1)
+    finite = distance[np.isfinite(distance)]
     length = 0.62 * float(finite.min()) if finite.size else 0.0
     direction = unit_vector(second - first)
     side = normal_of(direction) * 0.55 * u
-    head = first + direction * np.minimum(length, span)[:, None]
+    head = first + direction * np.minimum(length, distance)[:, None]
     drawing.line(first, second, width=1.5, layer=SYMBOLS)
     drawing.area(first - side, first + side, head + side, head - side, fill="#DDDDDD", width=1.0, layer=SYMBOLS)
 
 
 def turn(drawing: Drawing, center: Flat, plane: Float[np.ndarray, "time 2 2"], *, spiral: bool = False) -> None:
-    """Draw an arrow that turns about a place, or a spiral spring.
+    """Draw an arrow that turns about a point, or a spiral spring.
 
     Parameters
     ----------
@@ -166,14 +166,14 @@ def turn(drawing: Drawing, center: Flat, plane: Float[np.ndarray, "time 2 2"], *
     angle = np.linspace(0.0, 5.0 * np.pi, 61) if spiral else np.radians(np.linspace(-50.0, 195.0, 25))
     radius = np.linspace(0.9, 2.3, len(angle)) if spiral else np.full(len(angle), 2.4)
 
-    def place(at: Any, distance: Any) -> np.ndarray:
+    def point_at(at: Any, distance: Any) -> np.ndarray:
         circle = np.stack([distance * np.cos(at), distance * np.sin(at)], axis=-1) * u
         return center[:, None] + np.einsum("nk,tkc->tnc", circle, plane)
 
-    drawing.curve(place(angle, radius), width=1.2, layer=MARKS)
+    drawing.curve(point_at(angle, radius), width=1.2, layer=MARKS)
     if not spiral:
         last = np.array([angle[-1], angle[-1], angle[-1] + 0.42])
-        head = place(last, np.array([1.95, 2.85, 2.4]))
+        head = point_at(last, np.array([1.95, 2.85, 2.4]))
         drawing.curve(head, closed=True, fill=INK, width=0.5, layer=MARKS)
 
 

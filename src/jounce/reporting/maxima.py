@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.limits.local_maxima import highest_of, local_heights
+from jounce.dynamics.limits.local_maxima import largest_indices, local_heights
 
 Times = Float[np.ndarray, " time"]
 Curves = Float[np.ndarray, "time curves"]
@@ -13,7 +13,7 @@ Peaks = Float[np.ndarray, "peaks curves"]
 ALIKE = 1e-6  # of the largest value of a curve
 
 
-class Highest:
+class RunningMaxima:
     """The highest values and a number of the highest local maxima of curves that come stretch by stretch.
 
     A curve is -inf where it is not known.
@@ -38,45 +38,45 @@ class Highest:
     def add(self, time: Times, values: Curves, scales: Float[np.ndarray, " curves"]) -> None:
         """Look at the next stretch."""
         top, every = np.argmax(values, axis=0), np.arange(values.shape[1])
-        found = values[top, every]
+        largest = values[top, every]
         if self._ends is None:
-            self.times, self.sizes, self.scales = time[top], found, scales
+            self.times, self.sizes, self.scales = time[top], largest, scales
         else:
-            self.times = np.where(found > self.sizes, time[top], self.times)
-            self.sizes, self.scales = np.maximum(self.sizes, found), np.maximum(self.scales, scales)
+            self.times = np.where(largest > self.sizes, time[top], self.times)
+            self.sizes, self.scales = np.maximum(self.sizes, largest), np.maximum(self.scales, scales)
             time, values = np.concatenate([self._ends[0], time]), np.concatenate([self._ends[1], values])
-        self._maxima = self._looked_at(time, values, ends=False)
+        self._maxima = self._local_maxima(time, values, ends=False)
         self._ends = time[-2:], values[-2:].copy()
 
     def around_maxima(self) -> tuple[Peaks, Peaks]:
         """Return the instants before and after the highest local maxima of each curve, once all has come."""
         assert self._ends is not None
-        height, low, high = self._looked_at(*self._ends, ends=True)
+        height, low, high = self._local_maxima(*self._ends, ends=True)
         usable = np.isfinite(height)
         return np.where(usable, low, low[0]), np.where(usable, high, high[0])
 
-    def _looked_at(self, time: Times, values: Curves, *, ends: bool) -> list[Peaks]:
+    def _local_maxima(self, time: Times, values: Curves, *, ends: bool) -> list[Peaks]:
         """Return the highest of the local maxima so far; the first and the last instant are some only at the ends."""
         inner = slice(1 if self._maxima else 0, None if ends else -1)
         height = local_heights(values)[inner]
         if not len(height):
             return self._maxima
-        places = np.arange(len(time))[inner]
-        top = highest_of(height, self._count)
-        index = places[top]
+        indices = np.arange(len(time))[inner]
+        top = largest_indices(height, self._count)
+        index = indices[top]
         heights = np.take_along_axis(height, top, axis=0)
         for k in range(1, self._count):  # one that stands twice, for want of others, counts once
             heights[k, (top[:k] == top[k]).any(axis=0)] = -np.inf
-        found = [
+        candidates = [
             heights,
             time[np.maximum(index - 1, 0)],
             time[np.minimum(index + 1, len(time) - 1)],
         ]
         if self._maxima:
-            both = [np.concatenate(pair) for pair in zip(self._maxima, found, strict=True)]
+            both = [np.concatenate(pair) for pair in zip(self._maxima, candidates, strict=True)]
             order = np.argsort(-both[0], axis=0, kind="stable")[: self._count]  # of equal ones the earlier
-            found = [np.take_along_axis(x, order, axis=0) for x in both]
-        return found
+            candidates = [np.take_along_axis(x, order, axis=0) for x in both]
+        return candidates
 
 
 def alike(first: Curves, second: Curves) -> bool:

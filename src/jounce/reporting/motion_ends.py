@@ -13,17 +13,17 @@ from jounce.planning.retiming.straight_lines import polynomials_at
 from jounce.trajectory import HermiteMotion, JointTrajectory, SplineMotion
 
 LOOKS = 8  # between two points
-TOLD = 1e-9  # rad or m: less is rounding
+NEGLIGIBLE = 1e-9  # rad or m: less is rounding
 SHOWN = 3  # joints of an end
 UNITS = {"velocities": "rad/s or m/s", "accelerations": "rad/s^2 or m/s^2"}
 
 
 def ends_words(ends: Iterable[TrajectoryEnd]) -> list[str]:
     """Word what a controller meets at both ends: one line for each, or one where both are at rest."""
-    found = list(ends)
-    if all(end.at_rest for end in found):
-        return ["starts and stops at rest"] if found else []
-    return [f"{end.end}s {_moving(end)} at t = {end.time:g} s" for end in found]
+    sentences = list(ends)
+    if all(end.at_rest for end in sentences):
+        return ["starts and stops at rest"] if sentences else []
+    return [f"{end.end}s {_moving(end)} at t = {end.time:g} s" for end in sentences]
 
 
 def _moving(end: TrajectoryEnd) -> str:
@@ -31,10 +31,10 @@ def _moving(end: TrajectoryEnd) -> str:
         return "at rest"
     word, values = ("velocities", end.velocities) if end.velocities else ("accelerations", end.accelerations)
     largest = sorted(values.items(), key=lambda entry: -abs(entry[1]))
-    told = ", ".join(f"{name} {value:.4g}" for name, value in largest[:SHOWN])
+    listed = ", ".join(f"{name} {value:.4g}" for name, value in largest[:SHOWN])
     more = f" and {len(largest) - SHOWN} more" if len(largest) > SHOWN else ""
     how = "in motion" if end.velocities else "at rest, but with acceleration"
-    return f"{how}: {told}{more}, {UNITS[word]},"
+    return f"{how}: {listed}{more}, {UNITS[word]},"
 
 
 def breaks_words(ends: Iterable[TrajectoryEnd]) -> list[str]:
@@ -46,9 +46,9 @@ def breaks_words(ends: Iterable[TrajectoryEnd]) -> list[str]:
         by: dict[str, list[str]] = {}
         for owner, quantity in end.breaks:
             by.setdefault(quantity, []).append(owner)
-        told = "; ".join(f"{quantity} of {', '.join(owners)}" for quantity, owners in by.items())
+        listed = "; ".join(f"{quantity} of {', '.join(owners)}" for quantity, owners in by.items())
         jump = "from rest" if end.end == "start" else "to rest"
-        lines.append(f"infinite by the jump {jump} at the {end.end}: {told}")
+        lines.append(f"infinite by the jump {jump} at the {end.end}: {listed}")
     return lines
 
 
@@ -73,13 +73,13 @@ def between_facts(trajectory: JointTrajectory) -> Mapping[str, Any] | None:
     ``words``, and how far from the straight lines between the points that leads at most: ``deviation``, rad or m, the
     ``joint`` and the instant ``at``, s.
     """
-    told = {words: None for law in trajectory.laws.values() if (words := _words(law)) is not None}
-    if not told:
+    by_words = {words: None for law in trajectory.laws.values() if (words := _words(law)) is not None}
+    if not by_words:
         return None
     away, joint, at = 0.0, None, None
     if all(samples_of(law) is not None for law in trajectory.laws.values()):
         away, joint, at = _farthest(trajectory)
-    return {"words": "; ".join(told), "deviation": away, "joint": joint, "at": at}
+    return {"words": "; ".join(by_words), "deviation": away, "joint": joint, "at": at}
 
 
 def _words(law: object) -> str | None:
@@ -97,21 +97,21 @@ def _farthest(trajectory: JointTrajectory) -> tuple[float, str | None, float | N
     assert lines is not None
     share = np.arange(1, LOOKS) / LOOKS
     at = (lines.at[:-1, None] + np.diff(lines.at)[:, None] * share).reshape(-1)
-    places = np.stack([polynomials_at(law, at) for law in trajectory.laws.values()], axis=1)  # type: ignore[arg-type]
-    away = lines.distances(at, places)
+    positions = np.stack([polynomials_at(law, at) for law in trajectory.laws.values()], axis=1)  # type: ignore[arg-type]
+    away = lines.distances(at, positions)
     k = int(np.argmax(away))
     if not away[k] > 0:
         return 0.0, None, None
     own = np.stack([np.interp(at[k], lines.at, column) for column in lines.points.T])
-    return float(away[k]), lines.names[int(np.argmax(np.abs(places[k] - own)))], float(at[k])
+    return float(away[k]), lines.names[int(np.argmax(np.abs(positions[k] - own)))], float(at[k])
 
 
 def between_words(trajectory: JointTrajectory) -> list[str]:
     """Word what was taken to happen between the points of a trajectory; nothing where its laws say it."""
-    told = between_facts(trajectory)
-    if told is None:
+    facts = between_facts(trajectory)
+    if facts is None:
         return []
-    if told["deviation"] <= TOLD:
-        return [told["words"]]
-    place = f"{told['joint']} at t = {told['at']:.5g} s"
-    return [f"{told['words']}, at most {told['deviation']:.2g} rad or m from straight lines, {place}"]
+    if facts["deviation"] <= NEGLIGIBLE:
+        return [facts["words"]]
+    location = f"{facts['joint']} at t = {facts['at']:.5g} s"
+    return [f"{facts['words']}, at most {facts['deviation']:.2g} rad or m from straight lines, {location}"]

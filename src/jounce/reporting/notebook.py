@@ -92,9 +92,9 @@ def _title(title: str, *lines: str) -> list[str]:
     return [f"<p><b>{_text(title)}</b></p>", *(f"<p>{_text(line)}</p>" for line in lines if line)]
 
 
-def _tables(found: Iterable[Table]) -> list[str]:
+def _tables(tables: Iterable[Table]) -> list[str]:
     """Return tables as HTML; names are escaped, long ones are cut at ROWS rows."""
-    return [_table(each) for each in found if each.rows]
+    return [_table(each) for each in tables if each.rows]
 
 
 def _table(table: Table) -> str:
@@ -145,21 +145,21 @@ def _motion(motion: Motion) -> list[str]:
     lines = _title(facts["title"] or "Motion", line)
     if facts["failures"]:
         first = facts["failures"][0]
-        place = f" ({first['fault']})" if first["fault"] else ""
+        fault = f" ({first['fault']})" if first["fault"] else ""
         word = first["status"].lower().replace("_", " ")
-        told = _text(f"t = {first['time']:g} s: {word}{place}")
-        lines.append(f'<p class="bad">{told}</p>')
+        text = _text(f"t = {first['time']:g} s: {word}{fault}")
+        lines.append(f'<p class="bad">{text}</p>')
     if "steps" in facts:
-        told = [facts["mobility"], count(facts["steps"], "step")]
+        text = [facts["mobility"], count(facts["steps"], "step")]
         if time["solved"]:
             energy = facts["energy"]
-            told.append(f"energy {energy['start']:.6g} J at the start, changes by {energy['largest_change']:.2g} J")
-            told.append(f"constraint drift {facts['drift']:.1e}")
-        lines += [f"<p>{_text(line)}</p>" for line in told]
+            text.append(f"energy {energy['start']:.6g} J at the start, changes by {energy['largest_change']:.2g} J")
+            text.append(f"constraint drift {facts['drift']:.1e}")
+        lines += [f"<p>{_text(line)}</p>" for line in text]
     if not motion.mechanism.outputs:
         return [*lines, "<p>No outputs are defined.</p>"]
-    found = shown_peaks(peaks(motion), motion.mechanism.shown_units)
-    return [*lines, *_tables([dataclasses.replace(peaks_table(found), title="Peaks")])]
+    motion_peaks = shown_peaks(peaks(motion), motion.mechanism.shown_units)
+    return [*lines, *_tables([dataclasses.replace(peaks_table(motion_peaks), title="Peaks")])]
 
 
 def _equilibrium(rest: Equilibrium) -> list[str]:
@@ -170,11 +170,11 @@ def _equilibrium(rest: Equilibrium) -> list[str]:
 def _linearisation(small: Linearisation) -> list[str]:
     where = "a motion" if small.equilibrium is None else f"an equilibrium that is {small.equilibrium.stability}"
     title = _title(small.mechanism.title or "Small motions", f"about {where} at t = {small.time:g} s")
-    found = []
+    tables = []
     for name, matrix in (("Mass", small.mass), ("Damping", small.damping), ("Stiffness", small.stiffness)):
         rows = [[c, *map(number, row)] for c, row in zip(small.coordinates, matrix.tolist(), strict=True)]
-        found.append(Table(f"{name} (SI)", ("", *small.coordinates), rows, range(1, len(rows) + 1)))
-    return [*title, *_tables([*found, modes_table(small.modes)])]
+        tables.append(Table(f"{name} (SI)", ("", *small.coordinates), rows, range(1, len(rows) + 1)))
+    return [*title, *_tables([*tables, modes_table(small.modes)])]
 
 
 def _robot(robot: Robot) -> list[str]:
@@ -191,8 +191,8 @@ def _trajectory(trajectory: JointTrajectory) -> list[str]:
     names = ("position", "velocity", "acceleration", "jerk")
     rows = []
     for k, name in enumerate(trajectory.names):
-        spans = [f"{number(values[:, d, k].min())} to {number(values[:, d, k].max())}" for d in range(4)]
-        rows.append([name, type(trajectory.laws[name]).__name__, *spans])
+        ranges = [f"{number(values[:, d, k].min())} to {number(values[:, d, k].max())}" for d in range(4)]
+        rows.append([name, type(trajectory.laws[name]).__name__, *ranges])
     joints = count(len(rows), "joint")
     line = f"{joints}, t = {trajectory.start:g} s to {trajectory.stop:g} s, {count(len(trajectory.times), 'instant')}"
     headings = ("joint", "law", *(f"{name}, SI" for name in names))

@@ -16,7 +16,7 @@ from jounce.kinematics import Motion, Stretches, solve
 from jounce.mechanism import AbstractQuantity
 from jounce.mechanism.law_breaks import breaks_of_laws
 from jounce.mechanism.user_code import holds_users_code
-from jounce.reporting.maxima import Curves, Highest, Peaks, Times, alike
+from jounce.reporting.maxima import Curves, Peaks, RunningMaxima, Times, alike
 from jounce.trajectory.breaks import both_sides
 from jounce.units.shown_units import ShownUnits, derivative_unit
 
@@ -114,14 +114,14 @@ def scalar_outputs(motion: Motion) -> dict[str, tuple[str, Float[np.ndarray, "ti
     dict
         For each name, as in the columns of a CSV file, the name of its output and its values, shape (time, order + 1).
     """
-    found = {}
+    outputs = {}
     for name, values in motion.outputs.items():
         if values.ndim == 2:
-            found[name] = name, values
+            outputs[name] = name, values
         else:
             labels = motion.mechanism.outputs[name].labels
-            found |= {f"{name}_{labels[c]}": (name, values[..., c]) for c in range(values.shape[2])}
-    return found
+            outputs |= {f"{name}_{labels[c]}": (name, values[..., c]) for c in range(values.shape[2])}
+    return outputs
 
 
 def peaks(motion: Motion | Stretches, *, refine: bool = True) -> list[Peak]:
@@ -150,52 +150,54 @@ def peaks(motion: Motion | Stretches, *, refine: bool = True) -> list[Peak]:
     """
     name = _name(refine)
     if name not in motion.derived:
-        for _ in looked_at(motion, refine=refine):
+        for _ in parts_with_peaks(motion, refine=refine):
             pass
     return motion.derived[name]
 
 
-def looked_at(motion: Motion | Stretches, *, refine: bool = True) -> Iterator[Motion]:
+def parts_with_peaks(motion: Motion | Stretches, *, refine: bool = True) -> Iterator[Motion]:
     """Yield the stretches of a motion, for what else is to be done with them, and keep their `peaks` in the end."""
     search = _PeakSearch()
     for part in motion if isinstance(motion, Stretches) else (motion,):
         search.add(part)
         yield part
-    motion.derived[_name(refine)] = search.found(motion, refine=refine)
+    motion.derived[_name(refine)] = search.peaks_of(motion, refine=refine)
 
 
 def _name(refine: bool) -> str:
     return "peaks" if refine else "peaks at the instants"
 
 
-def table_peaks(dataset: xarray.Dataset, beside: xarray.Dataset | None = None) -> list[Peak]:
+def table_peaks(dataset: xarray.Dataset, one_sided: xarray.Dataset | None = None) -> list[Peak]:
     """Return the peak values of torques and their rates, or of coordinates, at the instants of a dataset only.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Of variables of dimensions time and derivative, with the attribute ``units``: N, N*m, m or rad.
-    beside : xarray.Dataset, optional
+    one_sided : xarray.Dataset, optional
         The same on both sides of where laws jump or bend.
     """
-    found, coords = [], ("time", "derivative")
-    times = np.concatenate([x["time"].values for x in (dataset, beside) if x is not None])
+    peaks_found, coords = [], ("time", "derivative")
+    times = np.concatenate([x["time"].values for x in (dataset, one_sided) if x is not None])
     for name, variable in dataset.data_vars.items():
         unit = variable.attrs["units"]
-        both = (variable, *(() if beside is None else (beside[name],)))
+        both = (variable, *(() if one_sided is None else (one_sided[name],)))
         for order, given in enumerate(np.concatenate([x.transpose(*coords).values for x in both]).T):
             solved = np.flatnonzero(np.isfinite(given))
             values = given if solved.size else np.full_like(given, np.nan)
             low, high = (int(solved[pick(given[solved])]) if solved.size else 0 for pick in (np.argmin, np.argmax))
             extremes = [(float(values[k]), float(times[k])) for k in (low, high)]
             (least, least_at), (most, most_at) = extremes
-            told = derivative_name(order) if unit in ("m", "rad") else effort_name(unit, order)
+            quantity = derivative_name(order) if unit in ("m", "rad") else effort_name(unit, order)
             size = float(np.abs(values[solved]).max(initial=0.0))
-            found.append(Peak(str(name), told, derivative_unit(unit, order), least, least_at, most, most_at, size))
-    return found
+            peaks_found.append(
+                Peak(str(name), quantity, derivative_unit(unit, order), least, least_at, most, most_at, size)
+            )
+    return peaks_found
 
 
-def shown_peaks(found: Sequence[Peak], units: ShownUnits) -> list[Peak]:
+def shown_peaks(given: Sequence[Peak], units: ShownUnits) -> list[Peak]:
     """Return peaks in the units in which they are shown.
 
     Examples
@@ -206,7 +208,7 @@ def shown_peaks(found: Sequence[Peak], units: ShownUnits) -> list[Peak]:
     -500.0
     """
     shown = []
-    for peak in found:
+    for peak in given:
         stem = peak.output.rpartition("_")[0]
         name = stem if peak.output not in units.outputs and stem in units.outputs else peak.output
         unit, factor = units.of(peak.unit, name)
@@ -233,48 +235,48 @@ class _PeakSearch:
 
     def __init__(self) -> None:
         self._columns: dict[str, tuple[str, int]] = {}  # the output and the number of derivatives of each
-        self._highest = Highest(PEAKS)
+        self._maxima = RunningMaxima(PEAKS)
 
     def add(self, part: Motion) -> None:
         """Look at the instants of a motion, or at those of its next stretch."""
         self._columns = {column: (name, x.shape[1]) for column, (name, x) in scalar_outputs(part).items()}
         if self._columns:
-            self._highest.add(part.time, _curves(part), _scales(part))
+            self._maxima.add(part.time, _curves(part), _scales(part))
 
-    def found(self, motion: Motion | Stretches, *, refine: bool) -> list[Peak]:
+    def peaks_of(self, motion: Motion | Stretches, *, refine: bool) -> list[Peak]:
         """Return the peaks of a motion of which all instants were looked at, as `peaks` does."""
         rows = [(column, name, order) for column, (name, orders) in self._columns.items() for order in range(orders)]
         if not rows:
             return []
-        times, values = _extremes(motion, self._highest, refine)
+        times, values = _extremes(motion, self._maxima, refine)
         extremes = [(-values[k], times[k], values[len(rows) + k], times[len(rows) + k]) for k in range(len(rows))]
         sizes: dict[tuple[str, int], float] = {}
         for (_, name, order), (low, _, high, _) in zip(rows, extremes, strict=True):
             sizes[name, order] = float(np.nanmax([sizes.get((name, order), 0.0), abs(low), abs(high)]))
-        found = []
+        result = []
         for (column, name, order), numbers in zip(rows, extremes, strict=True):
             output = motion.mechanism.outputs[name]
-            unit, told = derivative_unit(output.unit, order), [float(x) for x in numbers]
-            found.append(Peak(column, rate_name(output, order), unit, *told, size=sizes[name, order]))
-        return found
+            unit, numbers_of_peak = derivative_unit(output.unit, order), [float(x) for x in numbers]
+            result.append(Peak(column, rate_name(output, order), unit, *numbers_of_peak, size=sizes[name, order]))
+        return result
 
 
 def _extremes(
-    motion: Motion | Stretches, highest: Highest, refine: bool
+    motion: Motion | Stretches, maxima: RunningMaxima, refine: bool
 ) -> tuple[Float[np.ndarray, " curves"], Float[np.ndarray, " curves"]]:
     """Return where each curve is largest and how large, (2 curves,): all curves upside down, then as they are.
 
     Around the highest instants, the best of a few becomes the middle of a shorter interval, again and again; the last
     look is at the vertex of the parabola through three of them.
     """
-    times, sizes = highest.times.copy(), highest.sizes.copy()
-    rounding = ROUNDING * highest.scales
+    times, sizes = maxima.times.copy(), maxima.sizes.copy()
+    rounding = ROUNDING * maxima.scales
     changed = _has_changed(motion)
-    breaks, sides, beside = _beside(motion)
+    breaks, sides, one_sided = _one_sided(motion)
     if len(sides) and not changed:
-        _keep_best(times, sizes, 0 * rounding, np.repeat(breaks[:, None], len(sizes), axis=1), beside)
+        _keep_best(times, sizes, 0 * rounding, np.repeat(breaks[:, None], len(sizes), axis=1), one_sided)
     if refine and len(motion.time) > 1 and not changed:
-        low, high = _around_maxima(motion, highest)
+        low, high = _around_maxima(motion, maxima)
         share = np.linspace(0.0, 1.0, POINTS)[:, None, None]
         near = []
         for _ in range(ROUNDS):
@@ -295,12 +297,12 @@ def _has_changed(motion: Motion | Stretches) -> bool:
     elements = (element for part in motion.mechanism.elements.values() for element in part.values())
     if type(motion) is not Motion or not len(motion.time) or not holds_users_code(elements):
         return False
-    places = np.unique(np.linspace(0, len(motion.time) - 1, COMPARED).astype(int))
-    now, then = _at(motion, motion.time[places]), _curves(motion)[places]
+    sample = np.unique(np.linspace(0, len(motion.time) - 1, COMPARED).astype(int))
+    now, then = _at(motion, motion.time[sample]), _curves(motion)[sample]
     return not alike(now, then)
 
 
-def _beside(motion: Motion | Stretches) -> tuple[Times, Times, Curves]:
+def _one_sided(motion: Motion | Stretches) -> tuple[Times, Times, Curves]:
     """Return where the laws of a motion jump or bend, at both sides of each, these sides, and the curves there."""
     if not len(motion.time):
         return np.zeros(0), np.zeros(0), np.zeros((0, 0))
@@ -315,13 +317,13 @@ def _beside(motion: Motion | Stretches) -> tuple[Times, Times, Curves]:
     return breaks[which], sides, _at(motion, sides) if len(sides) else np.zeros((0, 0))
 
 
-def _around_maxima(motion: Motion | Stretches, highest: Highest) -> tuple[Peaks, Peaks]:
+def _around_maxima(motion: Motion | Stretches, maxima: RunningMaxima) -> tuple[Peaks, Peaks]:
     """Return the instants before and after the highest local maxima, of a motion with few instants at more of them."""
     steps = -(-LEAST // (len(motion.time) - 1))
     if steps == 1 or isinstance(motion, Stretches):
-        return highest.around_maxima()
-    denser = Highest(PEAKS)
-    denser.add(*_denser(motion, steps), highest.scales)
+        return maxima.around_maxima()
+    denser = RunningMaxima(PEAKS)
+    denser.add(*_denser(motion, steps), maxima.scales)
     return denser.around_maxima()
 
 
@@ -336,9 +338,9 @@ def _denser(motion: Motion, steps: int) -> tuple[Float[np.ndarray, " denser"], F
 
 def _own(motion: Motion | Stretches, around: _Around) -> _Around:
     """Return the values of curves at instants of their own, (points, peaks, curves)."""
-    wanted, places = np.unique(around, return_inverse=True)
-    values = _at(motion, wanted)
-    return values[places.reshape(around.shape), np.arange(around.shape[-1])]
+    instants, inverse = np.unique(around, return_inverse=True)
+    values = _at(motion, instants)
+    return values[inverse.reshape(around.shape), np.arange(around.shape[-1])]
 
 
 def _at(motion: Motion | Stretches, instants: Times) -> Curves:
@@ -365,11 +367,11 @@ def _curves(motion: Motion) -> Curves:
 
 def _scales(motion: Motion) -> Float[np.ndarray, " curves"]:
     """Return the largest magnitude that any component of the output of a curve has in its derivative, (2 curves,)."""
-    found = []
+    scales = []
     for name, values in scalar_outputs(motion).values():
         whole = np.nan_to_num(motion.outputs[name]).reshape(*values.shape, -1)
-        found.append(np.abs(whole).max(axis=(0, 2)))
-    return np.tile(np.concatenate(found), 2)
+        scales.append(np.abs(whole).max(axis=(0, 2)))
+    return np.tile(np.concatenate(scales), 2)
 
 
 def _keep_best(

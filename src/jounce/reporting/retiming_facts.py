@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from jounce.dynamics.limits.limit_report import LimitReport
-from jounce.dynamics.limits.trajectories import told_drives
+from jounce.dynamics.limits.trajectories import drives_note
 from jounce.planning import RetimedTrajectory
 from jounce.planning.retiming.path import Path as JointPath
 from jounce.reporting.json.results import limits_result
@@ -16,22 +16,22 @@ from jounce.reporting.motion_ends import ends_words
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number
 
-TOLD = 1e-9  # rad or m: how far from a trajectory its path is told to pass; less comes of rounding
+NEGLIGIBLE = 1e-9  # rad or m: how far from a trajectory its path is told to pass; less comes of rounding
 
 
-def binding_facts(found: RetimedTrajectory) -> list[dict[str, Any]]:
+def binding_facts(retimed: RetimedTrajectory) -> list[dict[str, Any]]:
     """Return the limits that bind, the dearest first: for how long, s, and by how much the duration would fall, s.
 
     The price is for a limit raised by a share of 1; a hundredth of it is what a percent more brings.
     """
-    active = found.active
+    active = retimed.active
     at = active["time"].values
-    spans = np.gradient(at)
+    weights = np.gradient(at)
     rows = [
         {
             "limit": str(name),
             "unit": str(active["unit"].values[k]),
-            "seconds": float(spans @ active["binds"].values[:, k]),
+            "seconds": float(weights @ active["binds"].values[:, k]),
             "price": float(active["price"].values[:, k].sum()),
         }
         for k, name in enumerate(active["limit"].values)
@@ -39,42 +39,42 @@ def binding_facts(found: RetimedTrajectory) -> list[dict[str, Any]]:
     return sorted((row for row in rows if row["seconds"] > 0), key=lambda row: -row["price"])
 
 
-def binding_table(found: RetimedTrajectory) -> Table:
+def binding_table(retimed: RetimedTrajectory) -> Table:
     """Return the limits that bind as a table."""
     rows = [
         [
             row["limit"],
             row["unit"],
             number(row["seconds"]),
-            f"{100 * row['seconds'] / found.stop:.1f}",
+            f"{100 * row['seconds'] / retimed.stop:.1f}",
             f"{10 * row['price']:.4g}",
         ]
-        for row in binding_facts(found)
+        for row in binding_facts(retimed)
     ]
     headings = ("limit that binds", "unit", "for s", "% of time", "ms saved if 1 % higher")
     return Table("", headings, rows, (2, 3, 4))
 
 
 def retimed_words(
-    found: RetimedTrajectory, before: float | None, free: float, files: list[str], read: LimitReport | None
+    retimed: RetimedTrajectory, before: float | None, free: float, files: list[str], read: LimitReport | None
 ) -> str:
     """Word how long the motion takes, and that it keeps its limits."""
     was = "" if before is None else f", {before:.6g} s before"
-    what = "joint" if found.report.held or len(found.report.values[0, 0]) else "driver"
-    lines = [f"{found.report.robot}: {count(len(found.names), what)} ({', '.join(files)})", f"{free:.6g} s{was}"]
+    what = "joint" if retimed.report.held or len(retimed.report.values[0, 0]) else "driver"
+    lines = [f"{retimed.report.robot}: {count(len(retimed.names), what)} ({', '.join(files)})", f"{free:.6g} s{was}"]
     if read is not None:
         lines.append(
-            f"written: {found.stop:.6g} s in {len(found.times)} rows; splines through them keep the limits too "
-            f"({100 * (found.stop / free - 1):.2f} % slower)"
+            f"written: {retimed.stop:.6g} s in {len(retimed.times)} rows; splines through them keep the limits too "
+            f"({100 * (retimed.stop / free - 1):.2f} % slower)"
         )
-    if what == "joint" and any(row.unit.startswith("N") for row in found.report.limited):
-        lines.append(f"torques: {told_drives(found.report.drives)}")
-    lines += [*path_words(found.path), *ends_words(found.report.ends)]
-    worst = found.report.worst
+    if what == "joint" and any(row.unit.startswith("N") for row in retimed.report.limited):
+        lines.append(f"torques: {drives_note(retimed.report.drives)}")
+    lines += [*path_words(retimed.path), *ends_words(retimed.report.ends)]
+    worst = retimed.report.worst
     if worst is not None and worst.ratio is not None:
-        kept = f"all {len(found.report.limited)} limits kept, between rows too; nearest"
+        verdict = f"all {len(retimed.report.limited)} limits kept, between rows too; nearest"
         lines.append(
-            f"{kept if found.report.kept else 'NOT all limits kept; worst'}: {worst.joint} {worst.quantity}, "
+            f"{verdict if retimed.report.kept else 'NOT all limits kept; worst'}: {worst.joint} {worst.quantity}, "
             f"{worst.ratio:.6f} of its limit at t = {worst.time:.5g} s"
         )
     return "\n".join(lines)
@@ -88,29 +88,29 @@ def path_words(path: JointPath) -> list[str]:
         bound = "" if path.allowed is None else f" ({path.allowed:.3g} allowed)"
         away = f"at most {path.deviation:.2g} rad or m{bound}"
         return [f"path: {path.words}; {away} from the straight lines between them"]
-    if path.deviation > TOLD:
+    if path.deviation > NEGLIGIBLE:
         return [f"path: within {path.deviation:.1e} rad or m of the given trajectory"]
     return []
 
 
 def retiming_result(
-    found: RetimedTrajectory,
+    retimed: RetimedTrajectory,
     before: float | None,
     free: float,
     files: tuple[Path, Path | None],
     written: tuple[Path | None, Path | None],
 ) -> dict[str, Any]:
     """Return what `jounce retime` tells."""
-    told = limits_result(found.report, files[0], files[1] or files[0], written[0])
-    del told["held"], told["broken"], told["between"]
+    facts = limits_result(retimed.report, files[0], files[1] or files[0], written[0])
+    del facts["held"], facts["broken"], facts["between"]
     return {
-        **told,
+        **facts,
         "trajectory": files[1],
         "duration": free,
         "before": before,
-        "path": found.path.words or None,
-        "deviation": found.path.deviation,
-        "deviation_allowed": found.path.allowed,
-        "binding": binding_facts(found),
+        "path": retimed.path.words or None,
+        "deviation": retimed.path.deviation,
+        "deviation_allowed": retimed.path.allowed,
+        "binding": binding_facts(retimed),
         "figure": written[1],
     }

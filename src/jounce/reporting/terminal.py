@@ -40,12 +40,12 @@ SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # on a cleared line; a progress bar hides i
 PATIENCE = 1.0  # s, before a progress bar is shown
 
 
-def show_peaks(found: Sequence[Peak]) -> None:
+def show_peaks(given: Sequence[Peak]) -> None:
     """Print a table of peaks."""
-    if found:
+    if given:
         from jounce.reporting.text.tables import peaks_table
 
-        show_table(peaks_table(found))
+        show_table(peaks_table(given))
     else:
         say("\nNo outputs are defined, so there is nothing to tabulate.")
 
@@ -207,12 +207,12 @@ def say_json(command: str, data: Mapping[str, Any]) -> None:
 
 def complain(error: object, *, json: bool = False) -> None:
     """Print an error on standard error, in one line: of words, or of JSON."""
-    _tell("error", "bold red", error, json)
+    _write_message("error", "bold red", error, json)
 
 
 def caution(warning: object, *, json: bool = False) -> None:
     """Print a warning on standard error, in one line: of words, or of JSON."""
-    _tell("warning", "bold yellow", warning, json)
+    _write_message("warning", "bold yellow", warning, json)
 
 
 def recorded_cautions(caught: Sequence[warnings.WarningMessage], *, json: bool = False) -> None:
@@ -224,11 +224,11 @@ def recorded_cautions(caught: Sequence[warnings.WarningMessage], *, json: bool =
 @contextmanager
 def cautions(*, json: bool = False) -> Iterator[None]:
     """Print warnings as the command prints its errors, each once and without its place in the code."""
-    told: set[str] = set()
+    shown: set[str] = set()
 
     def show(message: Any, *_: Any, **__: Any) -> None:
-        if str(message) not in told:
-            told.add(str(message))
+        if str(message) not in shown:
+            shown.add(str(message))
             caution(message, json=json)
 
     with warnings.catch_warnings():
@@ -238,7 +238,7 @@ def cautions(*, json: bool = False) -> Iterator[None]:
         yield
 
 
-def _tell(kind: str, style: str, message: object, json: bool) -> None:
+def _write_message(kind: str, style: str, message: object, json: bool) -> None:
     if json:
         from jounce.reporting.json.results import complaint
 
@@ -258,7 +258,7 @@ def unexpected(error: Exception) -> str:
     """Word an error that no check foresaw, with the innermost line that is the user's or this package's own."""
     import traceback
 
-    said = shortened(str(error).strip().partition("\n")[0])
-    words = f"unexpected {type(error).__name__}: {said}".rstrip(": ")
+    message = shortened(str(error).strip().partition("\n")[0])
+    words = f"unexpected {type(error).__name__}: {message}".rstrip(": ")
     frames = [f for f in traceback.extract_tb(error.__traceback__) if "site-packages" not in f.filename]
     return f"{words} ({Path(frames[-1].filename).name}, line {frames[-1].lineno})" if frames else words

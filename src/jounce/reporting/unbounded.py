@@ -36,14 +36,14 @@ def unbounded_outputs(motion: Motion | Stretches) -> dict[str, list[float]]:
     instants = np.unique(np.append(sides[inside], (first, last)))  # the same motion, from its start through all points
     # the value alone: derivatives are all rounding so near, and grow where it does
     near = solve(dataclasses.replace(motion.mechanism, outputs=forces), instants, order=0, strict=False)
-    places = np.searchsorted(instants, np.where(inside, sides, first))
-    found: dict[str, list[float]] = {}
+    indices = np.searchsorted(instants, np.where(inside, sides, first))
+    unbounded: dict[str, list[float]] = {}
     for name, values in near.outputs.items():
-        sizes = np.abs(values[:, 0].reshape(len(instants), -1))[places]
+        sizes = np.abs(values[:, 0].reshape(len(instants), -1))[indices]
         grows = (inside.all(axis=-1) & _poles(sizes)).any(axis=-1)
         if grows.any():
-            found[name] = [points[k].instant for k in np.flatnonzero(grows)]
-    return found
+            unbounded[name] = [points[k].instant for k in np.flatnonzero(grows)]
+    return unbounded
 
 
 def _poles(sizes: Float[np.ndarray, "point side distance component"]) -> Bool[np.ndarray, "point side"]:

@@ -116,13 +116,15 @@ def from_denavit_hartenberg(
         parent, about_z, about_x = links[-1].name, turn_about(Z, row.theta), turn_about(X, row.alpha)
         moved = {"type": row.type, "limits": row.limits}
         if convention == "modified":
-            place = about_x @ (row.a * X + row.d * Z)
-            joints.append(Joint(f"joint_{k}", parent, f"link_{k}", position=place, rotation=about_x @ about_z, **moved))
+            transform = about_x @ (row.a * X + row.d * Z)
+            joints.append(
+                Joint(f"joint_{k}", parent, f"link_{k}", position=transform, rotation=about_x @ about_z, **moved)
+            )
         else:  # the axis of the joint does not pass through the frame of its link: a frame on the axis stands between
             joints.append(Joint(f"joint_{k}", parent, f"axis_{k}", **moved))
             links.append(Link(f"axis_{k}"))
-            place = about_z @ (row.a * X) + row.d * Z
-            joints.append(Joint(f"fixed_{k}", f"axis_{k}", f"link_{k}", "fixed", place, about_z @ about_x))
+            transform = about_z @ (row.a * X) + row.d * Z
+            joints.append(Joint(f"fixed_{k}", f"axis_{k}", f"link_{k}", "fixed", transform, about_z @ about_x))
         links.append(Link(f"link_{k}", row.inertia))
     return Robot(name, links, joints)
 

@@ -18,7 +18,7 @@ from jounce.io.files.reading import recording
 from jounce.sweeps.layout import axes_of, files_of
 from jounce.sweeps.manifest import check_same_arithmetic
 from jounce.sweeps.problems import Designs, Problem, Quantity
-from jounce.sweeps.statistics import Variable, kept_values, variables_of
+from jounce.sweeps.statistics import Variable, stored_values, variables_of
 from jounce.sweeps.store import Store
 
 _computing = threading.Lock()
@@ -131,13 +131,13 @@ class Plan:
         spare = self.chunk - count if self.chunks > 1 else 0  # one shape of all chunks compiles once
         filled = {name: np.concatenate([x, np.repeat(x[-1:], spare)]) for name, x in designs.items()}
         try:
-            found = self.problem.histories(filled, threads)
+            histories = self.problem.histories(filled, threads)
         except JounceError as error:
             error.message = _DESIGN.sub(lambda m: f"(design {int(m[1]) + start}:", error.message)
             raise
         settings = (self.quantities, self.problem.levels, self.problem.instants)
-        kept = kept_values(found, *settings, histories=self.histories)
-        return {name: x[:count] for name, x in kept.items()} | dict(zip(self.names, designs.values(), strict=True))
+        stored = stored_values(histories, *settings, histories=self.histories)
+        return {name: x[:count] for name, x in stored.items()} | dict(zip(self.names, designs.values(), strict=True))
 
 
 @lru_cache(maxsize=1)
@@ -169,9 +169,9 @@ def _unpickled(content: bytes) -> Any:
     try:
         return pickle.loads(content)
     except Exception as error:  # noqa: BLE001 - whatever it needs and does not find
-        said = " ".join(f"{type(error).__name__}: {error}".split())
+        text = " ".join(f"{type(error).__name__}: {error}".split())
         message = (
-            f"a worker cannot load what is to be computed ({said}); it needs the same release of jounce as the client, "
+            f"a worker cannot load what is to be computed ({text}); it needs the same release of jounce as the client, "
             "and the modules that your own classes are from"
         )
         raise JounceError(message) from None

@@ -93,12 +93,12 @@ def _check_releases(client: Any, timeout: float) -> None:
     """
     names = list(versions())
     try:
-        found = client.sync(client._get_versions, packages=names, callback_timeout=max(timeout, PATIENCE))
+        releases = client.sync(client._get_versions, packages=names, callback_timeout=max(timeout, PATIENCE))
     except (OSError, TimeoutError) as error:
         raise _lost(error) from None
-    own = {name: found["client"]["packages"].get(name) for name in names}  # told in the same way
-    for address, told in sorted(found["workers"].items()):
-        packages = told["packages"] if isinstance(told, dict) else {}
+    own = {name: releases["client"]["packages"].get(name) for name in names}  # told in the same way
+    for address, worker in sorted(releases["workers"].items()):
+        packages = worker["packages"] if isinstance(worker, dict) else {}
         for name, release in own.items():
             if packages.get(name) != release:
                 there = f"has {name} {packages[name]}" if packages.get(name) else f"has no {name}"
@@ -152,8 +152,8 @@ def _reason(future: Any) -> Exception:
 
 
 def _lost(reason: object) -> ClusterError:
-    said = str(reason).strip().partition("\n")[0].rstrip(": ") or type(reason).__name__
-    return ClusterError(f"the cluster was lost: its scheduler or all of its workers do not answer ({said})")
+    message = str(reason).strip().partition("\n")[0].rstrip(": ") or type(reason).__name__
+    return ClusterError(f"the cluster was lost: its scheduler or all of its workers do not answer ({message})")
 
 
 @contextmanager
@@ -169,8 +169,8 @@ def _client(scheduler: str | None, workers: int | None, timeout: float, scratch:
         try:
             client = closing.enter_context(Client(scheduler, timeout=timeout))
         except (OSError, ValueError, ImportError) as error:  # TimeoutError is an OSError
-            said = str(error).strip().partition("\n")[0]
-            message = f"no Dask scheduler answers within {timeout:g} s: {said or type(error).__name__}"
+            text = str(error).strip().partition("\n")[0]
+            message = f"no Dask scheduler answers within {timeout:g} s: {text or type(error).__name__}"
             raise ClusterError(message, name="scheduler", value=scheduler) from None
         try:
             client.wait_for_workers(1, timeout=timeout)

@@ -30,17 +30,17 @@ def sweep_facts(plan: Plan, checksum: str) -> dict[str, Any]:
             )
             for name, values in zip(_names(quantity), np.moveaxis(peaks, 0, -1), strict=True):
                 for order, row in enumerate(values):
-                    kept = extremes.setdefault(f"{name}/{order}", [None, None])
+                    extremes_of = extremes.setdefault(f"{name}/{order}", [None, None])
                     for side, sign in enumerate((1, -1)):
-                        kept[side] = _better(kept[side], sign * row, some.start)
+                        extremes_of[side] = _better(extremes_of[side], sign * row, some.start)
     rows = []
     for name, order, units in columns:
         low, high = extremes[f"{name}/{order}"]
-        found: dict[str, Any] = {"output": name, "derivative": order, "unit": derivative_unit(units, order)}
+        facts: dict[str, Any] = {"output": name, "derivative": order, "unit": derivative_unit(units, order)}
         for word, best, sign in (("least", low, 1), ("largest", high, -1)):
-            found[word] = None if best is None else sign * best[0]
-            found[f"{word}_at"] = None if best is None else _design(plan, best[1])
-        rows.append(found)
+            facts[word] = None if best is None else sign * best[0]
+            facts[f"{word}_at"] = None if best is None else _design(plan, best[1])
+        rows.append(facts)
     failed = {Status(code).name.lower(): count for code, count in sorted(outcomes.items()) if code != Status.OK}
     remark = last_step_words(plan.problem.instants)
     return ({"remark": remark} if remark else {}) | {
@@ -79,7 +79,7 @@ def sweep_table(facts: dict[str, Any]) -> Table:
 
 
 def _names(quantity: Any) -> list[str]:
-    labels = ["_".join(found) for found in itertools.product(*(labels for _, labels in quantity.axes))]
+    labels = ["_".join(parts) for parts in itertools.product(*(labels for _, labels in quantity.axes))]
     return [f"{quantity.name}_{label}" if label else quantity.name for label in labels]
 
 
@@ -90,10 +90,10 @@ def _columns(quantity: Any, levels: int) -> list[tuple[str, int, str]]:
 def _better(before: tuple[float, int] | None, values: np.ndarray, start: int) -> tuple[float, int] | None:
     """Return the least value so far and its design; of equal ones the first."""
     known = np.where(np.isnan(values), np.inf, values)
-    place = int(np.argmin(known))
-    if not np.isfinite(known[place]) or (before is not None and before[0] <= known[place]):
+    index = int(np.argmin(known))
+    if not np.isfinite(known[index]) or (before is not None and before[0] <= known[index]):
         return before
-    return float(known[place]), start + place
+    return float(known[index]), start + index
 
 
 def _design(plan: Plan, which: int) -> dict[str, float]:

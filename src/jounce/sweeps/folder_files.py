@@ -34,12 +34,12 @@ def attributes_in(path: Path) -> dict[str, Any]:
 def parsed(text: Any, path: Path) -> dict[str, Any]:
     """Return what a text in JSON says, by name."""
     try:
-        found = json.loads(text)
+        data = json.loads(text)
     except (TypeError, ValueError, RecursionError):
         raise OutputError("is no JSON", path=str(path)) from None
-    if not isinstance(found, dict):
+    if not isinstance(data, dict):
         raise OutputError("is no description of a group", path=str(path))
-    return found
+    return data
 
 
 def is_sweep(folder: Path) -> bool:

@@ -49,7 +49,7 @@ def manifest_of(
     options : dict
         What was chosen besides.
     """
-    told = {
+    attributes = {
         "format": FORMAT,
         "title": title,
         "files": _named(files),
@@ -64,8 +64,8 @@ def manifest_of(
         "arithmetic": arithmetic(),
         "checksum": None,
     }
-    told = json.loads(json.dumps(told))  # as it is read again
-    return told | {"identity": _identity(told)}
+    attributes = json.loads(json.dumps(attributes))  # as it is read again
+    return attributes | {"identity": _identity(attributes)}
 
 
 def _identity(manifest: Mapping[str, Any]) -> str:
@@ -140,9 +140,9 @@ def _named(files: Mapping[str, str]) -> dict[str, str]:
     return {Path(os.path.relpath(path, folder)).as_posix(): digest for path, digest in files.items()}
 
 
-def check_same(there: Mapping[str, Any], wanted: Mapping[str, Any], folder: str) -> None:
+def check_same(there: Mapping[str, Any], expected: Mapping[str, Any], folder: str) -> None:
     """Raise OutputError, with what differs, unless a sweep that was begun is the one that is wanted."""
-    differences = list(_differences(there, wanted))
+    differences = list(_differences(there, expected))
     if differences:
         message = (
             f"another sweep is there: {'; '.join(differences[:4])}; give another name, or the command that it was "
@@ -151,21 +151,23 @@ def check_same(there: Mapping[str, Any], wanted: Mapping[str, Any], folder: str)
         raise OutputError(message, path=folder)
 
 
-def _differences(there: Mapping[str, Any], wanted: Mapping[str, Any]) -> list[str]:
+def _differences(there: Mapping[str, Any], expected: Mapping[str, Any]) -> list[str]:
     """Word what differs."""
-    found = []
-    for name in there["files"] | wanted["files"]:
-        before, now = there["files"].get(name), wanted["files"].get(name)
+    differences = []
+    for name in there["files"] | expected["files"]:
+        before, now = there["files"].get(name), expected["files"].get(name)
         if before != now:
-            found.append(f"the file {name} {'was not read' if before is None else 'differs' if now else 'is not read'}")
-    others = [{name: x.get(name) for name in ("sample", "time")} for x in (there, wanted)]
-    for before, now in [*((there[group], wanted[group]) for group in COMPARED), others]:
-        found += _others(before, now)
-    if list(there["vary"]) != list(wanted["vary"]) and not found:
-        found.append(f"the order of what varies is {', '.join(there['vary'])} there")
-    if there["identity"] != wanted["identity"] and not found:
-        found.append("the model has other values")
-    return found
+            differences.append(
+                f"the file {name} {'was not read' if before is None else 'differs' if now else 'is not read'}"
+            )
+    others = [{name: x.get(name) for name in ("sample", "time")} for x in (there, expected)]
+    for before, now in [*((there[group], expected[group]) for group in COMPARED), others]:
+        differences += _others(before, now)
+    if list(there["vary"]) != list(expected["vary"]) and not differences:
+        differences.append(f"the order of what varies is {', '.join(there['vary'])} there")
+    if there["identity"] != expected["identity"] and not differences:
+        differences.append("the model has other values")
+    return differences
 
 
 def _others(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:

@@ -171,9 +171,9 @@ class Motions(_OfMechanism):
     def histories(self, designs: Designs, threads: int) -> Histories:
         """Solve some designs side by side."""
         settings = {"tolerance": self.tolerance, "threads": threads}
-        found, sides = solve_with_sides(self.mechanism, designs, self.instants, self.order, **settings)
-        values = {str(name): array.values for name, array in found.data_vars.items() if name != "status"}
-        return Histories(values, found["status"].values, sides=sides.like(values))
+        solved, sides = solve_with_sides(self.mechanism, designs, self.instants, self.order, **settings)
+        values = {str(name): array.values for name, array in solved.data_vars.items() if name != "status"}
+        return Histories(values, solved["status"].values, sides=sides.like(values))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -211,43 +211,43 @@ class Simulations(_OfMechanism):
         """Simulate some designs side by side; their threads are as many as the machine has cores."""
         del threads
         first, last = sorted((float(self.instants[0]), float(self.instants[-1])))
-        breaks, beside = sides_of_designs(self.mechanism, designs, first, last, self.order, forces=True)
+        breaks, side_times = sides_of_designs(self.mechanism, designs, first, last, self.order, forces=True)
         parts = [
-            self._simulated({name: values[lot] for name, values in designs.items()}, beside[lot])
-            for lot in _lots(beside, MORE_INSTANTS * len(self.instants))
+            self._simulated({name: values[lot] for name, values in designs.items()}, side_times[lot])
+            for lot in _lots(side_times, MORE_INSTANTS * len(self.instants))
         ]
         values, others, status = zip(*parts, strict=True)
         return Histories(_joined(values), np.concatenate(status), sides=Sides(breaks, _joined(others)))
 
     def _simulated(
-        self, designs: Designs, beside: Float[np.ndarray, "design side"]
+        self, designs: Designs, side_times: Float[np.ndarray, "design side"]
     ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], Int[np.ndarray, "design time"]]:
         """Return outputs at the instants and beside the breaks of laws, and the status at the instants."""
         settings = {"method": self.method, "tolerance": self.tolerance, "longest_step": self.longest_step}
-        every, forward = np.union1d(self.instants, beside), self.instants[0] <= self.instants[-1]
+        every, forward = np.union1d(self.instants, side_times), self.instants[0] <= self.instants[-1]
         grid = every if forward else every[::-1]
-        found = simulate_batch(self.mechanism, designs, grid, self.order, **settings)
-        here, there = (np.searchsorted(every, x) for x in (self.instants, beside))
+        simulated = simulate_batch(self.mechanism, designs, grid, self.order, **settings)
+        here, there = (np.searchsorted(every, x) for x in (self.instants, side_times))
         if not forward:
             here, there = len(every) - 1 - here, len(every) - 1 - there
         shapes = {quantity.name: quantity.shape for quantity in self.quantities()}
-        whole = {name: x.reshape(*x.shape[:3], *shapes[name]) for name, x in found.outputs.items()}
-        unknown = found.status != Status.OK
+        whole = {name: x.reshape(*x.shape[:3], *shapes[name]) for name, x in simulated.outputs.items()}
+        unknown = simulated.status != Status.OK
         for array in whole.values():
             array[unknown] = np.nan
-        others = {name: array[np.arange(len(beside))[:, None], there] for name, array in whole.items()}
-        return {name: array[:, here] for name, array in whole.items()}, others, found.status[:, here]
+        others = {name: array[np.arange(len(side_times))[:, None], there] for name, array in whole.items()}
+        return {name: array[:, here] for name, array in whole.items()}, others, simulated.status[:, here]
 
 
-def _lots(beside: Float[np.ndarray, "design side"], most: int) -> Iterator[slice]:
+def _lots(side_times: Float[np.ndarray, "design side"], most: int) -> Iterator[slice]:
     """Yield designs that are simulated together, since each is at the instants of all: these are not many."""
     start, known = 0, set()
-    for k, own in enumerate(beside.tolist()):
+    for k, own in enumerate(side_times.tolist()):
         known.update(own)
         if k > start and len(known) > most:
             yield slice(start, k)
             start, known = k, set(own)
-    yield slice(start, len(beside))
+    yield slice(start, len(side_times))
 
 
 def _joined(parts: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
@@ -260,11 +260,11 @@ def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order
         raise MechanismError("the mechanism has no outputs, so that there is nothing to keep", name="outputs")
     model = build(with_outputs_held(mechanism))
     pose = pose_at(model.guess, model.pose_type)
-    still = np.zeros_like(pose.position.coefficients[0])
-    pose = pose.extended(still, None if mechanism.space == "planar" else still)  # for outputs that are rates
+    zeros = np.zeros_like(pose.position.coefficients[0])
+    pose = pose.extended(zeros, None if mechanism.space == "planar" else zeros)  # for outputs that are rates
     of_motion = any(isinstance(output, AbstractMotionOutput) for output in mechanism.outputs.values())
     motion: Motion | None = solve(mechanism, instants, order, strict=False) if of_motion else None
-    found = []
+    outputs = []
     for name, output in mechanism.outputs.items():
         if isinstance(output, AbstractMotionOutput):
             assert motion is not None
@@ -277,8 +277,8 @@ def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order
             group = output_group(output, mechanism, name=name)
             count = jax.eval_shape(lambda g=group: g.evaluate(pose).coefficients[0]).shape[0]
         axes = output.axes or (("component", tuple(output.labels[:count])),)
-        found.append(Quantity(name, output.unit, axes if count > 1 else ()))
-    return tuple(found)
+        outputs.append(Quantity(name, output.unit, axes if count > 1 else ()))
+    return tuple(outputs)
 
 
 DRIVES = ("armature", "damping", "friction")
@@ -354,15 +354,15 @@ class Torques(Problem):
         which = np.searchsorted(speed, designs["speed"]) if "speed" in designs else np.zeros(count, int)
         bare = _with(dict.fromkeys(linear, 0.0), self.robot)
         base = self._torques(bare, speed)
-        found = base[which]
+        torques = base[which]
         for name in linear:
             share = self._torques(_with({name: 1.0}, bare), speed) - base
-            found = found + designs[name][:, None, None, None] * share[which]
+            torques = torques + designs[name][:, None, None, None] * share[which]
         here, breaks = len(self.instants), self._looks[1]
-        values = {name: found[:, :here, :, k] for k, name in enumerate(self.robot.joint_names)}
-        beside = {name: found[:, here:, :, k] for k, name in enumerate(self.robot.joint_names)}
+        values = {name: torques[:, :here, :, k] for k, name in enumerate(self.robot.joint_names)}
+        one_sided = {name: torques[:, here:, :, k] for k, name in enumerate(self.robot.joint_names)}
         status = np.full((count, here), int(Status.OK))
-        sides = Sides(np.broadcast_to(breaks, (count, len(breaks))), beside)
+        sides = Sides(np.broadcast_to(breaks, (count, len(breaks))), one_sided)
         return Histories(values, status, designs.get("speed"), sides)
 
     @functools.cached_property

@@ -51,59 +51,68 @@ def variables_of(
         Two of them would have the same name.
     """
     flags = {"flag_values": [int(s) for s in Status], "flag_meanings": " ".join(s.name.lower() for s in Status)}
-    kept = [
+    variables = [
         Variable("failed_instants", (), (), "i4", {"long_name": "instants not solved, -1 where not computed"}),
         Variable("first_status", (), (), "i1", {"long_name": "outcome at the first instant not solved", **flags}),
     ]
     if histories:
-        kept.append(Variable("status", ("time",), (instants,), "i1", {"long_name": "outcome", **flags}))
+        variables.append(Variable("status", ("time",), (instants,), "i1", {"long_name": "outcome", **flags}))
     for quantity in quantities:
         dims = ("derivative", *(axis for axis, _ in quantity.axes))
         shape = (levels, *quantity.shape)
         for kind, words in STATISTICS.items():
             units = "s" if kind == "peak_time" else quantity.units
             attributes = {"units": units, "long_name": words.format(quantity.name)}
-            kept.append(Variable(f"{quantity.name}_{kind}", dims, shape, "f8", attributes))
+            variables.append(Variable(f"{quantity.name}_{kind}", dims, shape, "f8", attributes))
         if histories:
             attributes = {"units": quantity.units, "long_name": quantity.name}
-            kept.append(Variable(quantity.name, ("time", *dims), (instants, *shape), "f8", attributes))
+            variables.append(Variable(quantity.name, ("time", *dims), (instants, *shape), "f8", attributes))
     taken = {"time", "derivative", "design", *(axis for quantity in quantities for axis, _ in quantity.axes)}
-    for variable in kept:
+    for variable in variables:
         if variable.name in taken:
             message = f"two arrays of the result would be called {variable.name}; give the output another name"
             raise MechanismError(message, name=f"outputs.{variable.name}")
         taken.add(variable.name)
     named = {name: name if name not in taken else f"parameter_{name}" for name in parameters}
-    return [*(Variable(named[name], (), (), "f8", {"long_name": name}) for name in parameters), *kept]
+    return [*(Variable(named[name], (), (), "f8", {"long_name": name}) for name in parameters), *variables]
 
 
-def kept_values(
-    found: Histories, quantities: Sequence[Quantity], levels: int, instants: np.ndarray, *, histories: bool
+def stored_values(
+    histories_given: Histories, quantities: Sequence[Quantity], levels: int, instants: np.ndarray, *, histories: bool
 ) -> dict[str, np.ndarray]:
     """Return the arrays of some designs, by name; a design that was not solved at all instants has no statistics."""
-    count = len(found.status)
-    bad = found.status != Status.OK
-    first = np.take_along_axis(found.status, np.argmax(bad, axis=1)[:, None], axis=1)[:, 0]
-    kept: dict[str, np.ndarray] = {"failed_instants": bad.sum(axis=1).astype("i4"), "first_status": first.astype("i1")}
+    count = len(histories_given.status)
+    bad = histories_given.status != Status.OK
+    first = np.take_along_axis(histories_given.status, np.argmax(bad, axis=1)[:, None], axis=1)[:, 0]
+    stored: dict[str, np.ndarray] = {
+        "failed_instants": bad.sum(axis=1).astype("i4"),
+        "first_status": first.astype("i1"),
+    }
     if histories:
-        kept["status"] = found.status.astype("i1")
+        stored["status"] = histories_given.status.astype("i1")
     for quantity in quantities:
-        values = found.values.get(quantity.name)
+        values = histories_given.values.get(quantity.name)
         if values is None:  # no design of them was solved
             values = np.full((count, len(instants), levels, *quantity.shape), np.nan)
-        beside = None if found.sides is None or quantity.name not in found.sides.values else found.sides
-        told = statistics(values, instants, found.pace, beside and (beside.values[quantity.name], beside.instants))
-        kept |= {f"{quantity.name}_{kind}": x for kind, x in told.items()}
+        sides = (
+            None
+            if histories_given.sides is None or quantity.name not in histories_given.sides.values
+            else histories_given.sides
+        )
+        values_of = statistics(
+            values, instants, histories_given.pace, sides and (sides.values[quantity.name], sides.instants)
+        )
+        stored |= {f"{quantity.name}_{kind}": x for kind, x in values_of.items()}
         if histories:
-            kept[quantity.name] = values
-    return kept
+            stored[quantity.name] = values
+    return stored
 
 
 def statistics(
     values: Float[np.ndarray, "design time *rest"],
     instants: np.ndarray,
     pace: np.ndarray | None = None,
-    beside: tuple[np.ndarray, np.ndarray] | None = None,
+    sides: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> dict[str, Float[np.ndarray, "design *rest"]]:
     """Return statistics of histories over time; NaN where a value is not known.
 
@@ -114,7 +123,7 @@ def statistics(
         s; the mean of squares is over time, by trapezia.
     pace : array of shape (designs,), optional
         How many times faster each design moves than the instants say.
-    beside : tuple of arrays of shape (designs, sides, ...) and (designs, sides), optional
+    sides : tuple of arrays of shape (designs, sides, ...) and (designs, sides), optional
         More values that count for extremes, those on both sides of where laws jump or bend, and their instants, s.
 
     Examples
@@ -128,8 +137,8 @@ def statistics(
     at = np.argmax(size, axis=1)
     peak = np.take_along_axis(size, at[:, None], axis=1)[:, 0]
     unknown, when = np.isnan(peak), instants[at]
-    if beside is not None and beside[0].shape[1]:
-        more, their = beside
+    if sides is not None and sides[0].shape[1]:
+        more, their = sides
         low = np.where(unknown, low, np.fmin(low, np.fmin.reduce(more, axis=1)))
         high = np.where(unknown, high, np.fmax(high, np.fmax.reduce(more, axis=1)))
         sizes = np.nan_to_num(np.abs(more), nan=-np.inf)

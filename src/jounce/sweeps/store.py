@@ -81,8 +81,8 @@ class Store:
         """Arrays over the designs, whose descriptions were compared before."""
         import zarr
 
-        found: dict[str, Any] = dict(zarr.open_group(self.folder, mode="r+", use_consolidated=True).arrays())
-        return {name: x for name, x in found.items() if (x.metadata.dimension_names or ("",))[0] == "design"}
+        arrays: dict[str, Any] = dict(zarr.open_group(self.folder, mode="r+", use_consolidated=True).arrays())
+        return {name: x for name, x in arrays.items() if (x.metadata.dimension_names or ("",))[0] == "design"}
 
     def write(self, chunk: int, start: int, arrays: Mapping[str, np.ndarray]) -> None:
         """Write the arrays of a chunk, whose first design is `start`; it is done once all is on the disk.
@@ -126,18 +126,18 @@ class Store:
         OutputError
             Something else has the place of a file or a folder, and would have to be removed.
         """
-        found = []
+        mended = []
         with worded(self.folder):
             for folder in sorted({*self._folders(files)}):
                 if folder.is_symlink() or (os.path.lexists(folder) and not folder.is_dir()):
                     raise OutputError(f"has the place of a folder of the sweep; {REMOVE}", path=str(folder))
             for name, content in files.items():
                 path = self.folder / name
-                if (wanted := self._wanted(path, content)) is not None:
+                if (expected := self._expected_content(path, content)) is not None:
                     path.parent.mkdir(parents=True, exist_ok=True)
-                    put(path, wanted)
-                    found.append(Path(name).parts[0])
-        return list(dict.fromkeys(found))
+                    put(path, expected)
+                    mended.append(Path(name).parts[0])
+        return list(dict.fromkeys(mended))
 
     def _folders(self, files: Mapping[str, bytes]) -> Iterator[Path]:
         """Yield the folders that hold the files of a sweep, now or when it is done."""
@@ -147,7 +147,7 @@ class Store:
             if parents and Path(name).name == ROOT:
                 yield self.folder / parents[0] / "c"
 
-    def _wanted(self, path: Path, content: bytes) -> bytes | None:
+    def _expected_content(self, path: Path, content: bytes) -> bytes | None:
         """Return what a file must hold, None where it does; what others wrote about the whole sweep stays."""
         try:
             there = read_file(path, LARGEST_ROOT, error=OutputError, is_input=False)
@@ -157,15 +157,15 @@ class Store:
             return None
         if path.name != ROOT:
             return content
-        wanted = json.loads(content)
+        expected = json.loads(content)
         try:
-            found = parsed(there, path)
+            present = parsed(there, path)
         except OutputError:
             return content
-        if path.parent == self.folder and isinstance(attributes := found.get("attributes"), dict):
+        if path.parent == self.folder and isinstance(attributes := present.get("attributes"), dict):
             own = {name: attributes.get(name) for name in ("manifest", "checksum")}
-            wanted["attributes"] = attributes | wanted["attributes"] | own
-        return None if found == wanted else json.dumps(wanted, indent=1).encode()
+            expected["attributes"] = attributes | expected["attributes"] | own
+        return None if present == expected else json.dumps(expected, indent=1).encode()
 
     def forget(self, chunk: int) -> None:
         """Have a chunk computed again.
@@ -180,9 +180,9 @@ class Store:
 
     def done(self, count: int) -> np.ndarray:
         """Tell which of the chunks were put on the disk."""
-        found = np.zeros(count, bool)
-        found[[chunk for chunk in map(int, self._marked()) if chunk < count]] = True
-        return found
+        done = np.zeros(count, bool)
+        done[[chunk for chunk in map(int, self._marked()) if chunk < count]] = True
+        return done
 
     def is_empty(self) -> bool:
         """Tell whether there is nothing but what was there before any chunk."""
@@ -213,9 +213,9 @@ class Store:
         path = self.folder / ROOT
         content = parsed(read_file(path, LARGEST_ROOT, error=OutputError, is_input=False), path)
         manifest = {**self.manifest, "checksum": checksum}
-        told = {"manifest": json.dumps(manifest, indent=1), "checksum": checksum}
-        if content["attributes"] != content["attributes"] | told:
-            content["attributes"] |= told
+        attributes = {"manifest": json.dumps(manifest, indent=1), "checksum": checksum}
+        if content["attributes"] != content["attributes"] | attributes:
+            content["attributes"] |= attributes
             with worded(self.folder):
                 put(path, json.dumps(content, indent=1).encode())
         self.__dict__["manifest"] = manifest
@@ -330,11 +330,11 @@ def find(folder: Path) -> Store | None:
     except (OSError, ValueError) as error:
         raise OutputError(f"cannot be read: {reason_of(error)}", path=str(folder)) from None
     try:
-        found = "manifest" in attributes_in(folder / ROOT)
+        present = "manifest" in attributes_in(folder / ROOT)
         reason = f"{ROOT} has no manifest"
     except OutputError as error:
-        found, reason = False, f"{ROOT}: {error.message}"
-    if not found:
+        present, reason = False, f"{ROOT}: {error.message}"
+    if not present:
         message = (
             f"something is there that is no sweep of jounce, or one that was damaged ({reason}); give another name"
         )

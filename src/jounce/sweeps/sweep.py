@@ -196,21 +196,21 @@ def run(
     with store.locked():
         store.clear()
         done = _whole(plan)
-        told = _Told(plan, sum(map(plan.size, np.flatnonzero(done).tolist())), progress)
+        tracker = _Progress(plan, sum(map(plan.size, np.flatnonzero(done).tolist())), progress)
         left = (chunk for chunk in range(plan.chunks) if not done[chunk])
         if not done.all():
-            with told.kept():
+            with tracker.resumable():
                 if workers == 0 and scheduler is None:
                     for chunk in left:
                         plan.compute(chunk)
-                        told(chunk)
+                        tracker(chunk)
                 else:
                     check_installed("zarr", "distributed")
                     processes = None if workers is None else whole_number("workers", workers, 1, error=JounceError)
                     where = {"scheduler": scheduler, "workers": processes, "timeout": timeout}
                     with store.scratch() as scratch:
                         where["scratch"] = scratch
-                        compute_on_cluster(plan, left, told, **where, user_files=user_files, prepare=prepare_worker)
+                        compute_on_cluster(plan, left, tracker, **where, user_files=user_files, prepare=prepare_worker)
         return store.finish(plan.chunks)
 
 
@@ -250,7 +250,7 @@ def _differs(there: Store, manifest: Mapping[str, Any], folder: Path) -> bool:
     return False
 
 
-class _Told:
+class _Progress:
     """How far a sweep is."""
 
     def __init__(self, plan: Plan, done: int, progress: Callable[[int, int], None] | None):
@@ -264,7 +264,7 @@ class _Told:
             self.progress(self.done, self.plan.space.count)
 
     @contextmanager
-    def kept(self) -> Any:
+    def resumable(self) -> Any:
         """Say in errors that nothing is lost."""
         try:
             yield

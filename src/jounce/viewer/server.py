@@ -167,18 +167,18 @@ def view(
     """
     check_installed()
     chosen = ModesChoice(modes, tuple(without), hold)
-    found = View(subject_of(subject, trajectory, allow, chosen), port=port, order=order, playing=playing)
+    view_shown = View(subject_of(subject, trajectory, allow, chosen), port=port, order=order, playing=playing)
     if open_page:
         import webbrowser
 
-        webbrowser.open(found.url)
-    return found
+        webbrowser.open(view_shown.url)
+    return view_shown
 
 
 class ModesChoice(NamedTuple):
     """Whether modes are shown instead of a motion, and what is left out or held then."""
 
-    wanted: bool = False
+    requested: bool = False
     without: tuple[str, ...] = ()
     hold: str | Sequence[str] = ()
 
@@ -206,11 +206,11 @@ def subject_of(
     if isinstance(given, PlateCam):
         from jounce.viewer.subjects.cams import CamSubject
 
-        if trajectory is not None or modes.wanted:
+        if trajectory is not None or modes.requested:
             raise JounceError("a cam turns, and has neither modes nor a trajectory", path=path, name="cam")
         return CamSubject(given)
     if isinstance(given, Robot):
-        if modes.wanted:
+        if modes.requested:
             if trajectory is not None:
                 message = "modes are about an equilibrium, not along a trajectory"
                 raise JounceError(message, path=path, name="trajectory")
@@ -222,7 +222,7 @@ def subject_of(
     if trajectory is not None:
         message = "a mechanism moves by its own drivers; a trajectory is for robots"
         raise JounceError(message, path=path, name="trajectory")
-    if modes.wanted:
+    if modes.requested:
         return modes_subject(given, modes, path)
     try:
         return MechanismSubject(given)

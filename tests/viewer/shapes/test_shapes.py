@@ -89,7 +89,9 @@ def test_joints_swing_within_their_limits():
     q = np.stack([recording.outputs[name].values[7, :, 0] for name in robot.joint_names], axis=-1)
     expected = jn.forward_kinematics(robot, q, point.name)
     np.testing.assert_allclose(recording.motion(point)[7], expected.position, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(recording.placed(point.body, point.point)[7], expected.position[0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        recording.global_point(point.body, point.point)[7], expected.position[0], rtol=0, atol=1e-12
+    )
     drives = {e.name: e for e in recording.loads if e.kind == "driver"}
     torque = np.linalg.norm(drives["panda_joint2"].torque, axis=1)
     np.testing.assert_allclose(torque, np.abs(jn.inverse_dynamics(robot, _coordinates(recording, robot))[:, 0, 1]))
@@ -119,7 +121,7 @@ def test_a_robot_with_closed_loops_moves_as_one():
     recording = subject.solve({p.name: p.value for p in subject.parameters}, 2)
     assert not recording.notice
     (closure,) = robot.closures.values()
-    ends = [recording.placed(link, point) for link, point in zip(closure.links, closure.points, strict=True)]
+    ends = [recording.global_point(link, point) for link, point in zip(closure.links, closure.points, strict=True)]
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-9)
     assert np.ptp(ends[0], axis=0).max() > 0.01
     assert {load.kind for load in recording.loads} >= {"reaction", "driver"}

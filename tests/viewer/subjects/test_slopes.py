@@ -7,7 +7,7 @@ from jounce.errors import JounceError
 from jounce.reporting.peaks import peaks
 from jounce.viewer import View
 from jounce.viewer.subjects.mechanisms import MechanismSubject
-from jounce.viewer.subjects.slopes import can_be_differentiated, peak_slopes, told
+from jounce.viewer.subjects.slopes import can_be_differentiated, peak_slopes, slopes_html
 from tests.problems.mechanisms import example
 
 FOUR_BAR = jn.load(example("four_bar"))
@@ -49,4 +49,4 @@ def test_what_has_no_slopes():
     assert can_be_differentiated(MechanismSubject(FOUR_BAR))
     assert not can_be_differentiated(MechanismSubject(jn.load(example("double_pendulum"))))
     pressed = MechanismSubject(jn.load(example("servo_press"))).solve({}, 1)
-    assert told(pressed, next(iter(pressed.solution.outputs)), 1).startswith("No slopes: ")
+    assert slopes_html(pressed, next(iter(pressed.solution.outputs)), 1).startswith("No slopes: ")

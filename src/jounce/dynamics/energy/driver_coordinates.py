@@ -91,15 +91,15 @@ def in_driver_coordinates(
     if q is not None:
         raise MechanismError("a motion has its coordinates already, the laws of its drivers", name="q", value=q)
     model, names = motion.model, drivers_of(motion)
-    found = element_indices(model)
-    order = tuple((found[name].group, found[name].instance) for name in names)
+    indices = element_indices(model)
+    order = tuple((indices[name].group, indices[name].instance) for name in names)
     pose_type, coordinates = motion.poses
     masses = required_masses(motion.mechanism)
     start = cut(coordinates, 0)
 
     def chunk(lanes: np.ndarray) -> Any:
-        still = {name: values[..., lanes] for name, values in start.items()}
-        return _evaluated(model.system, still, motion.time[lanes], masses, pose_type, order, least, form, static)
+        at_lanes = {name: values[..., lanes] for name, values in start.items()}
+        return _evaluated(model.system, at_lanes, motion.time[lanes], masses, pose_type, order, least, form, static)
 
     values = in_chunks(chunk, len(motion.time))
     values = np.where(spoiled(motion.passages, motion.time, least), np.nan, values)
@@ -164,7 +164,7 @@ def balanced(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray"
 @compiled("pose_type", "order", "least", "form", "static")
 def _evaluated(
     system: System,
-    still: Coordinates,
+    coordinates: Coordinates,
     instants: Lanes,
     masses: Masses,
     pose_type: type[Pose],
@@ -173,12 +173,12 @@ def _evaluated(
     form: Callable[..., Any],
     static: tuple[Any, ...],
 ) -> Any:
-    place = pose_of(still, pose_type)
-    factor = factored(dataclasses.replace(system, fronts=None), place, Jet([instants[None]]))
+    start_pose = pose_of(coordinates, pose_type)
+    factor = factored(dataclasses.replace(system, fronts=None), start_pose, Jet([instants[None]]))
 
     def energies(changes: Any, p: int) -> Jet:
         time = Jet.variable(instants[None], changes.shape[0] - 1)
-        pose = followed(with_changes(system, order, changes), place, factor, time)
+        pose = followed(with_changes(system, order, changes), start_pose, factor, time)
         parts = body_energy(pose, *masses, p)
         return total(part.map(lambda c: jnp.sum(c, axis=0)) for part in parts)
 
@@ -197,7 +197,7 @@ def with_changes(
     return eqx.tree_at(lambda s: s.groups, system, tuple(groups))
 
 
-def followed(system: System, place: Pose, factor: Factor, time: Jet) -> Pose:
+def followed(system: System, start_pose: Pose, factor: Factor, time: Jet) -> Pose:
     """Return the pose with all derivatives that the time jet has, right to first order in changes of the system.
 
     The factors are those of the system without changes. What they leave of the residual is corrected by them once more,
@@ -210,7 +210,7 @@ def followed(system: System, place: Pose, factor: Factor, time: Jet) -> Pose:
     def left(pose: Any) -> Any:
         return system.residual(pose, time.truncate(pose.order)).dense().coefficients[pose.order]
 
-    pose = place.displaced(*system.coordinates(factor.solve(-left(place)), place.shifts))
+    pose = start_pose.displaced(*system.coordinates(factor.solve(-left(start_pose)), start_pose.shifts))
     for _ in range(time.order):
         solution = factor.solve(-left(pose.extended(None, None)))
         solution = solution - factor.solve(left(solved(pose, solution)))

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses, second_moments
-from jounce.dynamics.motion_values import Coordinates, check_motion, cut, held, labelled, pose_of
+from jounce.dynamics.motion_values import Coordinates, check_motion, concrete_values, cut, labelled, pose_of
 from jounce.errors import JounceError, MechanismError, RobotError, flag, whole_number
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet, dot
@@ -225,8 +225,10 @@ def energies_of(
             raise MechanismError("a motion has its coordinates already", name="q", value=q)
         _check_known(system, order, system.order)
         bodies = tuple(system.mechanism.bodies)
-        found = energy_coefficients(system, order, function)
-        parts = tuple(labelled(system, x[: system.order - order, 1:], energy_unit(order), body=bodies) for x in found)
+        coefficients = energy_coefficients(system, order, function)
+        parts = tuple(
+            labelled(system, x[: system.order - order, 1:], energy_unit(order), body=bodies) for x in coefficients
+        )
         return *parts, bodies, order
     leading = tuple(k for k, joint in enumerate(system.moving_joints) if joint.mimic is None) if drives else ()
     parts = _of_robot(system, (checked_coordinates(system, q, order + 1),), (), (order, function, leading))
@@ -333,7 +335,7 @@ def potential_energy(motion: Motion) -> "xarray.DataArray":
 def potential_coefficients(motion: Motion) -> Energies:
     """Return the potential energies of bodies as Taylor coefficients, the ground first."""
     masses, (pose_type, coordinates) = required_masses(motion.mechanism), motion.poses
-    heights = held(motion, _heights(coordinates, masses.center, gravity_of(motion.mechanism), pose_type))
+    heights = concrete_values(motion, _heights(coordinates, masses.center, gravity_of(motion.mechanism), pose_type))
     return 0.0 - heights * masses.mass[None]  # no -0
 
 
@@ -373,7 +375,7 @@ def stored_energy(motion: Motion) -> Any:
     check_motion(motion)
     pose_type, coordinates = motion.poses
     stored = _stored(motion.forces, cut(coordinates, 1), motion.time[None], pose_type)
-    return labelled(motion, held(motion, stored)[None], "J")[:, 0].drop_vars("derivative")
+    return labelled(motion, concrete_values(motion, stored)[None], "J")[:, 0].drop_vars("derivative")
 
 
 @compiled("pose_type", brief=True)

@@ -7,7 +7,7 @@ import equinox as eqx
 
 from jounce.constraints.base import Whole
 from jounce.dynamics.energy.energies import energy_coefficients, energy_unit, potential_coefficients
-from jounce.dynamics.motion_values import held
+from jounce.dynamics.motion_values import concrete_values
 from jounce.errors import MechanismError, check_name, whole_number
 from jounce.kinematics import Motion
 from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
@@ -23,25 +23,25 @@ class AbstractEnergyOutput(AbstractMotionOutput):
     source: ClassVar[str] = "mechanism"  # the key of a file that says what it is of
 
     @property
-    def alone(self) -> str | None:
+    def single_body(self) -> str | None:
         """The body alone whose energy it is; None for all of them."""
         return getattr(self, "body", None)
 
     def check(self, mechanism: Mechanism) -> None:
         """Raise MechanismError unless the body exists and there are masses."""
-        bodies, alone = mechanism.bodies, self.alone
-        if alone is not None:
-            check_name("moving body", alone, bodies, MechanismError, name="body")
-        if all(body.mass is None for name, body in bodies.items() if alone in (None, name)):
-            which = "no body has a mass" if alone is None else "this body has no mass"
-            raise MechanismError(f"{which}, and an energy needs one", name=self.source, value=alone)
+        bodies, name_of_body = mechanism.bodies, self.single_body
+        if name_of_body is not None:
+            check_name("moving body", name_of_body, bodies, MechanismError, name="body")
+        if all(body.mass is None for name, body in bodies.items() if name_of_body in (None, name)):
+            which = "no body has a mass" if name_of_body is None else "this body has no mass"
+            raise MechanismError(f"{which}, and an energy needs one", name=self.source, value=name_of_body)
 
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the energy, (levels, 1, time)."""
-        parts = held(motion, self._of_bodies(motion))
-        if self.alone is None:
+        parts = concrete_values(motion, self._of_bodies(motion))
+        if self.single_body is None:
             return parts.sum(axis=1, keepdims=True)
-        index = 1 + list(motion.mechanism.bodies).index(self.alone)  # the ground first
+        index = 1 + list(motion.mechanism.bodies).index(self.single_body)  # the ground first
         return parts[:, index : index + 1]
 
     @abc.abstractmethod

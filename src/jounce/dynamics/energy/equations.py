@@ -371,5 +371,5 @@ def higher_order(
     k = whole_number("k", k, 1, error=error_for(system))
     m = k + 1 if m is None else whole_number("m", m, k + 1, error=error_for(system))
     weights = tuple(float(coefficients(p)) for p in range(1, k + 1))
-    found = _evaluated(system, q, m + k - 1, _higher_order, k, m, weights, power=k - 1)
-    return found[:, 0] if isinstance(system, Motion) else found[..., 0, :]
+    values = _evaluated(system, q, m + k - 1, _higher_order, k, m, weights, power=k - 1)
+    return values[:, 0] if isinstance(system, Motion) else values[..., 0, :]

@@ -78,18 +78,20 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
     power, size = np.sum(driven, axis=0)
     terms = {"drivers": power, "forces": applied.sum(axis=1)}
     terms |= {"kinetic": kinetic.sum(axis=1), "potential": potential.sum(axis=1)}
-    found = {name: labelled(motion, part[: motion.order + 1], "W") for name, part in terms.items()}
-    residual = found["drivers"] + found["forces"] - found["kinetic"] - found["potential"]
-    found["residual"] = residual.assign_attrs(units="W")
-    found["scale"] = labelled(motion, (size + sizes.sum(axis=1))[: motion.order + 1], "W")
-    return xarray.Dataset(found)
+    labelled_terms = {name: labelled(motion, part[: motion.order + 1], "W") for name, part in terms.items()}
+    residual = (
+        labelled_terms["drivers"] + labelled_terms["forces"] - labelled_terms["kinetic"] - labelled_terms["potential"]
+    )
+    labelled_terms["residual"] = residual.assign_attrs(units="W")
+    labelled_terms["scale"] = labelled(motion, (size + sizes.sum(axis=1))[: motion.order + 1], "W")
+    return xarray.Dataset(labelled_terms)
 
 
 def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the power of a driver and the size of its products, as Taylor coefficients, (levels, time)."""
-    place = forces.indices[name]
-    element = forces.model.system.groups[place.group].element
-    law = forces.in_chunks(lambda lanes: _law(element, forces.motion.time[lanes], forces.levels))[:, place.instance]
+    index = forces.indices[name]
+    element = forces.model.system.groups[index.group].element
+    law = forces.in_chunks(lambda lanes: _law(element, forces.motion.time[lanes], forces.levels))[:, index.instance]
     rate, force = Jet(tuple(law)).differentiate(), Jet(tuple(forces.driver_force(name)[:, 0]))
     power, size = force * rate, force.map(np.abs) * rate.map(np.abs)
     return np.stack(power.dense().coefficients), np.stack(size.dense().coefficients)

@@ -140,13 +140,13 @@ class Equations(Module):
 
     def pose(self, state: State) -> Pose:
         """Return the pose of all bodies, the ground first, with velocities."""
-        return self.extended(self.still(state.position, state.attitude), state.velocity, state.spin)
+        return self.extended(self.pose_at_rest(state.position, state.attitude), state.velocity, state.spin)
 
     def extended(self, pose: Pose, shift: Shifts, turn: Turns) -> Pose:
         """Return a pose with one more Taylor coefficient of the moving bodies."""
         return pose.extended(with_ground(shift), with_ground(turn))
 
-    def still(self, position: Shifts, attitude: Attitudes) -> Pose:
+    def pose_at_rest(self, position: Shifts, attitude: Attitudes) -> Pose:
         """Return the pose of order zero of all bodies, the ground first."""
         origins = Jet([with_ground(position)])
         if self.pose_type is PlanarPose:
@@ -176,8 +176,10 @@ class Equations(Module):
             Of the shape of the attitude.
         """
         shifts = self.pose_type.shifts
-        still = self.still(state.position, state.attitude)  # made once: what repeats is summed once, if it is the same
-        moving = self.extended(still, state.velocity, state.spin)
+        at_rest = self.pose_at_rest(
+            state.position, state.attitude
+        )  # made once: what repeats is summed once, if it is the same
+        moving = self.extended(at_rest, state.velocity, state.spin)
         pose = self.extended(moving, acceleration[:shifts] / 2.0, acceleration[shifts:] / 2.0)
         clock = Jet.variable(time, 2)
         second = 2.0 * self.system.residual(pose, clock).dense().coefficients[2]
@@ -186,9 +188,9 @@ class Equations(Module):
         now = clock.truncate(0)
 
         def loosened(change: Any) -> Any:
-            return jax.jvp(lambda p: self.system.residual(p, now).coefficients[0], (still,), (change,))[1]
+            return jax.jvp(lambda p: self.system.residual(p, now).coefficients[0], (at_rest,), (change,))[1]
 
-        forces = inertia / self.scale + conjugate(loosened, still, multipliers)[:, 1:]
+        forces = inertia / self.scale + conjugate(loosened, at_rest, multipliers)[:, 1:]
         applied = self.system.applied_forces(moving, clock.truncate(1)).coefficients[0]
         forces = forces - applied[:, 1:] / self.scale
         return forces, second, self.attitude_rate(state)
@@ -213,7 +215,7 @@ class Equations(Module):
             return ReducedFactor.of(self.mass_matrix(state), jacobian, range_basis(jacobian, self.system.rank))
         if self.saddle is None:
             return DenseFactor.of(self.matrix(state, time))
-        entries = self.system.entries(self.still(state.position, state.attitude), Jet([time]))
+        entries = self.system.entries(self.pose_at_rest(state.position, state.attitude), Jet([time]))
         return self.saddle.factored(self._masses(state), entries, self.system.column_scale, self.system.row_scale)
 
     def blank_factor(self, lanes: int) -> Factor:
@@ -226,7 +228,7 @@ class Equations(Module):
         return self.saddle.blank(lanes)
 
     def _jacobian(self, state: State, time: Instants) -> Jacobian:
-        return self.system.jacobian(self.still(state.position, state.attitude), Jet([time]))
+        return self.system.jacobian(self.pose_at_rest(state.position, state.attitude), Jet([time]))
 
     def mass_matrix(self, state: State) -> MassMatrix:
         """Return the mass matrix over the scale of the masses, scaled."""
@@ -234,7 +236,7 @@ class Equations(Module):
 
     def _masses(self, state: State) -> BodyMatrices:
         """Return the mass matrices of the moving bodies over the scale of the masses."""
-        return mass_matrices(self.still(state.position, state.attitude), self.masses)[:, :, 1:] / self.scale
+        return mass_matrices(self.pose_at_rest(state.position, state.attitude), self.masses)[:, :, 1:] / self.scale
 
     def unknowns(self, solve: Callable[[Rows], Rows], forces: ByBody, second: Rows) -> tuple[ByBody, Rows]:
         """Return the changes of accelerations and multipliers that make what `balance` returns vanish.

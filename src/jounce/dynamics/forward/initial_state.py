@@ -156,12 +156,12 @@ def _let_go(model: Model, whole: Model, instant: float) -> tuple[Model, dict[str
 
     The rows that are left are fulfilled there, and independent if all were.
     """
-    kept = [k for k, name in enumerate(whole.rows) if not name.startswith("initial.")]
-    alike = model.length == whole.length and model.rows == tuple(whole.rows[k] for k in kept)
-    if not kept or not alike or whole.system.rank is not None:
+    remaining = [k for k, name in enumerate(whole.rows) if not name.startswith("initial.")]
+    alike = model.length == whole.length and model.rows == tuple(whole.rows[k] for k in remaining)
+    if not remaining or not alike or whole.system.rank is not None:
         return None
     model, away = with_reference(model, model.guess, instant, model.prescribed)
-    system = resident(with_fields(model.system, row_scale=np.asarray(whole.system.row_scale)[kept]))
+    system = resident(with_fields(model.system, row_scale=np.asarray(whole.system.row_scale)[remaining]))
     return (dataclasses.replace(model, system=system), model.guess) if away <= SETTLED else None
 
 
@@ -189,7 +189,7 @@ def with_rates(equations: Equations, state: State, time: Instants) -> State:
 
 
 @compiled(narrow=True, brief=True, alone=True)
-def _with_rates_told(equations: Equations, state: State, time: Instants) -> tuple[State, Any, Any]:
+def _with_row_rates(equations: Equations, state: State, time: Instants) -> tuple[State, Any, Any]:
     """Return the state of bodies at rest with velocities, what rates they fulfil, and how the attitude moves."""
     moving = _moving(equations, state, time)
     return moving, _row_rates(equations, state, time), equations.attitude_rate(moving)
@@ -207,8 +207,8 @@ class _Facts(NamedTuple):
 @compiled(narrow=True, brief=True, alone=True)
 def _judged(equations: Equations, state: State, time: Instants) -> _Facts:
     """Return these facts from a program of their own: in that of the velocities they would change its last digits."""
-    still = equations.still(state.position, state.attitude)
-    matrix, entries = equations.matrix(state, time)[..., 0], equations.system.entries(still, Jet([time]))[..., 0]
+    pose = equations.pose_at_rest(state.position, state.attitude)
+    matrix, entries = equations.matrix(state, time)[..., 0], equations.system.entries(pose, Jet([time]))[..., 0]
     sound = equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
     return _Facts(matrix, entries, _row_rates(equations, state, time), sound)
 
@@ -229,15 +229,15 @@ def _set_in_motion(equations: Equations, model: Model, coordinates: dict[str, np
     At a limit position, such as an arm stretched out, a residual changes with the square of a displacement: what
     rounding leaves of it hides a place 1e-8 away, at which the velocities are others, and finite.
     """
-    still, time = at_rest(model, coordinates), np.array([[instant]])
-    state, rates, turning = jax.tree.map(np.asarray, _with_rates_told(equations, still, time))
+    start, time = at_rest(model, coordinates), np.array([[instant]])
+    state, rates, turning = jax.tree.map(np.asarray, _with_row_rates(equations, start, time))
     speeds = np.concatenate([state.velocity / model.length, state.spin])[..., 0]
-    size, told = (float(np.max(np.abs(x), initial=0.0)) for x in (speeds, rates))
-    if not (np.isfinite(size) and size > 0 and told > 0):
+    size, rate = (float(np.max(np.abs(x), initial=0.0)) for x in (speeds, rates))
+    if not (np.isfinite(size) and size > 0 and rate > 0):
         return state
-    away = ROUNDING / told  # s, at those velocities
-    there = still._replace(position=still.position + away * state.velocity, attitude=still.attitude + away * turning)
-    other = jax.tree.map(np.asarray, _with_rates_told(equations, there, time)[0])
+    away = ROUNDING / rate  # s, at those velocities
+    there = start._replace(position=start.position + away * state.velocity, attitude=start.attitude + away * turning)
+    other = jax.tree.map(np.asarray, _with_row_rates(equations, there, time)[0])
     change = np.concatenate([(other.velocity - state.velocity) / model.length, other.spin - state.spin])[..., 0]
     if np.max(np.abs(change)) <= LARGEST_CHANGE * size:
         return state
@@ -296,8 +296,8 @@ def _loose(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndar
     small = (sizes := np.linalg.svd(even, compute_uv=False)) <= tolerance * sizes.max()
     if not small.any():
         return np.zeros((0, len(whole)))
-    found = np.linalg.svd(even)[2][small] * scale
-    return found / np.linalg.norm(found, axis=1, keepdims=True)
+    directions = np.linalg.svd(even)[2][small] * scale
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
 def _is_solid(masses: Masses) -> bool:

@@ -61,10 +61,10 @@ def mass_matrices(pose: Pose, masses: Masses) -> BodyMatrices:
         return whole[:split], whole[split:]
 
     size = split + pose.turns
-    still = pose.extended(*wide(jnp.zeros(size)))
+    at_rest = pose.extended(*wide(jnp.zeros(size)))
 
     def along(direction: Any) -> Any:
-        accelerated = still.extended(*wide(0.5 * direction))
+        accelerated = at_rest.extended(*wide(0.5 * direction))
         force, moment = inertia_forces(accelerated, masses, 0.0)
         return jnp.concatenate([force.coefficients[0], moment.coefficients[0]])
 

@@ -49,8 +49,10 @@ def at_state(given: object, state: object, time: object) -> tuple[Motion, int]:
 
 
 def _guessed(model: Model) -> Coordinates:
-    found = {name: np.asarray(value)[None] for name, value in model.guess.items()}
-    return found | ({} if "angle" in found else {"angular_velocity": np.zeros((0, *found["position"].shape[1:]))})
+    coordinates = {name: np.asarray(value)[None] for name, value in model.guess.items()}
+    return coordinates | (
+        {} if "angle" in coordinates else {"angular_velocity": np.zeros((0, *coordinates["position"].shape[1:]))}
+    )
 
 
 def _coordinates(mechanism: Mechanism, model: Model, state: object) -> Coordinates:
@@ -67,63 +69,63 @@ def _coordinates(mechanism: Mechanism, model: Model, state: object) -> Coordinat
     read = [_body_state(f"state.{name}", state[name], model.pose_type) for name in mechanism.bodies]
     orders = {len(body["position"]) - 1: name for body, name in zip(read, mechanism.bodies, strict=True)}
     if len(orders) > 1:
-        told = ", ".join(f"'{name}' has {order}" for order, name in sorted(orders.items()))
-        raise MechanismError(f"all bodies need derivatives to the same order; {told}", name="state")
+        listed = ", ".join(f"'{name}' has {order}" for order, name in sorted(orders.items()))
+        raise MechanismError(f"all bodies need derivatives to the same order; {listed}", name="state")
     (order,) = orders
     if order >= HIGHEST_ORDER:
         raise MechanismError(f"derivatives are taken to order {HIGHEST_ORDER - 1}", name="state", value=order)
-    found = {}
+    coordinates = {}
     for name in read[0]:
         whole = np.stack([np.zeros_like(read[0][name]), *(body[name] for body in read)], axis=-1)[..., None]
         if name == "quaternion":
             whole[0, 0, 0] = 1.0
-        found[name] = taylor_coefficients(whole)
-    return found
+        coordinates[name] = taylor_coefficients(whole)
+    return coordinates
 
 
-def _body_state(place: str, given: object, pose_type: type[Pose]) -> dict[str, Float[np.ndarray, "_ *component"]]:
+def _body_state(location: str, given: object, pose_type: type[Pose]) -> dict[str, Float[np.ndarray, "_ *component"]]:
     """Return the plain derivatives of the coordinates of one body."""
     spatial = pose_type is SpatialPose
     keys = ("position", "orientation", "angular_velocity") if spatial else ("position", "angle")
     if not isinstance(given, Mapping):
-        raise MechanismError(f"must be a mapping with {', '.join(keys)}", name=place, value=given)
+        raise MechanismError(f"must be a mapping with {', '.join(keys)}", name=location, value=given)
     for key in given:
-        check_choice("key", key, keys, MechanismError, name=place)
+        check_choice("key", key, keys, MechanismError, name=location)
     for key in keys[:2]:
         if key not in given:
-            raise MechanismError("is missing", name=f"{place}.{key}")
-    position = _array(f"{place}.position", given["position"], (pose_type.shifts,))
+            raise MechanismError("is missing", name=f"{location}.{key}")
+    position = _array(f"{location}.position", given["position"], (pose_type.shifts,))
     order = len(position) - 1
     if not spatial:
-        angle = _array(f"{place}.angle", given["angle"], (1,))[:, 0]
-        _check_order(f"{place}.angle", len(angle) - 1, order)
+        angle = _array(f"{location}.angle", given["angle"], (1,))[:, 0]
+        _check_order(f"{location}.angle", len(angle) - 1, order)
         return {"position": position, "angle": angle}
     try:
         quaternion = np.array([euler_parameters(given["orientation"])])
     except MechanismError as error:
-        raise error.located(name=f"{place}.orientation") from None
-    spin = _array(f"{place}.angular_velocity", given.get("angular_velocity", np.zeros((0, 3))), (3,))
-    _check_order(f"{place}.angular_velocity", len(spin), order)
+        raise error.located(name=f"{location}.orientation") from None
+    spin = _array(f"{location}.angular_velocity", given.get("angular_velocity", np.zeros((0, 3))), (3,))
+    _check_order(f"{location}.angular_velocity", len(spin), order)
     return {"position": position, "quaternion": quaternion, "angular_velocity": spin}
 
 
-def _check_order(name: str, found: int, order: int) -> None:
-    if found != order:
+def _check_order(name: str, given_order: int, order: int) -> None:
+    if given_order != order:
         message = f"goes with a position and {order} {'derivative' if order == 1 else 'derivatives'} of it"
-        raise MechanismError(f"{message}; give as many here", name=name, value=found)
+        raise MechanismError(f"{message}; give as many here", name=name, value=given_order)
 
 
 def _array(name: str, value: Any, shape: tuple[int, ...]) -> Float[np.ndarray, "..."]:
     """Return finite numbers: of a shape, or where it is not empty, one of them or a list of them."""
-    found = np.array(real_numbers(name, value, MechanismError))
+    array = np.array(real_numbers(name, value, MechanismError))
     if shape:
         scalar = shape == (1,)
-        if found.ndim == len(shape) - scalar:
-            found = found[None]
-        found = found[:, None] if scalar and found.ndim == 1 else found
-    if found.ndim != len(shape) + bool(shape) or found.shape[1:] != shape:
-        wanted = "one number" if not shape else f"a list of {shape[0]} numbers, or one such list for each derivative"
-        raise MechanismError(f"must be {wanted}", name=name, value=value)
-    if not np.isfinite(found).all():
+        if array.ndim == len(shape) - scalar:
+            array = array[None]
+        array = array[:, None] if scalar and array.ndim == 1 else array
+    if array.ndim != len(shape) + bool(shape) or array.shape[1:] != shape:
+        expected = "one number" if not shape else f"a list of {shape[0]} numbers, or one such list for each derivative"
+        raise MechanismError(f"must be {expected}", name=name, value=value)
+    if not np.isfinite(array).all():
         raise MechanismError("must be finite", name=name, value=value)
-    return found
+    return array

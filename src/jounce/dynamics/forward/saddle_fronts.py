@@ -36,7 +36,7 @@ class SaddleFronts(Module):
     ----------
     plan : InversePlan
         Of a matrix whose entries are those of the mass matrices, of the Jacobian, and one.
-    places : array of int, shape (size,)
+    positions : array of int, shape (size,)
         Where each unknown, the coordinates first, and its equation stand in it.
     unknowns : array of int, shape (rows of the whole matrix,)
         Which unknown stands there; one beyond the last where there is none.
@@ -45,7 +45,7 @@ class SaddleFronts(Module):
     """
 
     plan: InversePlan
-    places: Int[Numbers, " size"]
+    positions: Int[Numbers, " size"]
     unknowns: Int[Numbers, " row"]
     rows: Int[Numbers, " entry"]
 
@@ -58,14 +58,14 @@ class SaddleFronts(Module):
     def of(cls, pattern: Pattern) -> "SaddleFronts | None":
         """Plan the elimination from the pattern of the Jacobian; None where a dense one is less work."""
         arrays = (np.asarray(pattern.bodies), np.asarray(pattern.places))
-        told = tuple((x.shape, x.dtype.str, x.tobytes()) for x in arrays)
-        return _planned(told, pattern.body_count, pattern.entry_count, FRONT_COST)
+        key = tuple((x.shape, x.dtype.str, x.tobytes()) for x in arrays)
+        return _planned(key, pattern.body_count, pattern.entry_count, FRONT_COST)
 
     @classmethod
     def anew(cls, pattern: Pattern) -> "SaddleFronts | None":
         """Plan it, as `of` does, which keeps the plans."""
         size, width, count = sum(pattern.shape), pattern.width, pattern.body_count
-        bodies, places = np.asarray(pattern.bodies), np.asarray(pattern.places)
+        bodies, positions = np.asarray(pattern.bodies), np.asarray(pattern.places)
         owners = _owners(bodies.tolist(), count)
         if not owners:
             return None
@@ -82,7 +82,7 @@ class SaddleFronts(Module):
         if FRONT_COST * number * whole * height * wide >= size**3:
             return None
         row_of = np.zeros(pattern.entry_count + 1, np.int32)
-        row_of[places] = np.arange(len(bodies))[:, None, None]
+        row_of[positions] = np.arange(len(bodies))[:, None, None]
         coordinates = (np.arange(count)[:, None] * whole + np.arange(width)).ravel()
         at = np.concatenate([coordinates, where]).astype(np.int32)
         unknowns = np.full(count * whole, size, np.int32)
@@ -121,15 +121,15 @@ class SaddleFactor(Module):
 
     def solve(self, right: Unknowns) -> Unknowns:
         """Return the solutions for right sides in the order of the coordinates and rows."""
-        return self.factor.solve(self.saddle.spread(right))[self.saddle.places]
+        return self.factor.solve(self.saddle.spread(right))[self.saddle.positions]
 
     def inverse(self) -> Float[Numbers, "size size batch"]:
         """Return the inverse matrices as dense ones."""
-        size = len(self.saddle.places)
+        size = len(self.saddle.positions)
 
         def one(lane: Any) -> Any:
-            found = jax.tree.map(lambda x: jax.lax.dynamic_slice_in_dim(x, lane, 1, x.ndim - 1), self.factor.arrays)
-            return SaddleFactor(FrontalFactor(self.factor.fronts, *found), self.saddle).solve(jnp.eye(size))
+            arrays = jax.tree.map(lambda x: jax.lax.dynamic_slice_in_dim(x, lane, 1, x.ndim - 1), self.factor.arrays)
+            return SaddleFactor(FrontalFactor(self.factor.fronts, *arrays), self.saddle).solve(jnp.eye(size))
 
         return jnp.moveaxis(jax.lax.map(one, jnp.arange(self.factor.inverted.shape[-1])), 0, -1)
 
@@ -146,7 +146,7 @@ class SaddleInverse(Module):
 
     def solve(self, right: Unknowns) -> Unknowns:
         """Return the solutions for right sides in the order of the coordinates and rows."""
-        return self.inverse.solve(self.saddle.spread(right))[self.saddle.places]
+        return self.inverse.solve(self.saddle.spread(right))[self.saddle.positions]
 
     def responses(self, columns: int) -> tuple[Float[Numbers, "column batch"], Float[Numbers, " batch"]]:
         """Return the largest response to a force on each coordinate, or more, and to a gap of the rows.
@@ -154,7 +154,7 @@ class SaddleInverse(Module):
         The inverse is not negative on the coordinates, and not positive on the rows: no entry of a column is larger
         than the root of the product of its diagonal entry and of the largest of those.
         """
-        diagonal = jnp.abs(self.inverse.diagonal()[self.saddle.places])
+        diagonal = jnp.abs(self.inverse.diagonal()[self.saddle.positions])
         forces = diagonal[:columns]
         largest = jnp.max(forces, axis=0, keepdims=True)
         return jnp.sqrt(forces * largest), jnp.max(diagonal[columns:], axis=0, initial=0.0)
@@ -162,14 +162,14 @@ class SaddleInverse(Module):
 
 @lru_cache(maxsize=100)
 def _planned(
-    told: tuple[tuple[tuple[int, ...], str, bytes], ...], body_count: int, entry_count: int, _: float
+    key: tuple[tuple[tuple[int, ...], str, bytes], ...], body_count: int, entry_count: int, _: float
 ) -> SaddleFronts | None:
     """Return the plan for a pattern of these arrays: the same for all values, so is kept."""
-    bodies, places = (np.frombuffer(data, kind).reshape(shape) for shape, kind, data in told)
-    found = SaddleFronts.anew(Pattern(bodies, places, body_count, entry_count))
-    for array in jax.tree.leaves(found):
+    bodies, positions = (np.frombuffer(data, kind).reshape(shape) for shape, kind, data in key)
+    fronts = SaddleFronts.anew(Pattern(bodies, positions, body_count, entry_count))
+    for array in jax.tree.leaves(fronts):
         array.setflags(write=False)  # many equations share it
-    return found
+    return fronts
 
 
 Meeting = list[dict[int, dict[int, int]]]
@@ -184,7 +184,7 @@ def _meeting(pattern: Pattern, where: Int[np.ndarray, " row"], whole: int) -> Me
     pattern : Pattern
         Of the Jacobian.
     where : array of int, shape (rows,)
-        The place of each multiplier, and of its row.
+        The position of each multiplier, and of its row.
     whole : int
         Columns of a body, its multipliers included.
     """
@@ -194,13 +194,13 @@ def _meeting(pattern: Pattern, where: Int[np.ndarray, " row"], whole: int) -> Me
     for body, i in itertools.product(range(count), range(width)):
         entries[body * whole + i][body] = {j: (i * width + j) * count + body for j in range(width)}
     rows = zip(np.asarray(pattern.bodies).tolist(), np.asarray(pattern.places).tolist(), where.tolist(), strict=True)
-    for touched, places, here in rows:
+    for touched, columns, here in rows:
         entries[here] = {}
-        for body, block in zip(touched, places, strict=True):
+        for body, block in zip(touched, columns, strict=True):
             if body < count:
-                entries[here][body] = {i: mass + place for i, place in enumerate(block)}
-                for i, place in enumerate(block):
-                    entries[body * whole + i].setdefault(here // whole, {})[here % whole] = mass + place
+                entries[here][body] = {i: mass + position for i, position in enumerate(block)}
+                for i, position in enumerate(block):
+                    entries[body * whole + i].setdefault(here // whole, {})[here % whole] = mass + position
     return entries
 
 
@@ -208,12 +208,12 @@ def _as_pattern(entries: Meeting, count: int, whole: int, nothing: int) -> Patte
     """Return what meets in rows as a pattern; `nothing` is the number of entries."""
     slots = max(map(len, entries))
     bodies = np.full((len(entries), slots), count, np.int32)
-    places = np.full((len(entries), slots, whole), nothing, np.int32)
+    positions = np.full((len(entries), slots, whole), nothing, np.int32)
     for row, by_body in enumerate(entries):
         for slot, (body, columns) in enumerate(by_body.items()):
             bodies[row, slot] = body
-            places[row, slot, list(columns)] = list(columns.values())
-    return Pattern(bodies, places, count, nothing)
+            positions[row, slot, list(columns)] = list(columns.values())
+    return Pattern(bodies, positions, count, nothing)
 
 
 def _owners(bodies: Sequence[Sequence[int]], count: int) -> list[int]:

@@ -90,8 +90,8 @@ class ReducedFactor(Module):
         """Return the solutions for right sides of all coordinates and rows."""
         columns = len(right) - len(self.basis)
         below = jnp.sum(self.basis * right[columns:][:, None], axis=0)
-        found = self.factor.solve(jnp.concatenate([right[:columns], below]))
-        return jnp.concatenate([found[:columns], jnp.sum(self.basis * found[columns:][None], axis=1)])
+        solution = self.factor.solve(jnp.concatenate([right[:columns], below]))
+        return jnp.concatenate([solution[:columns], jnp.sum(self.basis * solution[columns:][None], axis=1)])
 
     def inverse(self) -> Float[Numbers, "size size batch"]:
         """Return what takes right sides of all coordinates and rows to solutions."""
@@ -136,9 +136,9 @@ def multiplied(
     matrix = jnp.pad(matrix, ((0, 0), (0, count * block - size), (0, 0)))
     column = jnp.pad(column, ((0, count * block - size), (0, 0)))
 
-    def added(i: Any, found: Any) -> Any:
+    def added(i: Any, product: Any) -> Any:
         a = jax.lax.dynamic_slice_in_dim(matrix, i * block, block, 1)
         b = jax.lax.dynamic_slice_in_dim(column, i * block, block)
-        return found + total(a[:, j] * b[j][None] for j in range(block))
+        return product + total(a[:, j] * b[j][None] for j in range(block))
 
     return jax.lax.fori_loop(0, count, added, jnp.zeros((rows, lanes)))

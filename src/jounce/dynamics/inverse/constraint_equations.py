@@ -132,16 +132,16 @@ def constraint_equations(
     numbers = _numbers(motion, order)
     if isinstance(motion, MotionAtState):
         _check_finite(numbers, labels["row"], float(motion.time[0]))
-    found = {
+    variables = {
         "residual": (("time", "row"), numbers["residual"]),
         "jacobian": (("time", "row", "column"), numbers["jacobian"]),
         "right_side": (("time", "derivative", "row"), numbers["right_side"], 1),
         "velocities": (("time", "derivative", "column"), _velocities(motion, known), 1),
     }
-    found |= _places(motion) | _forces(motion, numbers["jacobian"])
+    variables |= _positions(motion) | _forces(motion, numbers["jacobian"])
     solved = motion.status == Status.OK
     parts = []
-    for name, (dims, values, *first) in found.items():
+    for name, (dims, values, *first) in variables.items():
         coordinates = {dim: labels[dim] for dim in dims if dim != "derivative"}
         if first:
             coordinates["derivative"] = np.arange(first[0], first[0] + values.shape[1])
@@ -163,7 +163,7 @@ def _labels(motion: Motion) -> dict[str, Any]:
     """Return the labels of all axes, rows in the order of the mechanism."""
     mechanism = motion.mechanism
     columns = [f"{body}.{name}" for body in mechanism.bodies for name in COLUMNS[mechanism.space]]
-    rows = [f"{name}.{k + 1}" for name, found in _in_order(motion) for k in range(len(found.own_rows))]
+    rows = [f"{name}.{k + 1}" for name, index in _in_order(motion) for k in range(len(index.own_rows))]
     labels = {
         "row": rows,
         "column": columns,
@@ -177,13 +177,13 @@ def _labels(motion: Motion) -> dict[str, Any]:
 
 def _in_order(motion: Motion) -> list[tuple[str, ElementIndex]]:
     """Return joints and drivers in the order of the mechanism, by name."""
-    found = element_indices(motion.model)
-    return [(name, found[name]) for name in (*motion.mechanism.joints, *motion.mechanism.drivers)]
+    indices = element_indices(motion.model)
+    return [(name, indices[name]) for name in (*motion.mechanism.joints, *motion.mechanism.drivers)]
 
 
 def _row_order(motion: Motion) -> np.ndarray:
     """Return which row of the system each row is, in the order of the mechanism."""
-    return np.array([row for _, found in _in_order(motion) for row in found.own_rows], int)
+    return np.array([row for _, index in _in_order(motion) for row in index.own_rows], int)
 
 
 def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
@@ -214,7 +214,7 @@ def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
 
 def _without_unknowns(coordinates: Coordinates, order: int) -> Coordinates:
     """Return coordinates once for each order from 1 on, one after the other, with those of that order set to zero."""
-    found = {}
+    elements = {}
     for name, values in coordinates.items():
         first = name == "angular_velocity"  # its coefficients are those of rates
         whole = np.zeros((order + 1 - first, *values.shape[1:-1], order, values.shape[-1]))
@@ -223,8 +223,8 @@ def _without_unknowns(coordinates: Coordinates, order: int) -> Coordinates:
         if name != "quaternion":  # the attitude follows from where it is and from how it turns
             for k in range(1, order + 1):
                 whole[k - first, ..., k - 1, :] = 0.0
-        found[name] = whole.reshape(*whole.shape[:-2], -1)
-    return found
+        elements[name] = whole.reshape(*whole.shape[:-2], -1)
+    return elements
 
 
 @compiled("pose_type")
@@ -263,35 +263,35 @@ def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivativ
     return np.transpose(parts, (3, 0, 2, 1)).reshape(len(motion.time), order, columns)
 
 
-def _places(motion: Motion) -> dict[str, Any]:
+def _positions(motion: Motion) -> dict[str, Any]:
     """Return where the bodies are at all instants."""
-    still = cut(motion.poses[1], 0)
-    first = {name: np.moveaxis(np.asarray(values[0])[..., 1:, :], -1, 0) for name, values in still.items()}
-    found = {"position": (("time", "body", "component"), np.swapaxes(first["position"], 1, 2))}
+    coordinates = cut(motion.poses[1], 0)
+    first = {name: np.moveaxis(np.asarray(values[0])[..., 1:, :], -1, 0) for name, values in coordinates.items()}
+    variables = {"position": (("time", "body", "component"), np.swapaxes(first["position"], 1, 2))}
     if "angle" in first:
-        return found | {"angle": (("time", "body"), first["angle"])}
-    return found | {"attitude": (("time", "body", "euler_parameter"), np.swapaxes(first["quaternion"], 1, 2))}
+        return variables | {"angle": (("time", "body"), first["angle"])}
+    return variables | {"attitude": (("time", "body", "euler_parameter"), np.swapaxes(first["quaternion"], 1, 2))}
 
 
 def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> dict[str, Any]:
     """Return the mass matrix and the multipliers, where there are some."""
-    mechanism, found = motion.mechanism, {}
+    mechanism, forces = motion.mechanism, {}
     if any(body.mass is not None for body in mechanism.bodies.values()):
-        found["mass_matrix"] = (("time", "column", "other_column"), _mass_matrix(motion))
+        forces["mass_matrix"] = (("time", "column", "other_column"), _mass_matrix(motion))
     elif not mechanism.forces:
-        return found
+        return forces
     _, coordinates = motion.poses
     levels = min(len(coordinates["position"]) - 2, motion.order + 1)
     columns = jacobian.shape[-1]
-    mass = found["mass_matrix"][1] if found else np.zeros((1, columns, columns))
+    mass = forces["mass_matrix"][1] if forces else np.zeros((1, columns, columns))
     if (
         levels < 1
         or not jacobian.size
         or (isinstance(motion, MotionAtState) and not _determined(motion, jacobian[0], mass[0]))
     ):
-        return found
+        return forces
     values = derivatives_along(motion, MotionForces.of(motion).unique_multipliers[:levels][:, _row_order(motion)])
-    return found | {"multipliers": (("time", "derivative", "row"), values, 0)}
+    return forces | {"multipliers": (("time", "derivative", "row"), values, 0)}
 
 
 def _determined(

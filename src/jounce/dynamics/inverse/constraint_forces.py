@@ -103,17 +103,17 @@ def multipliers(
     scale = jnp.asarray(system.column_scale)
     solve, count = _solver(system, blocks, mass), len(load)
 
-    def level(found: Any, wanted: Any) -> tuple[Any, Any]:
+    def level(latest: Any, level_and_load: Any) -> tuple[Any, Any]:
         """Find the next coefficient from those found, the latest first and zero before the lowest."""
-        k, missing = wanted
-        for group, parts, forces in by_group(system, blocks, found):
+        k, missing = level_and_load
+        for group, parts, forces in by_group(system, blocks, latest):
             for slot, slope in zip(group.moving_slots, parts, strict=True):
                 # what the order k does not need may not be finite
                 needed = [jnp.where(j <= k, slope[j], 0.0) for j in range(1, count)]
                 work = total(jnp.sum(c * f[None], axis=1) for c, f in zip(needed, forces, strict=True))
                 missing -= onto_bodies(work, group.bodies[slot], system.body_count)
         newest = solve(as_column(missing, scale)) * system.row_scale
-        return [newest, *found[:-1]][: len(found)], newest
+        return [newest, *latest[:-1]][: len(latest)], newest
 
     start = [jnp.zeros((system.shape[0], load.shape[-1]))] * (count - 1)
     return jax.lax.scan(level, start, (np.arange(count), load))[1]  # compiled once for all orders
@@ -152,15 +152,15 @@ def _entries(system: System, blocks: Slopes) -> Float[Numbers, "entry batch"]:
     return jnp.concatenate([(slope[0] * scale).reshape(-1, slope.shape[-1]) for parts in blocks for slope in parts])
 
 
-def by_group(system: System, blocks: Slopes, found: list[Float[Numbers, "row batch"]]) -> list[Any]:
+def by_group(system: System, blocks: Slopes, latest: list[Float[Numbers, "row batch"]]) -> list[Any]:
     """Return groups with their blocks and those of the multipliers found so far, each (rows, instances, batch)."""
-    if not found:
+    if not latest:
         return []
     results, first = [], 0
     for group, parts in zip(system.groups, blocks, strict=True):
         _, _, rows, instances, lanes = parts[0].shape
         last = first + rows * instances
-        results.append((group, parts, [level[first:last].reshape(rows, instances, lanes) for level in found]))
+        results.append((group, parts, [level[first:last].reshape(rows, instances, lanes) for level in latest]))
         first = last
     return results
 
@@ -182,7 +182,7 @@ class _Shifted(AbstractMotion):
         return self.law(time) + self.shift
 
 
-def _told(value: Jet, _: Jet) -> Jet:
+def _as_measured(value: Jet, _: Jet) -> Jet:
     return value
 
 
@@ -204,7 +204,7 @@ def exerted(
     """
     law = driver.motion
     if isinstance(law, LeftOut):
-        law = partial(_told, driver.evaluate(*poses))
+        law = partial(_as_measured, driver.evaluate(*poses))
 
     def residual(shift: Any) -> Any:
         element = eqx.tree_at(lambda e: e.motion, driver, _Shifted(law, shift))

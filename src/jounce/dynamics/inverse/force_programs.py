@@ -59,12 +59,12 @@ def multipliers(
     system: System,
     blocks: Slopes,
     load: Float[Numbers, "levels coordinate body batch"],
-    still: Coordinates | None,
+    at_rest: Coordinates | None,
     masses: Masses,
     pose_type: type[Pose],
 ) -> Any:
     """Return the multipliers that balance a load, Taylor coefficients, (levels, rows, time)."""
-    mass = None if still is None else mass_matrices(pose_of(still, pose_type, 0), masses)[:, :, 1:]
+    mass = None if at_rest is None else mass_matrices(pose_of(at_rest, pose_type, 0), masses)[:, :, 1:]
     of_lot = partial(constraint_forces.multipliers, system)
     dense = mass is not None or system.fronts is None
     return in_lots(of_lot, LOT, blocks, load, mass) if dense else of_lot(blocks, load, mass)
@@ -147,8 +147,8 @@ def applied(force: Any, poses: Sequence[Coordinates], instants: Lanes, pose_type
     """Return what applied forces exert, Taylor coefficients."""
     built = [pose_of(pose, pose_type, levels) for pose in poses]
     time = Jet.variable(instants[None], levels)
-    found = force.force(force.displacement(*built, time), force.velocity(*built, time), time).truncate(levels - 1)
-    return stacked(with_rows(found))
+    exerted = force.force(force.displacement(*built, time), force.velocity(*built, time), time).truncate(levels - 1)
+    return stacked(with_rows(exerted))
 
 
 @compiled("pose_type", "slot", "levels", brief=True)
@@ -158,10 +158,10 @@ def force_slopes(
     """Return how far applied forces act along as the body in a slot is displaced, as `slopes` does for residuals."""
     time = Jet.variable(instants[None], levels - 1)
     built = tuple(movable(pose_of(pose, pose_type, levels - 1)) for pose in poses)
-    still = [jax.tree.map(jnp.zeros_like, pose) for pose in built]
+    unchanged = [jax.tree.map(jnp.zeros_like, pose) for pose in built]
 
     def acting(change: Any) -> Any:
-        changes = (*still[:slot], change, *still[slot + 1 :])
+        changes = (*unchanged[:slot], change, *unchanged[slot + 1 :])
         return stacked(with_rows(force.variation(built, changes, time)))
 
     return along_displacements(built[slot], acting)
@@ -181,14 +181,14 @@ def passed_on(
     pose_type: type[Pose],
 ) -> Any:
     """Return the counterpart of what acts on some bodies: force, and moment about a point, both global."""
-    order, found = len(works[0]) - 1, []
+    order, wrenches = len(works[0]) - 1, []
     for work, body in zip(works, bodies, strict=True):
         pose = pose_of(body, pose_type, order)
         force, moment = (Jet(tuple(part[:, :, None])) for part in (work[:, : pose.shifts], work[:, pose.shifts :]))
         lever = cross(pose.position - point, force)
         moment = moment + lever[None] if pose.turns == 1 else pose.direction(moment) + lever
-        found.append(jnp.concatenate([stacked(force), stacked(moment)], axis=1)[:, :, 0])
-    return -total(found)
+        wrenches.append(jnp.concatenate([stacked(force), stacked(moment)], axis=1)[:, :, 0])
+    return -total(wrenches)
 
 
 @compiled("pose_type", brief=True)

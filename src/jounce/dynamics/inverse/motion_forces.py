@@ -181,8 +181,8 @@ class MotionForces:
         lanes = lanes if len(lanes) else np.zeros(1, int)
         scaled = programs.scaled_jacobian(dataclasses.replace(model.system, outputs=(), forces=()), self._blocks(lanes))
         mechanism = self.motion.mechanism
-        wanted = resolved_reactions(mechanism.redundant_reactions, mechanism.parameter_values)
-        return OpenMultipliers(model, np.asarray(scaled)[..., 0], wanted)
+        selection = resolved_reactions(mechanism.redundant_reactions, mechanism.parameter_values)
+        return OpenMultipliers(model, np.asarray(scaled)[..., 0], selection)
 
     def _blocks(self, lanes: np.ndarray) -> list[list[Any]]:
         """Return the slopes of all groups by the bodies of their moving slots."""
@@ -196,14 +196,14 @@ class MotionForces:
 
     def driver_force(self, name: str) -> Float[Numbers, "order 1 time"]:
         """Return what a driver exerts along what it prescribes, as Taylor coefficients."""
-        place = self.indices[name]
-        driver = law_left_out(self.model.system.groups[place.group], told=True).element
+        index = self.indices[name]
+        driver = law_left_out(self.model.system.groups[index.group], told=True).element
 
         def chunk(lanes: np.ndarray) -> Any:
-            poses, exerting = self._poses(place.group, lanes), self._of_group(place)[..., lanes]
+            poses, exerting = self._poses(index.group, lanes), self._of_group(index)[..., lanes]
             return programs.exerted(driver, poses, self.motion.time[lanes], exerting, self.pose_type)
 
-        return self._once(chunk, "driver", place.group)[:, place.instance : place.instance + 1]
+        return self._once(chunk, "driver", index.group)[:, index.instance : index.instance + 1]
 
     def reaction(self, name: str, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
         """Return what a joint, driver or applied force does to a body, as force and moment about a point of it.
@@ -255,8 +255,8 @@ class MotionForces:
 
     def _member(self, name: str) -> tuple[Group, int]:
         """Return the group of a joint, driver or force, and which of it that is."""
-        if place := self.indices.get(name):
-            return self.model.system.groups[place.group], place.instance
+        if element_index := self.indices.get(name):
+            return self.model.system.groups[element_index.group], element_index.instance
         index, instance = self._force_index(name)
         return self.model.system.forces[index], instance
 
@@ -282,9 +282,9 @@ class MotionForces:
 
     def applied_force(self, name: str) -> Numbers:
         """Return an applied force, as Taylor coefficients, (levels, components, time)."""
-        found = self._applied_force(name)
-        self.check_finite(found, f"forces.{name}")
-        return found
+        coefficients = self._applied_force(name)
+        self.check_finite(coefficients, f"forces.{name}")
+        return coefficients
 
     def check_finite(self, values: Numbers, name: str | None = None) -> None:
         """Raise MechanismError for the first instant that was solved and at which Taylor coefficients are not finite.
@@ -369,8 +369,8 @@ class MotionForces:
 
     def coordinates_at(self, bodies: tuple[int, ...] | None, lanes: np.ndarray, levels: int) -> dict[str, Any]:
         """Return coordinates at some instants, of bodies and to a number of coefficients as `part_of` has them."""
-        found = part_of(self.coordinates, bodies, levels)
-        return {name: values[..., lanes] for name, values in found.items()}
+        coordinates = part_of(self.coordinates, bodies, levels)
+        return {name: values[..., lanes] for name, values in coordinates.items()}
 
     def _check_finite(self, finite: Any, lanes: np.ndarray) -> None:
         """Raise MechanismError for the first instant that was solved and at which an applied force is not finite."""
@@ -391,8 +391,8 @@ class MotionForces:
         poses, instants = self._poses(index, lanes), self.motion.time[lanes]
         return programs.element_slopes(element, poses, instants, self.pose_type, slot, self.levels)
 
-    def _of_group(self, place: ElementIndex) -> Float[Numbers, "order row instance time"]:
+    def _of_group(self, index: ElementIndex) -> Float[Numbers, "order row instance time"]:
         """Return the multipliers of a group."""
-        found = self.multipliers[:, place.rows]
-        instances = self.model.system.groups[place.group].instances
-        return found.reshape(len(found), -1, instances, found.shape[-1])
+        multipliers = self.multipliers[:, index.rows]
+        instances = self.model.system.groups[index.group].instances
+        return multipliers.reshape(len(multipliers), -1, instances, multipliers.shape[-1])

@@ -21,7 +21,7 @@ from jounce.shapes import ArrayLike, Numbers
 from jounce.trajectory import FollowingMotion
 
 ROUNDING = 1e-9  # of the largest force
-MOST_TOLD = 4  # instants
+MOST_SHOWN = 4  # instants
 RATES = ("yank", "second rate", "third rate", "fourth rate")
 
 
@@ -80,7 +80,7 @@ class _DriverOutput(AbstractForceOutput):
         changes = times[1:][sign[1:] != sign[:-1]]
         if not changes.size:
             return ""
-        where = ", ".join(f"{t:.4g} s" for t in changes[:MOST_TOLD]) + (", ..." if len(changes) > MOST_TOLD else "")
+        where = ", ".join(f"{t:.4g} s" for t in changes[:MOST_SHOWN]) + (", ..." if len(changes) > MOST_SHOWN else "")
         return f"changes its sign before t = {where}: a follower that is pressed against a cam lifts off there"
 
 
@@ -148,10 +148,10 @@ class _JointOutput(_Reaction):
         frame = {"global": None, "body": body}.get(self.frame, self.frame)
         about: Any = forces.point_of(self.joint, index(body)) if point is None else point
 
-        def found(forces: MotionForces) -> Numbers:
+        def values_of(forces: MotionForces) -> Numbers:
             return forces.reaction(self.joint, index(body), None if frame is None else index(frame), about)[part]
 
-        return found(forces) if isinstance(element, AbstractForce) else forces.unique(found, size)
+        return values_of(forces) if isinstance(element, AbstractForce) else forces.unique(values_of, size)
 
 
 def ratio_words(names: Sequence[str]) -> str:
@@ -212,12 +212,12 @@ class _GroundOutput(_Reaction):
         mechanism, forces, about = motion.mechanism, MotionForces.of(motion), np.asarray(point)
         between = [name for name, force in mechanism.forces.items() if not _is_load(force)]
 
-        def found(forces: MotionForces, names: Iterable[str]) -> Numbers:
+        def values_of(forces: MotionForces, names: Iterable[str]) -> Numbers:
             start = np.zeros((forces.levels, (forces.pose_type.shifts, forces.pose_type.turns)[part], len(motion.time)))
             return sum((forces.reaction(name, 0, None, about)[part] for name in names), start)
 
         constraints = (*mechanism.joints, *mechanism.drivers)
-        return forces.unique(lambda f: found(f, constraints), size) + found(forces, between)
+        return forces.unique(lambda f: values_of(f, constraints), size) + values_of(forces, between)
 
 
 class GroundForceOutput(_GroundOutput):

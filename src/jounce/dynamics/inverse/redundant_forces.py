@@ -62,33 +62,33 @@ def least_multipliers(
     basis = range_basis(jnp.swapaxes(jacobian, 0, 1), system.rank or rows)
     within = jnp.sum(basis[:, :, None] * jnp.swapaxes(jacobian, 0, 1)[:, None], axis=0)
     factor = DenseFactor.of(saddle_point((jnp.eye(rows) * soft)[..., None], within))
-    found: list[Any] = []
+    solved: list[Any] = []
     strains: list[Any] = []
     for k in range(len(load)):
         missing = load[k]
-        for group, parts, forces in by_group(system, blocks, found):
+        for group, parts, forces in by_group(system, blocks, solved):
             for slot, slope in zip(group.moving_slots, parts, strict=True):
                 missing -= onto_bodies(work_along(slope, forces, k, 1), group.bodies[slot], system.body_count)
         rest = -_strained(system, blocks, strains, k) * system.row_scale
         rest = rest + (bent[:, None] if k == 0 else 0.0)
         right = jnp.sum(basis * as_column(missing, scale)[:, None], axis=0)
         solution = factor.solve(jnp.concatenate([jnp.broadcast_to(rest, (rows, right.shape[-1])), right]))
-        found.append(solution[:rows] * system.row_scale)
+        solved.append(solution[:rows] * system.row_scale)
         strains.append(by_body(jnp.sum(basis * solution[rows:][None], axis=1), scale))
-    return jnp.stack(found)
+    return jnp.stack(solved)
 
 
 def _strained(system: System, blocks: Slopes, strains: Sequence[Any], level: int) -> Float[Numbers, "row batch"]:
     """Return the Taylor coefficient of Jacobian times displacements, without that of the Jacobian of order zero."""
     parts = []
     for group, slopes in zip(system.groups, blocks, strict=True):
-        found: Any = 0.0
+        product: Any = 0.0
         for slot, slope in zip(group.moving_slots, slopes, strict=True):
             for j in range(1, level + 1):
                 moved = jnp.pad(strains[level - j], ((0, 0), (1, 0), (0, 0)))[:, np.array(group.bodies[slot])]
-                found = found + jnp.sum(slope[j] * moved[:, None], axis=0)
+                product = product + jnp.sum(slope[j] * moved[:, None], axis=0)
         _, _, rows, instances, lanes = slopes[0].shape
-        parts.append(jnp.broadcast_to(found, (rows, instances, lanes)).reshape(-1, lanes))
+        parts.append(jnp.broadcast_to(product, (rows, instances, lanes)).reshape(-1, lanes))
     return jnp.concatenate(parts)
 
 
@@ -101,12 +101,12 @@ class OpenMultipliers:
         Of a mechanism with redundant rows.
     jacobian : array of shape (rows, columns)
         At that position, rows and columns scaled.
-    wanted : str or mapping
+    selection : str or mapping
         As `Mechanism.redundant_reactions` has it.
     """
 
-    def __init__(self, model: Model, jacobian: Float[np.ndarray, "row column"], wanted: Any):
-        self.model, self.wanted = model, wanted
+    def __init__(self, model: Model, jacobian: Float[np.ndarray, "row column"], selection: Any):
+        self.model, self.selection = model, selection
         self._row_scale = np.asarray(model.system.row_scale)
         self._jacobian = jacobian
 
@@ -130,21 +130,23 @@ class OpenMultipliers:
         MechanismError
             If the stiffnesses leave multipliers open.
         """
-        if not isinstance(self.wanted, Mapping):
+        if not isinstance(self.selection, Mapping):
             return self.weights**2
         forces, couples = self._sizes
-        found = np.zeros(len(forces))
-        for name, stiffness in self.wanted.items():
+        compliances = np.zeros(len(forces))
+        for name, stiffness in self.selection.items():
             its = np.array([row.partition(".")[2] == name for row in self.model.rows])
             for size, key in ((forces, "force"), (couples, "torque")):
-                found += np.where(its, size**2 / stiffness.get(key, math.inf), 0.0)
+                compliances += np.where(its, size**2 / stiffness.get(key, math.inf), 0.0)
         open_ = np.linalg.qr(self._basis * self._row_scale)[0]
-        if not np.linalg.eigvalsh(open_.T @ (found[:, None] * open_))[0] > 1e-12 * np.max(found, initial=0.0):
-            held = np.any(np.abs(self._basis) > OPEN, axis=1)
-            names = dict.fromkeys(row.partition(".")[2] for row, x in zip(self.model.rows, held, strict=True) if x)
+        if not np.linalg.eigvalsh(open_.T @ (compliances[:, None] * open_))[0] > 1e-12 * np.max(
+            compliances, initial=0.0
+        ):
+            affected = np.any(np.abs(self._basis) > OPEN, axis=1)
+            names = dict.fromkeys(row.partition(".")[2] for row, x in zip(self.model.rows, affected, strict=True) if x)
             message = f"leaves reactions open; give stiffnesses, force and torque, of more of {', '.join(names)}"
-            raise MechanismError(message, name="redundant_reactions", value=dict(self.wanted))
-        return found
+            raise MechanismError(message, name="redundant_reactions", value=dict(self.selection))
+        return compliances
 
     def chance(self) -> RowNumbers:
         """Return a right side that leaves nothing out of what is open; the same each time."""
@@ -161,7 +163,7 @@ class OpenMultipliers:
         """Force and couple by which a multiplier of one acts on a body: a row has a force, or a couple alone."""
         scale = np.asarray(self.model.system.column_scale)
         shifts = self.model.pose_type.shifts
-        found = np.abs((self._jacobian / self._row_scale).reshape(len(self._jacobian), -1, len(scale)) / scale)
-        forces, couples = (np.linalg.norm(part, axis=2).max(axis=1) for part in np.split(found, [shifts], axis=2))
+        scaled = np.abs((self._jacobian / self._row_scale).reshape(len(self._jacobian), -1, len(scale)) / scale)
+        forces, couples = (np.linalg.norm(part, axis=2).max(axis=1) for part in np.split(scaled, [shifts], axis=2))
         pure = forces * self.model.length <= 1e-9 * couples
         return np.where(pure, 0.0, forces), np.where(pure, couples, 0.0)

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from jounce.dynamics.limits.limit_jumps import Infinite, infinite_quantities, jumps_of
 from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
 from jounce.dynamics.limits.local_maxima import local_maxima
-from jounce.dynamics.limits.motion_ends import TrajectoryEnd, end_jumps, told_ends
+from jounce.dynamics.limits.motion_ends import TrajectoryEnd, end_jumps, ends_of_jumps
 from jounce.dynamics.limits.trajectories import FollowedTrajectory, why_not
 from jounce.errors import RobotError, SampleWarning, TrajectoryError, flag
 from jounce.robot.model.links_and_joints import Limits
@@ -108,7 +108,7 @@ def check_limits(
     """
     drives, hand_over = flag("drives", drives, error=RobotError), flag("hand_over", hand_over, error=RobotError)
     followed = FollowedTrajectory(robot, trajectory)
-    held = followed.held
+    resting = followed.resting_joints
 
     def curves(times: np.ndarray) -> np.ndarray:
         """Return all quantities of all joints, (time, 6, joints)."""
@@ -123,24 +123,33 @@ def check_limits(
     values = curves(grid)
     bounds = _Bounds(robot, merged, REST * np.abs(values[:, 1]).max(axis=0), trajectory.stop)
     infinite = infinite_quantities(followed, jumps_of(followed, grid, values[:, : ORDER + 1]), drives)
-    wanted = [
+    limited = [
         (quantity, joint)
         for joint, name in enumerate(robot.joint_names)
         for quantity in range(len(FIELDS))
-        if quantity in EFFORTS or name not in held
+        if quantity in EFFORTS or name not in resting
     ]
-    at, found, shown = worst_instants(curves, bounds, grid, values, np.array(wanted))
+    at, values_there, shown = worst_instants(curves, bounds, grid, values, np.array(limited))
     at = at_breaks(at, breaks, first, last)
     rows = tuple(
         _row(robot, bounds, quantity, joint, *bounds.or_infinite(infinite, quantity, joint, *worst))
-        for (quantity, joint), *worst in zip(wanted, at.tolist(), found.tolist(), shown.tolist(), strict=True)
+        for (quantity, joint), *worst in zip(limited, at.tolist(), values_there.tolist(), shown.tolist(), strict=True)
     )
     ends = _ends(followed, values[:, : ORDER + 1], bounds, drives)
     for message in followed.doubts:
         warnings.warn(SampleWarning(message), stacklevel=2)
     shares = bounds.shares(values, grid)
     return LimitReport(
-        robot.name, robot.joint_names, rows, held, grid, values, shares, drives=drives, ends=ends, hand_over=hand_over
+        robot.name,
+        robot.joint_names,
+        rows,
+        resting,
+        grid,
+        values,
+        shares,
+        drives=drives,
+        ends=ends,
+        hand_over=hand_over,
     )
 
 
@@ -155,8 +164,8 @@ class _Bounds:
         every = [limits[name] for name in robot.joint_names]
 
         def table(*fields: str, missing: float = np.inf) -> np.ndarray:
-            found = np.array([[getattr(x, field) for x in every] for field in fields], float)  # None becomes NaN
-            return np.where(np.isnan(found), missing, found)
+            numbers = np.array([[getattr(x, field) for x in every] for field in fields], float)  # None becomes NaN
+            return np.where(np.isnan(numbers), missing, numbers)
 
         largest, (slower,) = table(*FIELDS[1:]), table("deceleration")
         faster, given = largest[ACCELERATION - 1].copy(), np.isfinite(slower)
@@ -178,9 +187,9 @@ class _Bounds:
         velocity, acceleration = values[..., 1, :], values[..., ACCELERATION, :]
         ends = (times == self.stop)[..., None]
         slows = np.where(np.abs(velocity) > self.rest, velocity * acceleration < 0, ends)
-        found = np.ones_like(values)
-        found[..., ACCELERATION, :] = np.where(slows, self.slowing, self.speeding)
-        return found
+        factors = np.ones_like(values)
+        factors[..., ACCELERATION, :] = np.where(slows, self.slowing, self.speeding)
+        return factors
 
     def sides(self, values: Any, at: Any = ...) -> tuple[Any, Any]:
         """Return the ratios of weighted values to the upper and to the lower bound, -inf where there is none."""
@@ -214,9 +223,9 @@ def worst_instants(
     bounds: Any,
     grid: np.ndarray,
     values: np.ndarray,
-    wanted: np.ndarray,
+    limited: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the worst instant of each wanted curve, its value there and the weight of that.
+    """Return the worst instant of each limited curve, its value there and the weight of that.
 
     Around the peaks that may be the highest, the best of a few instants becomes the middle of a shorter interval, again
     and again. A jump between two instants is found from the side on which the curve is worse.
@@ -229,16 +238,16 @@ def worst_instants(
         Has `weights` and `measure`, as the bounds of this module have.
     grid, values
         Instants to begin with, and what `curves` gives there.
-    wanted : array of shape (curves, 2)
+    limited : array of shape (curves, 2)
         Quantity and joint of each.
     """
-    at = tuple(wanted.T)
+    at = tuple(limited.T)
     weights = bounds.weights(values, grid)
     measures = bounds.measure(values * weights)[:, *at]
-    every = np.arange(len(wanted))
+    every = np.arange(len(limited))
     best = np.argmax(measures, axis=0)
     times, sizes = grid[best], measures[best, every]
-    found, weight = values[best, *at], weights[best, *at]
+    maxima, weight = values[best, *at], weights[best, *at]
     peaks = local_maxima(measures)
     low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, len(grid) - 1)]
     share = np.linspace(0.0, 1.0, POINTS)
@@ -252,11 +261,11 @@ def worst_instants(
         chosen = np.argmax(np.max(measured, axis=0), axis=0)  # of the peaks of each curve
         new = (top[chosen, every], chosen, every)
         better = measured[new] > sizes + 1e-12 * np.abs(sizes)  # else the instant on the grid, which has a round number
-        pairs = ((measured, sizes), (around, times), (own, found), (weights, weight))
-        sizes, times, found, weight = (np.where(better, x[new], y) for x, y in pairs)
+        pairs = ((measured, sizes), (around, times), (own, maxima), (weights, weight))
+        sizes, times, maxima, weight = (np.where(better, x[new], y) for x, y in pairs)
         low = np.take_along_axis(around, np.maximum(top - 1, 0)[None], axis=0)[0]
         high = np.take_along_axis(around, np.minimum(top + 1, POINTS - 1)[None], axis=0)[0]
-    return times, found, weight
+    return times, maxima, weight
 
 
 def _row(
@@ -277,7 +286,7 @@ def _ends(
     """Return what is met at both ends, and the limits that are broken there."""
     robot, jumps = followed.robot, end_jumps(followed, values)
     if np.array_equal(jumps.before, jumps.after):
-        return told_ends(robot.joint_names, jumps)
+        return ends_of_jumps(robot.joint_names, jumps)
     infinite = infinite_quantities(followed, jumps, drives)
     weights = bounds.weights(infinite.before, infinite.times)
     broken = (infinite.signs != 0) & (weights > 0) & bounds.limited
@@ -285,7 +294,7 @@ def _ends(
         dataclasses.replace(
             end, breaks=tuple((robot.joint_names[j], word_of(robot, q, j)[0]) for j, q in np.argwhere(own.T).tolist())
         )
-        for end, own in zip(told_ends(robot.joint_names, jumps), broken, strict=True)
+        for end, own in zip(ends_of_jumps(robot.joint_names, jumps), broken, strict=True)
     )
 
 
@@ -316,7 +325,9 @@ def _grid(trajectory: JointTrajectory) -> Float[np.ndarray, " time"]:
 
 
 def _checked_times(times: ArrayLike) -> Float[np.ndarray, " time"]:
-    found = np.array(seconds("times", times, TrajectoryError))
-    if found.ndim != 1 or not found.size or not np.isfinite(found).all() or (np.diff(found) <= 0).any():
-        raise TrajectoryError("must be finite instants that increase, at least one", name="times", value=found.tolist())
-    return found
+    instants = np.array(seconds("times", times, TrajectoryError))
+    if instants.ndim != 1 or not instants.size or not np.isfinite(instants).all() or (np.diff(instants) <= 0).any():
+        raise TrajectoryError(
+            "must be finite instants that increase, at least one", name="times", value=instants.tolist()
+        )
+    return instants

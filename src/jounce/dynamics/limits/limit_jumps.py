@@ -78,8 +78,8 @@ def jumps_of(
     """
     trajectory, order, joints = followed.trajectory, values.shape[1] - 1, values.shape[2]
     first, last = float(grid[0]), float(grid[-1])
-    span = last - first
-    if not span > 0:
+    duration = last - first
+    if not duration > 0:
         nothing = np.zeros((0, order + 1, joints))
         return Jumps(np.zeros(0), nothing, nothing)
     instants, sizes, unknown = [np.zeros(0)], [np.zeros((0, order, joints))], []
@@ -109,26 +109,26 @@ def jumps_of(
         spread[:, :, unknown] = jumps
         instants.append(seen)
         sizes.append(spread)
-    where, found = _joined(np.concatenate(instants), np.concatenate(sizes), SAME * span)
-    found = np.where(np.abs(found) > SMALL * level_sizes(values, span)[:-1], found, 0.0)
-    inside = (where > first + SAME * span) & (where < last - SAME * span) & found.any(axis=(1, 2))
-    where, found = where[inside], found[inside]
-    after = evaluate(where + SAME * span / 2) if len(where) else np.zeros((0, order + 1, joints))
+    where, heights = _joined(np.concatenate(instants), np.concatenate(sizes), SAME * duration)
+    heights = np.where(np.abs(heights) > SMALL * level_sizes(values, duration)[:-1], heights, 0.0)
+    inside = (where > first + SAME * duration) & (where < last - SAME * duration) & heights.any(axis=(1, 2))
+    where, heights = where[inside], heights[inside]
+    after = evaluate(where + SAME * duration / 2) if len(where) else np.zeros((0, order + 1, joints))
     after = np.where(np.isfinite(after), after, 0.0)  # beside a kink that has no derivatives, as of asin(sin(t))
     before = after.copy()
-    before[:, :-1] -= found
+    before[:, :-1] -= heights
     return Jumps(where, before, after)
 
 
 def _joined(
-    instants: np.ndarray, sizes: np.ndarray, apart: float
+    instants: np.ndarray, sizes: np.ndarray, gap: float
 ) -> tuple[Float[np.ndarray, " jump"], Float[np.ndarray, "jump level joint"]]:
     """Return jumps in their sequence, those at the same instant as one."""
     if not len(instants):
         return instants, sizes
     sequence = np.argsort(instants, kind="stable")
     instants, sizes = instants[sequence], sizes[sequence]
-    begins = np.flatnonzero(np.append(True, np.diff(instants) > apart))
+    begins = np.flatnonzero(np.append(True, np.diff(instants) > gap))
     most, least = np.maximum.reduceat(sizes, begins), np.minimum.reduceat(sizes, begins)
     return instants[begins], np.where(most >= -least, most, least)
 
@@ -162,8 +162,8 @@ def infinite_quantities(followed: FollowedTrajectory, jumps: Jumps, drives: bool
     efforts = followed.torques(states.reshape(-1, *states.shape[2:]), times, drives)[:, 0]
     efforts = efforts.reshape(len(states), count, joints)
     least = NONE * np.abs(efforts).max(axis=(0, 2))[:, None]
-    after, early, still, *pushed = efforts
-    changes = np.stack([*(own - still for own in pushed), after - early])
+    after, early, resting, *pushed = efforts
+    changes = np.stack([*(own - resting for own in pushed), after - early])
     changed = np.where(np.abs(changes) > least, np.sign(changes), 0.0)
     for quantity, those in ((EFFORT, changed[:2]), (EFFORT_RATE, changed)):
         lowest = np.argmax(those != 0, axis=0)
@@ -175,6 +175,6 @@ def _pushed(steady: np.ndarray, jumps: Jumps, level: int) -> Float[np.ndarray, "
     """Return a steady motion with an acceleration along the jump of a derivative, the largest of a joint 1."""
     jump = jumps.after[:, level] - jumps.before[:, level]
     size = np.abs(jump).max(axis=1, keepdims=True)
-    found = steady.copy()
-    found[:, 2] = np.divide(jump, size, out=np.zeros_like(jump), where=size > 0)
-    return found
+    pushed = steady.copy()
+    pushed[:, 2] = np.divide(jump, size, out=np.zeros_like(jump), where=size > 0)
+    return pushed

@@ -57,7 +57,7 @@ class LimitRow:
 
 
 class LimitRows:
-    """What is told of rows of quantities and their limits.
+    """Rows of quantities and their limits.
 
     Attributes
     ----------
@@ -132,12 +132,12 @@ class LimitReport(LimitRows, Displayed):
         return not self.broken and (self.hand_over or not any(end.breaks for end in self.ends))
 
     def __repr__(self) -> str:
-        found = f"{len(self.limited)} limits, {len(self.broken)} broken"
+        counts = f"{len(self.limited)} limits, {len(self.broken)} broken"
         if (worst := self.worst) is not None:
-            found += (
+            counts += (
                 f"; {worst.quantity} of {worst.joint} takes {worst.ratio:.6g} of its limit at t = {worst.time:.6g} s"
             )
-        return f"<LimitReport of {self.robot}: {found}>"
+        return f"<LimitReport of {self.robot}: {counts}>"
 
 
 def _ratio(row: LimitRow) -> float:

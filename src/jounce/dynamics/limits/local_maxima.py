@@ -1,4 +1,4 @@
-"""The highest places of curves that are known at instants."""
+"""The largest values of curves that are known at instants."""
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -13,19 +13,19 @@ def local_maxima(measures: Float[np.ndarray, "time curve"]) -> Int[np.ndarray, "
     """
     height = local_heights(measures) + _above_samples(measures)
     reaching = np.sum(height >= measures.max(axis=0), axis=0).max(initial=0)
-    order = highest_of(height, int(np.clip(reaching, LEAST, MOST)))
+    order = largest_indices(height, int(np.clip(reaching, LEAST, MOST)))
     usable = np.isfinite(np.take_along_axis(height, order, axis=0))
     return np.where(usable, order, np.argmax(measures, axis=0))
 
 
 def _above_samples(measures: Float[np.ndarray, "time curve"]) -> Float[np.ndarray, "time curve"]:
     """Return how far the tops of parabolas are above their middle samples, 0 at the ends and where they have none."""
-    found = np.zeros_like(measures)
+    heights = np.zeros_like(measures)
     before, middle, after = measures[:-2], measures[1:-1], measures[2:]
     with np.errstate(invalid="ignore", divide="ignore"):
         top = (after - before) ** 2 / 8 / (2 * middle - before - after)
-    found[1:-1] = np.where((middle >= before) & (middle >= after) & np.isfinite(top), top, 0.0)
-    return found
+    heights[1:-1] = np.where((middle >= before) & (middle >= after) & np.isfinite(top), top, 0.0)
+    return heights
 
 
 def local_heights(measures: Float[np.ndarray, "time curve"]) -> Float[np.ndarray, "time curve"]:
@@ -35,7 +35,7 @@ def local_heights(measures: Float[np.ndarray, "time curve"]) -> Float[np.ndarray
     return np.where((measures > before) & (measures >= after), measures, -np.inf)
 
 
-def highest_of(height: Float[np.ndarray, "time curve"], count: int) -> Int[np.ndarray, "{count} curve"]:
+def largest_indices(height: Float[np.ndarray, "time curve"], count: int) -> Int[np.ndarray, "{count} curve"]:
     """Return the indices of the highest values of curves, the best first, of equal ones the earlier.
 
     Where fewer are finite than are wanted, an index may stand twice.

@@ -89,7 +89,7 @@ def trajectory_ends(robot: Robot, trajectory: JointTrajectory) -> tuple[Trajecto
     """
     followed = FollowedTrajectory(robot, trajectory)
     times = np.linspace(trajectory.start, trajectory.stop, LOOKS)
-    return told_ends(robot.joint_names, end_jumps(followed, followed.coordinates(times, ORDER)))
+    return ends_of_jumps(robot.joint_names, end_jumps(followed, followed.coordinates(times, ORDER)))
 
 
 def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time derivative joint"]) -> Jumps:
@@ -112,7 +112,7 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
     near = np.maximum(SMALL * sizes, least[:, None])
     near[:-1] = np.maximum(near[:-1], 2 * inside * sizes[1:])
     near = np.stack([near, near])
-    span = float(times[1] - times[0])
+    duration = float(times[1] - times[0])
     # a law may be another one from its last instant on, as polynomials between points are
     moving = np.stack([moving[0], np.where(np.abs(moving[1] - before) > near[1], before, moving[1])])
     for column, name in zip(followed.columns, trajectory.names, strict=True):
@@ -122,7 +122,9 @@ def end_jumps(followed: FollowedTrajectory, values: Float[np.ndarray, "time deri
         if len(law.samples.value[0]) <= FEW * law.degree + 1:
             continue
         errors = trajectory.estimate_error(order, [name])[:, 0]
-        wave = np.ptp(values[:, 0, column]) / 2 * (2 * np.pi / span) ** np.arange(order + 1)  # as errors count peaks
+        wave = (
+            np.ptp(values[:, 0, column]) / 2 * (2 * np.pi / duration) ** np.arange(order + 1)
+        )  # as errors count peaks
         noise = np.where(errors > UNSUPPORTED, np.inf, SAFE * errors * np.maximum(sizes[:, column], wave))
         near[:, :, column] = np.maximum(near[:, :, column], noise)
         if noise[1] > SLOW * sizes[1, column]:
@@ -141,21 +143,21 @@ def _fitted_speed(times: Float[np.ndarray, " sample"], values: Float[np.ndarray,
     count = min(len(times), max(FITTED, len(times) // PART))
     reach = times[count - 1] - times[0]
     table = np.vander((times[:count] - times[0]) / reach, 3, increasing=True)
-    found, *_ = np.linalg.lstsq(table, values[:count], rcond=None)
-    left = values[:count] - table @ found
+    fitted, *_ = np.linalg.lstsq(table, values[:count], rcond=None)
+    left = values[:count] - table @ fitted
     spread = np.linalg.inv(table.T @ table)[1, 1] * (left @ left) / max(count - 3, 1)
-    return float(found[1] / reach), float(np.sqrt(spread) / abs(reach))
+    return float(fitted[1] / reach), float(np.sqrt(spread) / abs(reach))
 
 
-def told_ends(names: Sequence[str], jumps: Jumps) -> tuple[TrajectoryEnd, TrajectoryEnd]:
-    """Return what is told of the jumps of joints at both ends."""
+def ends_of_jumps(names: Sequence[str], jumps: Jumps) -> tuple[TrajectoryEnd, TrajectoryEnd]:
+    """Return the ends of a trajectory from the jumps of joints at both ends."""
     states = jumps.after[0], jumps.before[1]
 
-    def told(k: int, level: int) -> dict[str, float]:
+    def nonzero(k: int, level: int) -> dict[str, float]:
         return {name: float(x) for name, x in zip(names, states[k][level], strict=True) if x}
 
     start, stop = (
-        TrajectoryEnd(end, float(jumps.times[k]), told(k, 1), told(k, 2), told(k, 3))
+        TrajectoryEnd(end, float(jumps.times[k]), nonzero(k, 1), nonzero(k, 2), nonzero(k, 3))
         for k, end in enumerate(("start", "stop"))
     )
     return start, stop

@@ -40,7 +40,7 @@ class FollowedTrajectory:
 
     Attributes
     ----------
-    held : dict of str to float
+    resting_joints : dict of str to float
         Joints that the trajectory does not name, and where they stand: at zero, or at the end of their range that is
         nearest to it.
     doubts : list of str
@@ -61,9 +61,9 @@ class FollowedTrajectory:
         check_measures(robot, trajectory)
         self.robot, self.trajectory = robot, trajectory
         self.columns = [robot.joint_names.index(name) for name in trajectory.names]
-        still = [name for name in robot.joint_names if name not in trajectory.names]
-        limits = robot.limits if still else {}
-        self.held = {name: _rest(limits[name]) for name in still}
+        resting = [name for name in robot.joint_names if name not in trajectory.names]
+        limits = robot.limits if resting else {}
+        self.resting_joints = {name: _rest(limits[name]) for name in resting}
         self.doubts: list[str] = []
         if given:
             warn_of_degrees(robot, trajectory)
@@ -77,7 +77,7 @@ class FollowedTrajectory:
             If one is not finite.
         """
         q = np.zeros((len(times), order + 1, len(self.robot.joint_names)))
-        for name, value in self.held.items():
+        for name, value in self.resting_joints.items():
             q[:, 0, self.robot.joint_names.index(name)] = value
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", SampleWarning)
@@ -127,7 +127,7 @@ def warn_of_degrees(robot: Robot, trajectory: JointTrajectory) -> None:
         warnings.warn(UnitWarning(why), stacklevel=3)
 
 
-def told_drives(drives: bool) -> str:
+def drives_note(drives: bool) -> str:
     """Return in words what torques of a robot contain."""
     kinds = "armature, damping and friction"
     return f"{kinds}, as far as the robot file has them" if drives else f"the bare bodies, without {kinds}"
@@ -188,10 +188,10 @@ def trajectory_torques(
         warnings.warn(SampleWarning(message), stacklevel=2)
     variables = {}
     for k, name in enumerate(robot.joint_names):
-        told = {"units": "N*m" if robot.joints[name].turning else "N", "long_name": derivatives_of(name)}
-        variables[name] = (("time", "derivative"), values[..., k], told)
+        attributes = {"units": "N*m" if robot.joints[name].turning else "N", "long_name": derivatives_of(name)}
+        variables[name] = (("time", "derivative"), values[..., k], attributes)
     axes = time_axes(instants, rates + 1)
-    about = {"title": robot.name, "source": "jounce", "drives": told_drives(drives)}
+    about = {"title": robot.name, "source": "jounce", "drives": drives_note(drives)}
     return xarray.Dataset(variables, coords=axes, attrs=about)
 
 

@@ -64,12 +64,12 @@ def eigenmodes(mass: Square, damping: Square, stiffness: Square, noise: tuple[Sq
     else:
         values, shapes = _of_state_matrix(c, k, c_noise, k_noise)
     shapes = shapes / np.linalg.norm(shapes, axis=0)
-    places = np.argmax(np.abs(shapes) >= 0.999 * np.abs(shapes).max(axis=0, initial=0.0), axis=0)
-    largest = shapes[places, np.arange(shapes.shape[1])]
+    largest_at = np.argmax(np.abs(shapes) >= 0.999 * np.abs(shapes).max(axis=0, initial=0.0), axis=0)
+    largest = shapes[largest_at, np.arange(shapes.shape[1])]
     shapes = shapes * np.conj(largest) / np.abs(largest)
     order = np.lexsort((np.real(values), np.abs(values)))
-    found = solve_triangular(lower.T, shapes[:, order], lower=False)
-    return Eigenmodes(values[order], found, undamped)
+    vectors = solve_triangular(lower.T, shapes[:, order], lower=False)
+    return Eigenmodes(values[order], vectors, undamped)
 
 
 def is_symmetric(matrix: Square, noise: Square) -> bool:
@@ -81,8 +81,8 @@ def is_symmetric(matrix: Square, noise: Square) -> bool:
 def zeros(matrix: Square, noise: Square) -> tuple[Float[np.ndarray, "c k"], Float[np.ndarray, "c k"]]:
     """Return what a matrix takes to zero from the left and from the right, but for rounding; orthonormal columns."""
     left, sizes, right = np.linalg.svd(matrix)
-    kept = sizes <= _along(left, noise, right.T)
-    return left[:, kept], right.T[:, kept]
+    null = sizes <= _along(left, noise, right.T)
+    return left[:, null], right.T[:, null]
 
 
 def _with_rounding(noise: Square, matrix: Square) -> Square:
@@ -111,10 +111,10 @@ def _of_state_matrix(
     chains = zeros(left.T @ c @ right, np.abs(left.T) @ c_noise @ np.abs(right))[1].shape[1]
     order = np.argsort(np.abs(values))
     moving = order[right.shape[1] + chains :]
-    kept = moving[_upper(values[moving])]
-    found = _without_rounding(values[kept])
-    shapes = np.where(np.abs(np.imag(found)) > 0, vectors[:count, kept], _real(vectors[:count, kept]))
-    return np.concatenate([np.zeros(right.shape[1]), found * rate]), np.concatenate([right, shapes], axis=1)
+    selected = moving[_upper(values[moving])]
+    eigenvalues = _without_rounding(values[selected])
+    shapes = np.where(np.abs(np.imag(eigenvalues)) > 0, vectors[:count, selected], _real(vectors[:count, selected]))
+    return np.concatenate([np.zeros(right.shape[1]), eigenvalues * rate]), np.concatenate([right, shapes], axis=1)
 
 
 def _upper(values: Complex[np.ndarray, " value"]) -> Bool[np.ndarray, " value"]:
@@ -125,8 +125,8 @@ def _upper(values: Complex[np.ndarray, " value"]) -> Bool[np.ndarray, " value"]:
 def _without_rounding(values: Complex[np.ndarray, " value"]) -> Complex[np.ndarray, " value"]:
     """Return eigenvalues without real and imaginary parts that are rounding."""
     fastest = np.abs(values).max(initial=0.0)
-    still = np.abs(np.real(values)) <= 8 * len(values) * EPSILON * fastest
-    values = np.where(still, 1j * np.imag(values), values)
+    undamped = np.abs(np.real(values)) <= 8 * len(values) * EPSILON * fastest
+    values = np.where(undamped, 1j * np.imag(values), values)
     return np.where(np.abs(np.imag(values)) <= REAL * np.abs(values), np.real(values), values)
 
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from jounce.dynamics.forward.accelerations import Equations
 from jounce.dynamics.forward.initial_state import TOLERANCE
 from jounce.dynamics.masses import gravity_of, masses_of
-from jounce.dynamics.statics.independent_coordinates import Place
+from jounce.dynamics.statics.independent_coordinates import OperatingPoint
 from jounce.dynamics.statics.variations import LEVELS, at_rest, clock_at, residuals_at, sizes_of_forces
 from jounce.errors import SolveError
 from jounce.execution.compilation import compiled
@@ -35,12 +35,12 @@ FLAT = 1e-10  # of the stiffness: what is smaller counts as none in a step
 WORTH = 1e-14  # of the loads: what is smaller is rounding
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """Where a search ended.
 
     Attributes
     ----------
-    place : Place
+    point : OperatingPoint
         The mechanism at rest there.
     left : array of shape (directions,)
         Generalised forces that nothing balances, in free directions of the scaled coordinates.
@@ -48,35 +48,35 @@ class Found(NamedTuple):
         Whether they are zero but for rounding.
     """
 
-    place: Place
+    point: OperatingPoint
     left: Float[np.ndarray, " direction"]
     balanced: bool
 
 
-def placed(mechanism: Mechanism, model: Model, coordinates: Coordinates, instant: float) -> Place:
+def rest_point(mechanism: Mechanism, model: Model, coordinates: Coordinates, instant: float) -> OperatingPoint:
     """Return a mechanism that stands still, the laws of its drivers and forces held at an instant."""
     system = with_fields(model.system, outputs=())
     equations = Equations(system, masses_of(mechanism), gravity_of(mechanism), 1.0, model.pose_type)
-    return Place(mechanism, model, equations, at_rest(coordinates), clock_at(instant, held=True))
+    return OperatingPoint(mechanism, model, equations, at_rest(coordinates), clock_at(instant, stopped=True))
 
 
-def driven(place: Place) -> Place:
+def driven(point: OperatingPoint) -> OperatingPoint:
     """Return a mechanism that its drivers hold whole with the velocities and accelerations that their laws give."""
-    instant, coordinates = float(place.clock[0, 0, 0]), {name: x.copy() for name, x in place.coordinates.items()}
-    clock, shifts = clock_at(instant, held=False), place.model.pose_type.shifts
+    instant, coordinates = float(point.clock[0, 0, 0]), {name: x.copy() for name, x in point.coordinates.items()}
+    clock, shifts = clock_at(instant, stopped=False), point.model.pose_type.shifts
     for level in (1, 2):  # the residual of each order is affine in the coordinates of that order
-        gaps = np.asarray(residuals_at(place.equations, coordinates, clock))[level]
-        column = np.linalg.lstsq(place.jacobian, -gaps, rcond=RANK_TOLERANCE)[0]
-        change = place.changes(column[None, :, None])[0]
+        gaps = np.asarray(residuals_at(point.equations, coordinates, clock))[level]
+        column = np.linalg.lstsq(point.jacobian, -gaps, rcond=RANK_TOLERANCE)[0]
+        change = point.changes(column[None, :, None])[0]
         coordinates["position"][level] = change[:shifts]
         if "angle" in coordinates:
             coordinates["angle"][level] = change[shifts]
         else:
             coordinates["angular_velocity"][level - 1] = level * change[shifts:]
-    return dataclasses.replace(place, coordinates=coordinates, clock=clock)
+    return dataclasses.replace(point, coordinates=coordinates, clock=clock)
 
 
-def search(start: Place, *, settle: bool) -> Found:
+def search(start: OperatingPoint, *, settle: bool) -> SearchResult:
     """Return where the mechanism can stand still, or how near to it a search from a position came.
 
     Parameters
@@ -87,25 +87,25 @@ def search(start: Place, *, settle: bool) -> Found:
         Go where the forces do work, as a mechanism does that creeps to rest: only positions that are stable, or those
         that the start is on already, are found. Otherwise Newton's method, to any position nearby.
     """
-    place, drifted, scale = start, 0, 1.0
+    point, drifted, scale = start, 0, 1.0
     for _ in range(MAX_STEPS):
-        free = place.free
-        left = free.T @ place.loads.sum(axis=0)
+        free = point.free
+        left = free.T @ point.loads.sum(axis=0)
         if not free.shape[1]:
-            return Found(place, left, True)
-        stiffness = free.T @ place.varied(np.stack([free, *[np.zeros_like(free)] * 2]))[0].sum(axis=0)
-        scale = max(_scale(place), float(np.abs(stiffness).max()), 1e-300)
+            return SearchResult(point, left, True)
+        stiffness = free.T @ point.varied(np.stack([free, *[np.zeros_like(free)] * 2]))[0].sum(axis=0)
+        scale = max(_scale(point), float(np.abs(stiffness).max()), 1e-300)
         step = free @ _step(left, stiffness, scale, settle=settle)
         size = float(np.max(np.abs(step), initial=0.0))
         if size <= CLOSED:
-            return _ended(_moved(place, step) or place, scale)
-        following = _shortened(place, step * min(1.0, LONGEST / size), left, settle=settle)
+            return _ended(_moved(point, step) or point, scale)
+        following = _shortened(point, step * min(1.0, LONGEST / size), left, settle=settle)
         flat = size > LONGEST and _is_flat(stiffness, free.T @ step, left)
         drifted = drifted + 1 if flat else 0
         if following is None or drifted > ADRIFT:
             break
-        place = following
-    return _ended(place, scale)
+        point = following
+    return _ended(point, scale)
 
 
 def _is_flat(stiffness: np.ndarray, step: np.ndarray, left: np.ndarray) -> bool:
@@ -114,20 +114,20 @@ def _is_flat(stiffness: np.ndarray, step: np.ndarray, left: np.ndarray) -> bool:
     return bool(np.linalg.norm(change) < 1e-3 * np.linalg.norm(left))
 
 
-def _ended(place: Place, scale: float) -> Found:
-    left = place.free.T @ place.loads.sum(axis=0)
-    return Found(place, left, bool(np.abs(left).max(initial=0.0) <= BALANCED * scale))
+def _ended(point: OperatingPoint, scale: float) -> SearchResult:
+    left = point.free.T @ point.loads.sum(axis=0)
+    return SearchResult(point, left, bool(np.abs(left).max(initial=0.0) <= BALANCED * scale))
 
 
-def _scale(place: Place) -> float:
+def _scale(point: OperatingPoint) -> float:
     """Return the size of the largest load: of weight, of any applied force, or of what the constraints bear, N m."""
-    borne = place.jacobian.T @ place.multipliers
-    largest = [np.abs([*place.loads, borne]).max(initial=0.0)]
-    if place.equations.system.forces:
-        still = np.zeros((LEVELS, len(place.scale), 1))
-        sizes = sizes_of_forces(place.equations, place.coordinates, place.clock, place.changes(still))
-        for group, size in zip(place.equations.system.forces, sizes, strict=True):
-            lever = place.model.length if group.element.unit == "N" else 1.0
+    borne = point.jacobian.T @ point.multipliers
+    largest = [np.abs([*point.loads, borne]).max(initial=0.0)]
+    if point.equations.system.forces:
+        unchanged = np.zeros((LEVELS, len(point.scale), 1))
+        sizes = sizes_of_forces(point.equations, point.coordinates, point.clock, point.changes(unchanged))
+        for group, size in zip(point.equations.system.forces, sizes, strict=True):
+            lever = point.model.length if group.element.unit == "N" else 1.0
             largest.append(np.abs(size).max(initial=0.0) * lever)
     return float(max(largest))
 
@@ -143,8 +143,8 @@ def _step(
     values, vectors = np.linalg.eigh((stiffness + stiffness.T) / 2)
     floor = FLAT * scale
     if values[0] > floor or not settle:
-        found, sizes, turned = np.linalg.svd(stiffness)
-        along = found.T @ left
+        left_vectors, sizes, turned = np.linalg.svd(stiffness)
+        along = left_vectors.T @ left
         parts = np.where((sizes > floor) | (np.abs(along) > WORTH * scale), along / np.maximum(sizes, floor), 0.0)
         return -turned.T @ parts
     along = vectors.T @ left
@@ -152,14 +152,16 @@ def _step(
     return -vectors @ np.where((np.abs(values) > floor) | (np.abs(along) > WORTH * scale), along / curved, 0.0)
 
 
-def _shortened(place: Place, step: Float[np.ndarray, " column"], left: Any, *, settle: bool) -> Place | None:
-    """Return the place after a step, or after a part of it in which the forces do work, or balance better."""
+def _shortened(
+    point: OperatingPoint, step: Float[np.ndarray, " column"], left: Any, *, settle: bool
+) -> OperatingPoint | None:
+    """Return the operating point after a step, or after a part of it in which the forces do work, or balance better."""
     size = float(np.max(np.abs(step)))
     for _ in range(30):
-        trial = _moved(place, step)
+        trial = _moved(point, step)
         if trial is not None:
             after = trial.free @ (trial.free.T @ trial.loads.sum(axis=0))
-            before = place.free @ left
+            before = point.free @ left
             if not np.isfinite(after).all():
                 pass
             elif size <= 1e-7:
@@ -173,15 +175,15 @@ def _shortened(place: Place, step: Float[np.ndarray, " column"], left: Any, *, s
     return None
 
 
-def _moved(place: Place, step: Float[np.ndarray, " column"]) -> Place | None:
+def _moved(point: OperatingPoint, step: Float[np.ndarray, " column"]) -> OperatingPoint | None:
     """Return the mechanism after a step of the scaled coordinates, put together; None where that does not go.
 
     Angles about axes go on from those before the step, and so count their turns.
     """
-    model, instant = place.model, float(place.clock[0, 0, 0])
-    change = place.changes(np.broadcast_to(step[None, :, None], (1, len(step), 1)))[0]
+    model, instant = point.model, float(point.clock[0, 0, 0])
+    change = point.changes(np.broadcast_to(step[None, :, None], (1, len(step), 1)))[0]
     shifts = model.pose_type.shifts
-    coordinates = {name: x[0] for name, x in place.coordinates.items() if name != "angular_velocity"}
+    coordinates = {name: x[0] for name, x in point.coordinates.items() if name != "angular_velocity"}
     moved = displaced(coordinates, change[:shifts], change[shifts:], model.pose_type)
     coordinates = {name: np.asarray(x) for name, x in moved.items()}
     if model.rows:
@@ -191,8 +193,8 @@ def _moved(place: Place, step: Float[np.ndarray, " column"]) -> Place | None:
         coordinates = trial.coordinates
     model, _ = with_reference(model, coordinates, instant, model.prescribed, keep=True)
     system = with_fields(model.system, outputs=())
-    equations = dataclasses.replace(place.equations, system=system)
-    return dataclasses.replace(place, model=model, equations=equations, coordinates=at_rest(coordinates))
+    equations = dataclasses.replace(point.equations, system=system)
+    return dataclasses.replace(point, model=model, equations=equations, coordinates=at_rest(coordinates))
 
 
 @compiled("pose_type")
@@ -202,15 +204,15 @@ def displaced(coordinates: Mapping[str, Numbers], shift: Numbers, turn: Numbers,
     return {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
 
 
-def check_forces(place: Place) -> None:
+def check_forces(point: OperatingPoint) -> None:
     """Raise SolveError where an applied force has no finite value at rest."""
-    system, instant = place.equations.system, float(place.clock[0, 0, 0])
+    system, instant = point.equations.system, float(point.clock[0, 0, 0])
     if not system.forces:
         return
-    coordinates = {name: x[0] for name, x in place.coordinates.items() if name != "angular_velocity"}
-    pose = pose_at(coordinates, place.model.pose_type).extended(None, None)
+    coordinates = {name: x[0] for name, x in point.coordinates.items() if name != "angular_velocity"}
+    pose = pose_at(coordinates, point.model.pose_type).extended(None, None)
     fit = np.asarray(system.finite_forces(pose, Jet([np.full((1, 1), instant), np.zeros((1, 1))])))[:, 0]
-    bad = [f"forces.{name}" for name, good in zip(force_names(place.model), fit, strict=True) if not good]
+    bad = [f"forces.{name}" for name, good in zip(force_names(point.model), fit, strict=True) if not good]
     if bad:
         message = (
             f"{', '.join(bad)}: the force has no finite value at rest, where an equilibrium is looked for; check its "
@@ -219,11 +221,11 @@ def check_forces(place: Place) -> None:
         raise SolveError(message, status=Status.INADMISSIBLE)
 
 
-def remains(found: Found) -> str:
+def remains(result: SearchResult) -> str:
     """Say what nothing balances at the end of a search: which force or moment on which body, and how large it is."""
-    place = found.place
-    model, shifts = place.model, place.model.pose_type.shifts
-    by_body = -(place.free @ found.left).reshape(len(model.bodies), -1)
+    point = result.point
+    model, shifts = point.model, point.model.pose_type.shifts
+    by_body = -(point.free @ result.left).reshape(len(model.bodies), -1)
     body = int(np.argmax(np.linalg.norm(by_body, axis=1)))
     force, moment = by_body[body, :shifts], by_body[body, shifts:]
     pieces = []

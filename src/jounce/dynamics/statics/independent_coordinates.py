@@ -38,7 +38,7 @@ Lanes = Float[np.ndarray, "3 column lane"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Place:
+class OperatingPoint:
     """A mechanism in a motion at one instant, where small changes of that motion are looked at.
 
     Parameters
@@ -62,19 +62,19 @@ class Place:
     clock: np.ndarray
 
     @cached_property
-    def _found(self) -> tuple[np.ndarray, np.ndarray]:
+    def _loads_and_jacobian(self) -> tuple[np.ndarray, np.ndarray]:
         parts, jacobian = loads_at(self.equations, self.coordinates, self.clock)
         return np.asarray(parts), np.asarray(jacobian)
 
     @property
     def loads(self) -> Float[np.ndarray, "2 column"]:
         """Inertia less weight, and applied forces with the minus sign, in scaled coordinates: N m, or N by size."""
-        return self.as_columns(self._found[0][..., None])[..., 0]
+        return self.as_columns(self._loads_and_jacobian[0][..., None])[..., 0]
 
     @property
     def jacobian(self) -> Float[np.ndarray, "row column"]:
         """Of all constraints, scaled on both sides."""
-        return self._found[1]
+        return self._loads_and_jacobian[1]
 
     @property
     def scale(self) -> Float[np.ndarray, " column"]:
@@ -124,25 +124,25 @@ class Place:
 
     @cached_property
     def output_gradients(self) -> dict[str, Float[np.ndarray, " column"]]:
-        """Gradients, by the scaled coordinates, of the components of outputs that are places or angles, by name."""
+        """Gradients, by the scaled coordinates, of the components of outputs that are positions or angles, by name."""
         count = len(self.scale)
-        found = self.outputs_varied(np.stack([np.eye(count), *[np.zeros((count, count))] * 2]))
-        places = self.components([x.shape[1] for x in found])
+        varied = self.outputs_varied(np.stack([np.eye(count), *[np.zeros((count, count))] * 2]))
+        components = self.components([x.shape[1] for x in varied])
         groups = self.model.system.outputs
-        return {name: found[g][0, c, k] for name, (g, c, k) in places.items() if not groups[g].element.lost_orders}
+        return {name: varied[g][0, c, k] for name, (g, c, k) in components.items() if not groups[g].element.lost_orders}
 
     def components(self, counts: Sequence[int]) -> dict[str, tuple[int, int, int]]:
         """Return group, component and instance of each component of an output, by its name in tables."""
-        found = {}
+        components = {}
         for index, (names, group) in enumerate(zip(self.model.outputs, self.model.system.outputs, strict=True)):
             labels = group.element.labels[: counts[index]] if counts[index] > 1 else ("",)
             for instance, name in enumerate(names):
                 for k, label in enumerate(labels):
-                    found[f"{name}_{label}" if label else name] = index, k, instance
-        return {name: found[name] for name in sorted(found, key=self._order)}
+                    components[f"{name}_{label}" if label else name] = index, k, instance
+        return {name: components[name] for name in sorted(components, key=self._order)}
 
     def _order(self, component: str) -> int:
-        """Return the place of the output that a component belongs to in the order of the mechanism."""
+        """Return the position of the output that a component belongs to in the order of the mechanism."""
         names = list(self.mechanism.outputs)
         return max(k for k, name in enumerate(names) if component == name or component.startswith(f"{name}_"))
 
@@ -153,7 +153,7 @@ class Reduction:
 
     Parameters
     ----------
-    place : Place
+    point : OperatingPoint
         About what motion.
     names, units : tuple of str
         Of the coordinates.
@@ -168,7 +168,7 @@ class Reduction:
         What they would be if nothing cancelled: by it, what is rounding can be told.
     """
 
-    place: Place
+    point: OperatingPoint
     names: tuple[str, ...]
     units: tuple[str, ...]
     released: tuple[str, ...]
@@ -198,8 +198,8 @@ class Reduction:
 
 
 def reduced(
-    place: Place,
-    wanted: Sequence[str] | None = None,
+    point: OperatingPoint,
+    names: Sequence[str] | None = None,
     released: Sequence[str] = (),
     *,
     prefer_outputs: bool = False,
@@ -209,9 +209,9 @@ def reduced(
 
     Parameters
     ----------
-    place : Place
+    point : OperatingPoint
         The motion.
-    wanted : sequence of str, optional
+    names : sequence of str, optional
         Names of coordinates, those of released drivers left out; chosen unless given.
     released : sequence of str
         Drivers whose force stays as it is, instead of their coordinate.
@@ -225,47 +225,47 @@ def reduced(
     MechanismError
         If a name is not one of a coordinate, or the coordinates named are not independent.
     """
-    free = place.free
-    chosen = _chosen(place, free, prefer_outputs) if wanted is None else tuple(wanted)
-    gradients = _gradients(place, chosen, free)
-    held = tuple(name for name in place.mechanism.drivers if name not in released) if drivers else ()
-    own, other = len(released) + len(chosen), len(held)
+    free = point.free
+    chosen = _chosen(point, free, prefer_outputs) if names is None else tuple(names)
+    gradients = _gradients(point, chosen, free)
+    driving = tuple(name for name in point.mechanism.drivers if name not in released) if drivers else ()
+    own, other = len(released) + len(chosen), len(driving)
     laws, targets = _directions(len(released), len(chosen), other)
-    rows = _laws_varied(place, (*released, *held), laws)
-    matrix = np.concatenate([place.jacobian, gradients])
+    rows = _laws_varied(point, (*released, *driving), laws)
+    matrix = np.concatenate([point.jacobian, gradients])
     inverse = np.linalg.pinv(matrix, rcond=RANK_TOLERANCE)
-    changes = np.zeros((LEVELS, len(place.scale), targets.shape[-1]))
-    named = [name for name in chosen if name in place.output_gradients] if chosen else []
+    changes = np.zeros((LEVELS, len(point.scale), targets.shape[-1]))
+    named = [name for name in chosen if name in point.output_gradients] if chosen else []
     for level in range(LEVELS):
-        gaps = rows[level] + place.varied(changes)[1][level] if level else rows[level]
+        gaps = rows[level] + point.varied(changes)[1][level] if level else rows[level]
         away = targets[level] - gradients @ changes[level]
         if level and named:
-            away = targets[level] - _measured(place, chosen, changes, level)
+            away = targets[level] - _measured(point, chosen, changes, level)
         changes[level] = inverse @ np.concatenate([-gaps, away])
-    parts, _ = place.varied(changes)
+    parts, _ = point.varied(changes)
     basis = changes[0][:, :own]
-    units = [_unit_of_driver(place.mechanism, name) for name in released] + [_unit(place, name) for name in chosen]
+    units = [_unit_of_driver(point.mechanism, name) for name in released] + [_unit(point, name) for name in chosen]
     matrices, sizes = basis.T @ parts.sum(axis=0), np.abs(basis).T @ np.abs(parts).sum(axis=0)
-    sizes[:, : 2 * own] += np.concatenate(_magnitudes(place, basis), axis=1)
-    return Reduction(place, (*released, *chosen), tuple(units), tuple(released), held, changes, matrices, sizes)
+    sizes[:, : 2 * own] += np.concatenate(_magnitudes(point, basis), axis=1)
+    return Reduction(point, (*released, *chosen), tuple(units), tuple(released), driving, changes, matrices, sizes)
 
 
-def _magnitudes(place: Place, basis: Float[np.ndarray, "column coordinate"]) -> list[np.ndarray]:
+def _magnitudes(point: OperatingPoint, basis: Float[np.ndarray, "column coordinate"]) -> list[np.ndarray]:
     """Return what stiffness and damping by all loads and velocities would be if they did not cancel within a body."""
-    bodies = len(place.model.bodies)
-    borne = np.abs(place.jacobian).T @ np.abs(place.multipliers)
-    load = np.stack([*np.abs(place.loads), borne]).sum(axis=0).reshape(bodies, -1).max(axis=1)
-    rate = [place.coordinates[name][1 if name in ("position", "angle") else 0, ..., 1:, 0]
-            for name in ("position", "angle" if place.model.pose_type.turns == 1 else "angular_velocity")]  # fmt: skip
-    speed = np.abs(rate[0]).max(axis=0) / place.model.length + np.abs(np.atleast_2d(rate[1])).max(axis=0)
-    mass = np.abs(place.masses).max(axis=(0, 1))
+    bodies = len(point.model.bodies)
+    borne = np.abs(point.jacobian).T @ np.abs(point.multipliers)
+    load = np.stack([*np.abs(point.loads), borne]).sum(axis=0).reshape(bodies, -1).max(axis=1)
+    rate = [point.coordinates[name][1 if name in ("position", "angle") else 0, ..., 1:, 0]
+            for name in ("position", "angle" if point.model.pose_type.turns == 1 else "angular_velocity")]  # fmt: skip
+    speed = np.abs(rate[0]).max(axis=0) / point.model.length + np.abs(np.atleast_2d(rate[1])).max(axis=0)
+    mass = np.abs(point.masses).max(axis=(0, 1))
     moved = np.linalg.norm(basis.reshape(bodies, -1, basis.shape[1]), axis=1)
     return [np.einsum("b,bi,bj->ij", weight, moved, moved) for weight in (load, mass * speed)]
 
 
-def with_joints(found: Reduction, names: Sequence[str]) -> Reduction:
+def with_joints(reduction: Reduction, names: Sequence[str]) -> Reduction:
     """Return a reduction whose coordinates have the names of joints."""
-    return dataclasses.replace(found, names=tuple(names), released=tuple(names))
+    return dataclasses.replace(reduction, names=tuple(names), released=tuple(names))
 
 
 def null_space(jacobian: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "column direction"]:
@@ -276,112 +276,116 @@ def null_space(jacobian: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "
     return right[int(np.sum(sizes > RANK_TOLERANCE * sizes.max(initial=0.0))) :].T
 
 
-def column_names(place: Place) -> list[str]:
+def column_names(point: OperatingPoint) -> list[str]:
     """Return the names of the coordinates of all moving bodies."""
-    return [f"{body}.{name}" for body in place.model.bodies for name in COLUMNS[place.mechanism.space]]
+    return [f"{body}.{name}" for body in point.model.bodies for name in COLUMNS[point.mechanism.space]]
 
 
-def chosen_outputs(place: Place) -> tuple[str, ...]:
+def chosen_outputs(point: OperatingPoint) -> tuple[str, ...]:
     """Return outputs that together tell how all bodies move."""
-    return _chosen(place, place.free, True)
+    return _chosen(point, point.free, True)
 
 
-def _chosen(place: Place, free: Float[np.ndarray, "column direction"], prefer_outputs: bool) -> tuple[str, ...]:
+def _chosen(
+    point: OperatingPoint, free: Float[np.ndarray, "column direction"], prefer_outputs: bool
+) -> tuple[str, ...]:
     """Choose coordinates that are well independent: the largest part left in turn, as in a pivoted elimination."""
     if prefer_outputs:
-        names = list(place.output_gradients)
-        rows = np.array([place.output_gradients[name] for name in names]).reshape(-1, len(free)) @ free
-        rows = rows / np.array([1.0 if _unit(place, name) == "rad" else place.model.length for name in names])[:, None]
+        names = list(point.output_gradients)
+        rows = np.array([point.output_gradients[name] for name in names]).reshape(-1, len(free)) @ free
+        rows = rows / np.array([1.0 if _unit(point, name) == "rad" else point.model.length for name in names])[:, None]
     else:
-        names = column_names(place)
-        width = len(COLUMNS[place.mechanism.space])
-        turns = np.arange(width) >= place.model.pose_type.shifts
-        rows = free * np.tile(np.where(turns, 1.0, SHIFT), len(place.model.bodies))[:, None]
-    found: list[int] = []
+        names = column_names(point)
+        width = len(COLUMNS[point.mechanism.space])
+        turns = np.arange(width) >= point.model.pose_type.shifts
+        rows = free * np.tile(np.where(turns, 1.0, SHIFT), len(point.model.bodies))[:, None]
+    columns: list[int] = []
     left = rows.copy()
     for _ in range(free.shape[1]):
         lengths = np.linalg.norm(left, axis=1)
         if not lengths.max(initial=0.0) > 1e-6:
             raise MechanismError("do not determine how all bodies move; name coordinates of bodies", name="outputs")
-        place_of = int(np.argmax(lengths >= TIE * lengths.max()))
-        direction = left[place_of] / lengths[place_of]
+        longest = int(np.argmax(lengths >= TIE * lengths.max()))
+        direction = left[longest] / lengths[longest]
         left = left - np.outer(left @ direction, direction)
-        found.append(place_of)
-    return tuple(names[k] for k in sorted(found))
+        columns.append(longest)
+    return tuple(names[k] for k in sorted(columns))
 
 
 def _gradients(
-    place: Place, names: Sequence[str], free: Float[np.ndarray, "column direction"]
+    point: OperatingPoint, names: Sequence[str], free: Float[np.ndarray, "column direction"]
 ) -> Float[np.ndarray, "coordinate column"]:
     """Return the gradients of coordinates by the scaled ones of the bodies, or raise where they do not fit."""
-    columns = column_names(place)
+    columns = column_names(point)
     rows = []
     for name in names:
         if name in columns:
-            rows.append(np.eye(len(columns))[columns.index(name)] * place.scale)
+            rows.append(np.eye(len(columns))[columns.index(name)] * point.scale)
             continue
-        check_name("coordinate", name, (*columns, *place.output_gradients), MechanismError, name="coordinates")
-        rows.append(place.output_gradients[name])
-    found = np.array(rows).reshape(-1, len(columns))
+        check_name("coordinate", name, (*columns, *point.output_gradients), MechanismError, name="coordinates")
+        rows.append(point.output_gradients[name])
+    gradients = np.array(rows).reshape(-1, len(columns))
     count = free.shape[1]
     if len(names) != count or len(set(names)) != len(names):
         noun = "coordinate is" if count == 1 else "coordinates are"
         message = f"{count} independent {noun} needed besides those of released drivers; one name for each"
         raise MechanismError(message, name="coordinates", value=list(names))
     if count:
-        sizes = np.array([1.0 if _unit(place, name) == "rad" else place.model.length for name in names])
-        values = np.linalg.svd(found @ free / sizes[:, None], compute_uv=False)
+        sizes = np.array([1.0 if _unit(point, name) == "rad" else point.model.length for name in names])
+        values = np.linalg.svd(gradients @ free / sizes[:, None], compute_uv=False)
         if not values.min() > 1e-6:
-            suggested = ", ".join(_chosen(place, free, False))
+            suggested = ", ".join(_chosen(point, free, False))
             message = f"are not independent here, and do not tell how all bodies move; {suggested} would do"
             raise MechanismError(message, name="coordinates", value=list(names))
-    return found
+    return gradients
 
 
-def _directions(released: int, chosen: int, held: int) -> tuple[np.ndarray, np.ndarray]:
+def _directions(released: int, chosen: int, driving: int) -> tuple[np.ndarray, np.ndarray]:
     """Return Taylor coefficients of laws, (3, drivers, lanes), and of other coordinates, for a unit of each level."""
     own = released + chosen
-    lanes = LEVELS * (own + held)
-    laws, targets = np.zeros((LEVELS, released + held, lanes)), np.zeros((LEVELS, chosen, lanes))
+    lanes = LEVELS * (own + driving)
+    laws, targets = np.zeros((LEVELS, released + driving, lanes)), np.zeros((LEVELS, chosen, lanes))
     for level in range(LEVELS):
         unit = 1 / math.factorial(level)
         for k in range(own):
             (laws if k < released else targets)[level, k if k < released else k - released, level * own + k] = unit
-        for k in range(held):
-            laws[level, released + k, LEVELS * own + level * held + k] = unit
+        for k in range(driving):
+            laws[level, released + k, LEVELS * own + level * driving + k] = unit
     return laws, targets
 
 
-def _laws_varied(place: Place, names: Sequence[str], laws: np.ndarray) -> Float[np.ndarray, "3 row lane"]:
+def _laws_varied(point: OperatingPoint, names: Sequence[str], laws: np.ndarray) -> Float[np.ndarray, "3 row lane"]:
     if not names:
-        return np.zeros((LEVELS, len(place.jacobian), laws.shape[-1]))
-    found = element_indices(place.model)
-    order = tuple((found[name].group, found[name].instance) for name in names)
-    return np.asarray(law_variations(place.equations, place.coordinates, place.clock, order, laws))
+        return np.zeros((LEVELS, len(point.jacobian), laws.shape[-1]))
+    indices = element_indices(point.model)
+    order = tuple((indices[name].group, indices[name].instance) for name in names)
+    return np.asarray(law_variations(point.equations, point.coordinates, point.clock, order, laws))
 
 
-def _measured(place: Place, names: Sequence[str], changes: Lanes, level: int) -> Float[np.ndarray, "coordinate lane"]:
+def _measured(
+    point: OperatingPoint, names: Sequence[str], changes: Lanes, level: int
+) -> Float[np.ndarray, "coordinate lane"]:
     """Return the Taylor coefficients that coordinates have by changes, of which this level may be incomplete."""
-    found = place.outputs_varied(changes)
-    places, columns = place.components([x.shape[1] for x in found]), column_names(place)
+    varied = point.outputs_varied(changes)
+    components, columns = point.components([x.shape[1] for x in varied]), column_names(point)
     rows = []
     for name in names:
         if name in columns:
             k = columns.index(name)
-            rows.append(place.scale[k] * changes[level][k])
+            rows.append(point.scale[k] * changes[level][k])
         else:
-            group, component, instance = places[name]
-            rows.append(found[group][level, component, instance])
+            group, component, instance = components[name]
+            rows.append(varied[group][level, component, instance])
     return np.array(rows)
 
 
-def _unit(place: Place, name: str) -> str:
-    columns = column_names(place)
+def _unit(point: OperatingPoint, name: str) -> str:
+    columns = column_names(point)
     if name in columns:
-        width = len(COLUMNS[place.mechanism.space])
-        return "m" if columns.index(name) % width < place.model.pose_type.shifts else "rad"
-    output = max((n for n in place.mechanism.outputs if name == n or name.startswith(f"{n}_")), key=len)
-    return place.mechanism.outputs[output].unit
+        width = len(COLUMNS[point.mechanism.space])
+        return "m" if columns.index(name) % width < point.model.pose_type.shifts else "rad"
+    output = max((n for n in point.mechanism.outputs if name == n or name.startswith(f"{n}_")), key=len)
+    return point.mechanism.outputs[output].unit
 
 
 def _unit_of_driver(mechanism: Mechanism, name: str) -> str:

@@ -16,8 +16,8 @@ def kinked(reduction: Reduction) -> list[str]:
 
     A smooth law bends less the shorter the step is; a kink stays. Each coordinate and each velocity is looked at.
     """
-    place, count = reduction.place, len(reduction.names)
-    if not place.equations.system.forces or not count:
+    point, count = reduction.point, len(reduction.names)
+    if not point.equations.system.forces or not count:
         return []
     columns = reduction.changes[:2, :, : 2 * count]  # of positions and velocities
     sizes = np.abs(columns).max(axis=(0, 1), initial=1e-300)
@@ -25,22 +25,22 @@ def kinked(reduction: Reduction) -> list[str]:
     counts = _that_count(reduction, sizes)
 
     def forces(step: float) -> list[np.ndarray]:
-        changes = place.changes(columns * step)
-        return [np.asarray(x) for x in sizes_of_forces(place.equations, place.coordinates, place.clock, changes)]
+        changes = point.changes(columns * step)
+        return [np.asarray(x) for x in sizes_of_forces(point.equations, point.coordinates, point.clock, changes)]
 
-    still, bends = forces(0.0), []
+    at_rest, bends = forces(0.0), []
     for step in STEPS:
-        pairs = zip(forces(step), still, forces(-step), strict=True)
+        pairs = zip(forces(step), at_rest, forces(-step), strict=True)
         bends.append(
             [(np.abs(a - 2 * b + c) / step, np.maximum(np.abs(a - b), np.abs(b - c)) / step) for a, b, c in pairs]
         )
     names = []
-    for group, members, large, small in zip(place.equations.system.forces, place.model.forces, *bends, strict=True):
-        lever = place.model.length if group.element.unit == "N" else 1.0
-        slope = small[1].max(axis=2, keepdims=True)  # the steepest: what rounding of the place costs follows from it
+    for group, members, large, small in zip(point.equations.system.forces, point.model.forces, *bends, strict=True):
+        lever = point.model.length if group.element.unit == "N" else 1.0
+        slope = small[1].max(axis=2, keepdims=True)  # the steepest: what rounding of the position costs follows from it
         bent = (small[0] > BENT * large[0]) & (small[0] > FAINT * slope) & (small[0] * lever > counts)
         # what grows as the step shrinks is a jump, and nothing but rounding if it is small
-        bent &= (small[0] < large[0] / BENT) | (small[0] * STEPS[1] * lever > COUNTS * np.abs(place.loads).max())
+        bent &= (small[0] < large[0] / BENT) | (small[0] * STEPS[1] * lever > COUNTS * np.abs(point.loads).max())
         bad = (bent | ~np.isfinite(small[0])).any(axis=(0, 2))
         names += [name for name, is_bad in zip(members, bad, strict=True) if is_bad]
     return names

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from jounce.dynamics.forward.initial_state import TOLERANCE
-from jounce.dynamics.statics.equilibrium_search import displaced, placed, search
-from jounce.dynamics.statics.independent_coordinates import Place
-from jounce.dynamics.statics.static_equilibrium import Equilibrium, as_mechanism, at_rest_from, told
+from jounce.dynamics.statics.equilibrium_search import displaced, rest_point, search
+from jounce.dynamics.statics.independent_coordinates import OperatingPoint
+from jounce.dynamics.statics.static_equilibrium import Equilibrium, as_mechanism, at_rest_from, equilibrium_of
 from jounce.errors import MechanismError, whole_number
 from jounce.kinematics.assembly.axis_directions import senses
 from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
@@ -70,27 +70,27 @@ def equilibria(
     random = np.random.default_rng(whole_number("seed", seed, error=MechanismError))
     robot = mechanism if isinstance(mechanism, Robot) else None
     start = at_rest_from(as_mechanism(mechanism, q, hold, torques, drives), time, without, "newton")
-    places = (
+    points = (
         _closed(start, _random_poses(start, random))
         if robot is None
         else _closed(start, _random_coordinates(robot, start, random, q, hold, drives))
         for _ in range(count)
     )
-    found: list[Equilibrium] = []
-    for place in (start, *places):
-        if place is None:
+    results: list[Equilibrium] = []
+    for point in (start, *points):
+        if point is None:
             continue
         for settle in (True, False):
-            ended = search(place, settle=settle)
-            if ended.balanced and not any(_same(ended.place, known.place) for known in found):
-                found.append(told(ended, start, of_robot=robot is not None))
+            ended = search(point, settle=settle)
+            if ended.balanced and not any(_same(ended.point, known.point) for known in results):
+                results.append(equilibrium_of(ended, start, of_robot=robot is not None))
     order = ("stable", "held", "indifferent", "undetermined", "unstable")
-    return tuple(sorted(found, key=lambda one: order.index(one.stability)))
+    return tuple(sorted(results, key=lambda one: order.index(one.stability)))
 
 
 def _random_coordinates(
     robot: Robot,
-    start: Place,
+    start: OperatingPoint,
     random: np.random.Generator,
     q: GivenCoordinates,
     hold: str | Sequence[str],
@@ -98,19 +98,19 @@ def _random_coordinates(
 ) -> Coordinates:
     """Return where the bodies of a robot are at random coordinates of the joints that are not held."""
     values, limits = given_coordinates(robot, q), robot.limits
-    held = robot.joint_names if hold == "all" else (hold,) if isinstance(hold, str) else hold
+    fixed = robot.joint_names if hold == "all" else (hold,) if isinstance(hold, str) else hold
     for k, name in enumerate(robot.joint_names):
         joint = robot.joints[name]
         reach = np.pi if joint.turning else start.model.length
         ends = (limits[name].lower, limits[name].upper)
         low, high = (own if own is not None else reach * sign for own, sign in zip(ends, (-1, 1), strict=True))
-        if name not in held:
+        if name not in fixed:
             values[k] = random.uniform(low, high)
     opened = robot.opened().mechanism(values, drives=drives)
     return {name: np.asarray(x) for name, x in build(opened).guess.items()}
 
 
-def _random_poses(start: Place, random: np.random.Generator) -> Coordinates:
+def _random_poses(start: OperatingPoint, random: np.random.Generator) -> Coordinates:
     """Return random poses of all bodies."""
     model = start.model
     shape = (len(model.bodies), 1)
@@ -121,7 +121,7 @@ def _random_poses(start: Place, random: np.random.Generator) -> Coordinates:
     return {name: np.asarray(x) for name, x in displaced(coordinates, *parts, model.pose_type).items()}
 
 
-def _closed(start: Place, coordinates: Coordinates) -> Place | None:
+def _closed(start: OperatingPoint, coordinates: Coordinates) -> OperatingPoint | None:
     """Return the mechanism put together from a position; None where that does not go, or turns a part over."""
     model, instant = start.model, float(start.clock[0, 0, 0])
     if model.rows:
@@ -130,10 +130,10 @@ def _closed(start: Place, coordinates: Coordinates) -> Place | None:
         if not trial.closed or not np.array_equal(senses(model.system, trial.coordinates), senses(model.system, drawn)):
             return None
         coordinates = trial.coordinates
-    return placed(start.mechanism, model, coordinates, instant)
+    return rest_point(start.mechanism, model, coordinates, instant)
 
 
-def _same(one: Place, other: Place) -> bool:
+def _same(one: OperatingPoint, other: OperatingPoint) -> bool:
     """Tell whether two positions are the same but for rounding; whole turns count where a force counts them."""
     a, b = one.coordinates, other.coordinates
     if np.abs(one.loads - other.loads).max() > SAME * np.abs(one.loads).max():

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.forward.initial_state import TOLERANCE
-from jounce.dynamics.statics.equilibrium_search import driven, placed
-from jounce.dynamics.statics.independent_coordinates import Place, chosen_outputs
+from jounce.dynamics.statics.equilibrium_search import driven, rest_point
+from jounce.dynamics.statics.independent_coordinates import OperatingPoint, chosen_outputs
 from jounce.errors import RobotError, check_name
 from jounce.forces.actuators import SlideForce, SpatialTorque
 from jounce.kinematics.assembly.assemble import assemble
@@ -53,7 +53,7 @@ def standing(
     order = [joint.name for joint in robot.moving_joints]
     forces: dict[str, Any] = {}
     for name, value in given.items():
-        at, law = parts.placed(order.index(name)), repr(float(value))
+        at, law = parts.joint_placement(order.index(name)), repr(float(value))
         if at.turning:
             forces[f"{name}_torque"] = SpatialTorque(
                 at.bodies, axis_i=at.axis_i, law=law, vector_i=at.vector_i, vector_j=at.vector_j
@@ -68,7 +68,7 @@ def standing(
 
 def through_state(
     robot: Robot, state: GivenState, coordinates: Sequence[str] | None, drives: bool
-) -> tuple[Place, tuple[str, ...]]:
+) -> tuple[OperatingPoint, tuple[str, ...]]:
     """Return a robot in a state, driven in independent joints, and their names.
 
     Parameters
@@ -93,12 +93,12 @@ def through_state(
         check_name("moving joint", name, robot.joint_names, RobotError, name="coordinates")
     if coordinates is None and robot.closures:
         names = _independent(robot, levels[0])
-    places = [robot.joint_names.index(name) for name in names]
-    series = zip(names, (levels[:, places] * [[1.0], [1.0], [0.5]]).T.tolist(), strict=True)
+    columns = [robot.joint_names.index(name) for name in names]
+    series = zip(names, (levels[:, columns] * [[1.0], [1.0], [0.5]]).T.tolist(), strict=True)
     laws = {name: f"{value!r} + {rate!r}*t + {half!r}*t**2" for name, (value, rate, half) in series}
     mechanism = _frictionless(robot).mechanism(levels[0], drivers=laws, time=[0.0], drives=drives)
-    model, found = assemble(build(mechanism), 0.0, TOLERANCE)
-    return driven(placed(mechanism, model, found, 0.0)), names
+    model, assembled = assemble(build(mechanism), 0.0, TOLERANCE)
+    return driven(rest_point(mechanism, model, assembled, 0.0)), names
 
 
 def _frictionless(robot: Robot) -> Robot:
@@ -126,4 +126,4 @@ def _independent(robot: Robot, q: Float[np.ndarray, " joint"]) -> tuple[str, ...
     """Return joints that determine the position of a robot with loops, chosen where its loops are closed near q."""
     mechanism = robot.mechanism(q, drives=False)
     model, coordinates = assemble(build(mechanism), 0.0, TOLERANCE, free=True)
-    return chosen_outputs(placed(mechanism, model, coordinates, 0.0))
+    return chosen_outputs(rest_point(mechanism, model, coordinates, 0.0))

@@ -10,8 +10,8 @@ import numpy as np
 from jounce.display import Displayed
 from jounce.dynamics.forward.initial_state import TOLERANCE
 from jounce.dynamics.masses import check_loads
-from jounce.dynamics.statics.equilibrium_search import Found, check_forces, placed, remains, search
-from jounce.dynamics.statics.independent_coordinates import Place, Reduction, reduced
+from jounce.dynamics.statics.equilibrium_search import SearchResult, check_forces, remains, rest_point, search
+from jounce.dynamics.statics.independent_coordinates import OperatingPoint, Reduction, reduced
 from jounce.dynamics.statics.kinks import kinked
 from jounce.dynamics.statics.robot_states import standing
 from jounce.dynamics.statics.stability import Verdict, judged
@@ -55,9 +55,9 @@ class Equilibrium(Displayed):
         What was left out of account.
     """
 
-    def __init__(self, found: Place, singular: bool, *, of_robot: bool = False):
-        self.place, self.of_robot = found, of_robot
-        self.mechanism, self.time = found.mechanism, float(found.clock[0, 0, 0])
+    def __init__(self, point: OperatingPoint, singular: bool, *, of_robot: bool = False):
+        self.point, self.of_robot = point, of_robot
+        self.mechanism, self.time = point.mechanism, float(point.clock[0, 0, 0])
         self.singular = singular
 
     def __repr__(self) -> str:
@@ -67,7 +67,7 @@ class Equilibrium(Displayed):
     @property
     def degrees_of_freedom(self) -> int:
         """How many independent small motions the constraints allow."""
-        return self.place.free.shape[1]
+        return self.point.free.shape[1]
 
     @property
     def stable(self) -> bool | None:
@@ -86,7 +86,7 @@ class Equilibrium(Displayed):
         if verdict.direction is None:
             return verdict.reason
         direction = self._reduction.basis @ verdict.direction
-        moving = freely_moving(self.place.model, np.abs(direction)[None])
+        moving = freely_moving(self.point.model, np.abs(direction)[None])
         tail = {"energy falls": "as {} move", "no stiffness": "resists motions of {}"}.get(
             verdict.reason, "those of {}"
         )
@@ -97,7 +97,7 @@ class Equilibrium(Displayed):
     @cached_property
     def cautions(self) -> tuple[str, ...]:
         """What was left out of account."""
-        found = (
+        kinks = (
             [
                 f"forces.{name} has a kink or a jump there: its slope is not the same on both sides"
                 for name in kinked(self._reduction)
@@ -105,11 +105,11 @@ class Equilibrium(Displayed):
             if self.degrees_of_freedom and not self.singular
             else []
         )
-        return (*found, *((SINGULAR,) if self.singular else ()))
+        return (*kinks, *((SINGULAR,) if self.singular else ()))
 
     @cached_property
     def _reduction(self) -> Reduction:
-        return reduced(self.place, drivers=False, prefer_outputs=self.of_robot)
+        return reduced(self.point, drivers=False, prefer_outputs=self.of_robot)
 
     @cached_property
     def _verdict(self) -> Verdict:
@@ -123,9 +123,9 @@ class Equilibrium(Displayed):
     @cached_property
     def motion(self) -> Motion:
         """The mechanism at rest, as a motion of one instant, of order 2."""
-        place, model = self.place, self.place.model
+        point, model = self.point, self.point.model
         lost = max((output.lost_orders for output in self.mechanism.outputs.values()), default=0)
-        coordinates = {name: _padded(x, lost) for name, x in place.coordinates.items()}
+        coordinates = {name: _padded(x, lost) for name, x in point.coordinates.items()}
         groups = output_values(model.system.outputs, coordinates, model.pose_type)
         status = np.array([int(Status.OK)])
         return Motion(self.mechanism, model, np.array([self.time]), 2, (coordinates, groups), status, {})
@@ -138,12 +138,12 @@ class Equilibrium(Displayed):
     @cached_property
     def poses(self) -> dict[str, dict[str, Any]]:
         """Poses of the moving bodies, by name: position, m, and angle, rad, or Euler parameters."""
-        found = {}
-        for k, name in enumerate(self.place.model.bodies, 1):
-            position, attitude = (self.place.coordinates[key][0, ..., k, 0] for key in self._keys)
+        poses = {}
+        for k, name in enumerate(self.point.model.bodies, 1):
+            position, attitude = (self.point.coordinates[key][0, ..., k, 0] for key in self._keys)
             key = "angle" if self._keys[1] == "angle" else "orientation"
-            found[name] = {"position": position, key: float(attitude) if key == "angle" else attitude}
-        return found
+            poses[name] = {"position": position, key: float(attitude) if key == "angle" else attitude}
+        return poses
 
     @property
     def placed(self) -> Mechanism:
@@ -153,7 +153,7 @@ class Equilibrium(Displayed):
 
     @property
     def _keys(self) -> tuple[str, str]:
-        return ("position", "angle") if "angle" in self.place.coordinates else ("position", "quaternion")
+        return ("position", "angle") if "angle" in self.point.coordinates else ("position", "quaternion")
 
 
 def _padded(values: np.ndarray, count: int) -> np.ndarray:
@@ -232,16 +232,16 @@ def equilibrium(
     """
     robot = isinstance(mechanism, Robot)
     start = at_rest_from(as_mechanism(mechanism, q, hold, torques, drives), time, without, method)
-    found = search(start, settle=method == "settle")
-    if not found.balanced and method == "settle":
-        found = min(found, search(start, settle=False), key=lambda f: not f.balanced)
-    if not found.balanced:
+    result = search(start, settle=method == "settle")
+    if not result.balanced and method == "settle":
+        result = min(result, search(start, settle=False), key=lambda f: not f.balanced)
+    if not result.balanced:
         message = (
-            f"no equilibrium was found from the starting guess: where the search ended, {remains(found)} is balanced "
+            f"no equilibrium was found from the starting guess: where the search ended, {remains(result)} is balanced "
             "by nothing; check forces and gravity, hold what is driven, or guess the bodies nearer to it"
         )
         raise SolveError(message, status=Status.NOT_CONVERGED)
-    return told(found, start, of_robot=robot)
+    return equilibrium_of(result, start, of_robot=robot)
 
 
 def as_mechanism(
@@ -266,7 +266,9 @@ def as_mechanism(
     return subject
 
 
-def at_rest_from(mechanism: Mechanism, time: Real | Refused | None, without: Sequence[str], method: str) -> Place:
+def at_rest_from(
+    mechanism: Mechanism, time: Real | Refused | None, without: Sequence[str], method: str
+) -> OperatingPoint:
     """Return the mechanism at rest where its bodies can be put together, or raise where something is not valid."""
     check_mechanism(mechanism)
     check_choice("method", method, METHODS, MechanismError)
@@ -280,9 +282,9 @@ def at_rest_from(mechanism: Mechanism, time: Real | Refused | None, without: Seq
     instant = _instant(mechanism, time)
     check_laws(mechanism, np.array([instant]), 2, forces=True)
     model, coordinates = assemble(build(mechanism), instant, TOLERANCE, free=True)
-    place = placed(mechanism, model, coordinates, instant)
-    check_forces(place)
-    return place
+    point = rest_point(mechanism, model, coordinates, instant)
+    check_forces(point)
+    return point
 
 
 def _outputs_without(mechanism: Mechanism, drivers: dict[str, Any]) -> dict[str, Any]:
@@ -306,15 +308,15 @@ def _instant(mechanism: Mechanism, time: Any) -> float:
         given = mechanism.time
         return 0.0 if given is None else float(time_grid(given, mechanism.parameter_values)[0])
     try:
-        found = float(time)
+        instant = float(time)
     except (TypeError, ValueError):
         raise MechanismError("must be one instant, in s", name="time", value=time) from None
-    if not np.isfinite(found):
+    if not np.isfinite(instant):
         raise MechanismError("must be finite", name="time", value=time)
-    return found
+    return instant
 
 
-def told(found: Found, start: Place, *, of_robot: bool = False) -> Equilibrium:
+def equilibrium_of(result: SearchResult, start: OperatingPoint, *, of_robot: bool = False) -> Equilibrium:
     """Return the result; a position in which the constraints hold less than they do elsewhere is singular."""
-    singular = found.place.free.shape[1] > start.free.shape[1]
-    return Equilibrium(found.place, singular, of_robot=of_robot)
+    singular = result.point.free.shape[1] > start.free.shape[1]
+    return Equilibrium(result.point, singular, of_robot=of_robot)

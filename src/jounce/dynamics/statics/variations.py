@@ -132,8 +132,8 @@ def law_variations(
         system = with_changes(equations.system, order, change[..., None])
         return stacked(system.residual(pose, time))[..., 0]
 
-    still = jnp.zeros(changes.shape[:-1])
-    return jax.vmap(lambda change: jax.jvp(evaluated, (still,), (change,))[1], -1, -1)(changes)
+    zeros = jnp.zeros(changes.shape[:-1])
+    return jax.vmap(lambda change: jax.jvp(evaluated, (zeros,), (change,))[1], -1, -1)(changes)
 
 
 @compiled()
@@ -143,9 +143,9 @@ def reaches(equations: Equations, coordinates: Coordinates, clock: Clock, change
 
     def along(change: Any) -> tuple[Any, ...]:
         varied = _tangent(pose, change).truncate(1)
-        still = pose.truncate(1)
+        at_rest = pose.truncate(1)
         groups = equations.system.forces
-        return tuple(group.variation(still, varied, time).coefficients[0][..., 0] for group in groups)
+        return tuple(group.variation(at_rest, varied, time).coefficients[0][..., 0] for group in groups)
 
     return jax.vmap(along, -1, -1)(changes)
 
@@ -183,15 +183,15 @@ def masses_at(equations: Equations, coordinates: Coordinates) -> Float[Numbers, 
 
 def at_rest(coordinates: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return Taylor coefficients to order 2 of bodies that stand still, from coordinates of order zero."""
-    found = {name: np.stack([np.asarray(x), *[np.zeros_like(x)] * 2]) for name, x in coordinates.items()}
-    if "quaternion" in found:
-        found["angular_velocity"] = np.zeros((2, *np.shape(coordinates["position"])))
-    return found
+    extended = {name: np.stack([np.asarray(x), *[np.zeros_like(x)] * 2]) for name, x in coordinates.items()}
+    if "quaternion" in extended:
+        extended["angular_velocity"] = np.zeros((2, *np.shape(coordinates["position"])))
+    return extended
 
 
-def clock_at(instant: float, *, held: bool) -> np.ndarray:
-    """Return the Taylor coefficients of time at an instant; held, the laws of time stand still."""
-    return np.array([instant, 0.0 if held else 1.0, 0.0]).reshape(3, 1, 1)
+def clock_at(instant: float, *, stopped: bool) -> np.ndarray:
+    """Return the Taylor coefficients of time at an instant; stopped, the laws of time stand still."""
+    return np.array([instant, 0.0 if stopped else 1.0, 0.0]).reshape(3, 1, 1)
 
 
 def _moving(equations: Equations, coordinates: Coordinates) -> Any:

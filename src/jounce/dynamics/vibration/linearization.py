@@ -68,7 +68,7 @@ class Linearisation(Displayed):
 
     def __init__(self, reduction: Reduction, about: Equilibrium | None):
         self._reduction, self.equilibrium = reduction, about
-        self.mechanism, self.time = reduction.place.mechanism, float(reduction.place.clock[0, 0, 0])
+        self.mechanism, self.time = reduction.point.mechanism, float(reduction.point.clock[0, 0, 0])
         self.coordinates, self.units, self.held = reduction.names, reduction.units, reduction.held
         self.mass, self.damping, self.stiffness = (reduction.part(level) for level in (2, 1, 0))
 
@@ -84,16 +84,16 @@ class Linearisation(Displayed):
 
     @cached_property
     def _inputs(self) -> tuple[tuple[str, ...], Float[np.ndarray, "coordinate input"]]:
-        reduction, place = self._reduction, self._reduction.place
+        reduction, point = self._reduction, self._reduction.point
         own = len(self.coordinates)
         names, columns = [], []
         for k, name in enumerate(reduction.released):
             names.append(name)
             columns.append(np.eye(own)[k])
-        if place.equations.system.forces:
-            changes = place.changes(reduction.changes[:, :, reduction.lanes(0)])
-            found = reaches(place.equations, place.coordinates, place.clock, changes)
-            for members, reach in zip(place.model.forces, map(np.asarray, found), strict=True):
+        if point.equations.system.forces:
+            changes = point.changes(reduction.changes[:, :, reduction.lanes(0)])
+            forces = reaches(point.equations, point.coordinates, point.clock, changes)
+            for members, reach in zip(point.model.forces, map(np.asarray, forces), strict=True):
                 for instance, name in enumerate(members):
                     labels = "xyz"[: len(reach)] if len(reach) > 1 else ("",)
                     names += [f"{name}_{label}" if label else name for label in labels]
@@ -146,13 +146,13 @@ class Linearisation(Displayed):
         >>> space.A.round(9).tolist(), space.outputs
         ([[0.0, 1.0], [-9.81, -0.0]], ('angle', 'angle_d1'))
         """
-        wanted = self.inputs if inputs is None else named("inputs", inputs)
+        names = self.inputs if inputs is None else named("inputs", inputs)
         known = (*self.inputs, *self.held)
-        for name in wanted:
+        for name in names:
             check_name("input", name, known, MechanismError, name="inputs")
-        forces = [name for name in wanted if name in self.inputs]
-        drivers = [name for name in wanted if name not in self.inputs]
-        return _state_space(self, wanted, forces, drivers, None if outputs is None else named("outputs", outputs))
+        forces = [name for name in names if name in self.inputs]
+        drivers = [name for name in names if name not in self.inputs]
+        return _state_space(self, names, forces, drivers, None if outputs is None else named("outputs", outputs))
 
     @property
     def A(self) -> Float[np.ndarray, "state state"]:  # noqa: N802 - the field's name
@@ -203,8 +203,8 @@ def _state_space(
     a, b = np.zeros((2 * size, 2 * size)), np.zeros((2 * size, len(inputs)))
     a[:size, size:] = np.eye(size)
     a[size : size + own] = second[:, : 2 * size]
-    places = [inputs.index(name) for name in (*forces, *drivers)]
-    b[size : size + own, places] = second[:, 2 * size :]
+    columns = [inputs.index(name) for name in (*forces, *drivers)]
+    b[size : size + own, columns] = second[:, 2 * size :]
     for k, name in enumerate(drivers):
         b[size + own + k, inputs.index(name)] = 1.0
     names = (*of.coordinates, *drivers)
@@ -214,44 +214,44 @@ def _state_space(
 
 
 def _outputs(
-    of: Linearisation, wanted: tuple[str, ...] | None, drivers: Sequence[int], state: tuple[np.ndarray, np.ndarray]
+    of: Linearisation, selection: tuple[str, ...] | None, drivers: Sequence[int], state: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
     """Return how outputs and their rates follow from states and inputs, and their names."""
     r, (a, b) = of._reduction, state
     size = len(a) // 2
-    place = r.place
-    if (wanted is not None and not wanted) or not place.model.system.outputs:
-        for name in wanted or ():
+    point = r.point
+    if (selection is not None and not selection) or not point.model.system.outputs:
+        for name in selection or ():
             check_name("output", name, (), MechanismError, name="outputs")
         return np.zeros((0, 2 * size)), np.zeros((0, b.shape[1])), ()
-    found = place.outputs_varied(r.changes)
-    places = place.components([x.shape[1] for x in found])
-    names = _components(of.mechanism, places, wanted)
+    varied = point.outputs_varied(r.changes)
+    components = point.components([x.shape[1] for x in varied])
+    names = _components(of.mechanism, components, selection)
     # by the coordinates and the laws of drivers, by their rates, and by their second derivatives
     lanes = [[*np.arange(r.lanes(k).start, r.lanes(k).stop), *(r.lanes(k, drivers=True).start + x for x in drivers)]
              for k in range(3)]  # fmt: skip
     c, d = [], []
     for name in names:
-        group, component, instance = places[name]
+        group, component, instance = components[name]
         for level in range(2):
-            value, rate, second = (found[group][level, component, instance, lanes[k]] for k in range(3))
+            value, rate, second = (varied[group][level, component, instance, lanes[k]] for k in range(3))
             c.append(np.concatenate([value, rate]) + second @ a[size:])
             d.append(second @ b[size:])
     labels = tuple(label for name in names for label in (name, f"{name}_d1"))
     return np.reshape(c, (len(c), 2 * size)), np.reshape(d, (len(d), b.shape[1])), labels
 
 
-def _components(mechanism: Mechanism, places: Any, wanted: tuple[str, ...] | None) -> list[str]:
-    """Return the names of the components of the outputs that are wanted, or raise for one that is not there."""
-    if wanted is None:
-        return list(places)
-    found = []
-    for name in wanted:
-        own = [c for c in places if c == name or (name in mechanism.outputs and c.startswith(f"{name}_"))]
+def _components(mechanism: Mechanism, components: Any, selection: tuple[str, ...] | None) -> list[str]:
+    """Return the names of the components of the selected outputs, or raise for one that is not there."""
+    if selection is None:
+        return list(components)
+    selected = []
+    for name in selection:
+        own = [c for c in components if c == name or (name in mechanism.outputs and c.startswith(f"{name}_"))]
         if not own:
             if name in mechanism.outputs:
                 message = "follows from the whole motion, as a force or an energy does; name outputs of poses"
                 raise MechanismError(message, name=f"outputs.{name}")
-            check_name("output", name, (*mechanism.outputs, *places), MechanismError, name="outputs")
-        found += own
-    return found
+            check_name("output", name, (*mechanism.outputs, *components), MechanismError, name="outputs")
+        selected += own
+    return selected

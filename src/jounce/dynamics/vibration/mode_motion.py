@@ -42,19 +42,19 @@ def mode_motion(
     SolveError
         If joints cannot be closed so far from the equilibrium.
     """
-    place = reduction.place
+    point = reduction.point
     columns = reduction.basis @ shape
     columns = columns * (amplitude / np.abs(columns).max())
     phases = np.exp(2j * math.pi * np.linspace(0.0, 1.0, len(instants)))
     moved = np.real(columns[:, None] * phases / 1j)  # a swing begins in the middle
-    model, instant = place.model, float(place.clock[0, 0, 0])
-    changes, shifts = place.changes(moved[None])[0], model.pose_type.shifts
-    still = {key: x[0] for key, x in place.coordinates.items() if key != "angular_velocity"}
+    model, instant = point.model, float(point.clock[0, 0, 0])
+    changes, shifts = point.changes(moved[None])[0], model.pose_type.shifts
+    start = {key: x[0] for key, x in point.coordinates.items() if key != "angular_velocity"}
     frames = []
     for k in range(len(instants)):
         change = changes[..., k : k + 1]
-        found = displaced(still, change[:shifts], change[shifts:], model.pose_type)
-        coordinates = {key: np.asarray(x) for key, x in found.items()}
+        displaced_bodies = displaced(start, change[:shifts], change[shifts:], model.pose_type)
+        coordinates = {key: np.asarray(x) for key, x in displaced_bodies.items()}
         if model.rows:
             trial = assemble_from_guess(model, instant, TOLERANCE, coordinates)
             if not trial.closed:
@@ -65,7 +65,7 @@ def mode_motion(
     whole = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[None], *frames)
     groups = output_values(model.system.outputs, whole, model.pose_type)
     status = np.full(len(instants), int(Status.OK))
-    return Motion(place.mechanism, model, instants, 0, (whole, groups), status, {})
+    return Motion(point.mechanism, model, instants, 0, (whole, groups), status, {})
 
 
 def checked_amplitude(amplitude: object) -> float:

@@ -40,9 +40,9 @@ class Modes(Displayed):
     def __init__(self, reduction: Reduction):
         self._reduction = reduction
         mass, damping, stiffness = (reduction.part(level) for level in (2, 1, 0))
-        found: Eigenmodes = eigenmodes(mass, damping, stiffness, (reduction.noise(1), reduction.noise(0)))
-        self.eigenvalues, self.shapes, self.undamped = found
-        self.coordinates, self.bodies = reduction.names, reduction.place.model.bodies
+        solved: Eigenmodes = eigenmodes(mass, damping, stiffness, (reduction.noise(1), reduction.noise(0)))
+        self.eigenvalues, self.shapes, self.undamped = solved
+        self.coordinates, self.bodies = reduction.names, reduction.point.model.bodies
 
     def __len__(self) -> int:
         return len(self.eigenvalues)
@@ -83,16 +83,16 @@ class Modes(Displayed):
 
         Of shape (modes, bodies, 3) in the plane: x, y, angle; (modes, bodies, 6) in space.
         """
-        columns = (self._reduction.basis @ self.shapes) * self._reduction.place.scale[:, None]
-        width = len(COLUMNS[self._reduction.place.mechanism.space])
+        columns = (self._reduction.basis @ self.shapes) * self._reduction.point.scale[:, None]
+        width = len(COLUMNS[self._reduction.point.mechanism.space])
         return columns.T.reshape(len(self), len(self.bodies), width)
 
     @cached_property
     def participation(self) -> Float[np.ndarray, "mode body"]:
         """Share of each body in the kinetic energy of each mode."""
-        place = self._reduction.place
+        point = self._reduction.point
         columns = (self._reduction.basis @ self.shapes).T.reshape(len(self), len(self.bodies), -1)
-        energy = np.einsum("mbi,ijb,mbj->mb", columns.conj(), place.masses, columns).real
+        energy = np.einsum("mbi,ijb,mbj->mb", columns.conj(), point.masses, columns).real
         return energy / energy.sum(axis=1, keepdims=True)
 
     def motion(self, mode: int, amplitude: float = 0.1, *, duration: float | None = None, frames: int = 61) -> Motion:
@@ -120,8 +120,8 @@ class Modes(Displayed):
         """
         k = whole_number("mode", mode, 1, len(self), error=MechanismError) - 1
         count = whole_number("frames", frames, 2, 10_000, error=MechanismError)
-        place, amplitude = self._reduction.place, checked_amplitude(amplitude)
-        if place.clock[1].any():
+        point, amplitude = self._reduction.point, checked_amplitude(amplitude)
+        if point.clock[1].any():
             raise MechanismError("modes about a motion cannot be shown, only those of an equilibrium", name="mode")
         swings = abs(self.damped_frequencies[k])
         period = 1.0 if not swings else 1.0 / swings

@@ -8,8 +8,8 @@ import numpy as np
 from jounce.dynamics.forward.accelerations import Equations
 from jounce.dynamics.masses import gravity_of, masses_of, required_masses
 from jounce.dynamics.motion_values import cut
-from jounce.dynamics.statics.equilibrium_search import BALANCED, Found, remains
-from jounce.dynamics.statics.independent_coordinates import Place, Reduction, reduced, with_joints
+from jounce.dynamics.statics.equilibrium_search import BALANCED, SearchResult, remains
+from jounce.dynamics.statics.independent_coordinates import OperatingPoint, Reduction, reduced, with_joints
 from jounce.dynamics.statics.kinks import kinked
 from jounce.dynamics.statics.robot_states import DRIVE, GivenState, through_state
 from jounce.dynamics.statics.static_equilibrium import Equilibrium, equilibrium
@@ -100,33 +100,33 @@ def linearise(
         raise MechanismError("an equilibrium has its instant already", name="time", value=time)
     if isinstance(subject, Equilibrium):
         required_masses(subject.mechanism, "small motions")
-        about, place = subject, subject.place
+        about, point = subject, subject.point
     elif isinstance(subject, Motion):
         required_masses(subject.mechanism, "small motions")
-        place = place_along(subject, time)
+        point = point_along(subject, time)
     else:
         message = "must be a jn.Mechanism, a jn.Motion, an equilibrium or a jn.Robot"
         raise MechanismError(message, name="subject", value=subject)
     released = named("release", release)
     for name in released:
-        check_name("driver", name, place.mechanism.drivers, MechanismError, name="release")
-    _check_free(place, about, released)
-    wanted = None if coordinates is None else named("coordinates", coordinates)
-    reduction = reduced(place, wanted, released, prefer_outputs=about is not None and about.of_robot)
+        check_name("driver", name, point.mechanism.drivers, MechanismError, name="release")
+    _check_free(point, about, released)
+    names = None if coordinates is None else named("coordinates", coordinates)
+    reduction = reduced(point, names, released, prefer_outputs=about is not None and about.of_robot)
     _check(reduction)
     return Linearisation(reduction, about)
 
 
 def _of_robot(robot: Robot, q: GivenState, coordinates: Sequence[str] | None, drives: bool) -> Linearisation:
     """Return the equations of small motions of a robot about a state, in the coordinates of its joints."""
-    wanted = None if coordinates is None else named("coordinates", coordinates)
-    place, names = through_state(robot, q, wanted, drives)
-    found = reduced(place, released=[name + DRIVE for name in names], drivers=False)
-    _check(found)
-    return Linearisation(with_joints(found, names), None)
+    joint_coordinates = None if coordinates is None else named("coordinates", coordinates)
+    point, names = through_state(robot, q, joint_coordinates, drives)
+    reduction = reduced(point, released=[name + DRIVE for name in names], drivers=False)
+    _check(reduction)
+    return Linearisation(with_joints(reduction, names), None)
 
 
-def place_along(motion: Motion, time: Real | None) -> Place:
+def point_along(motion: Motion, time: Real | None) -> OperatingPoint:
     """Return a mechanism at an instant of its motion.
 
     Raises
@@ -143,15 +143,17 @@ def place_along(motion: Motion, time: Real | None) -> Place:
     if motion.status[lane] != Status.OK:
         raise MechanismError("the motion was not solved at this instant", name="time", value=float(motion.time[lane]))
     lanes, mechanism = np.array([lane]), motion.mechanism
-    found = {name: np.asarray(x)[..., lanes] for name, x in cut(coordinates, 2).items()}
+    at_lane = {name: np.asarray(x)[..., lanes] for name, x in cut(coordinates, 2).items()}
     system = with_fields(motion.model.system, outputs=(), forces=at_lanes(motion.forces, lanes))
     equations = Equations(system, masses_of(mechanism), gravity_of(mechanism), 1.0, pose_type)
-    place = Place(mechanism, motion.model, equations, found, clock_at(float(motion.time[lane]), held=False))
-    left = place.free.T @ place.loads.sum(axis=0)
-    if not np.abs(left).max(initial=0.0) <= 1e3 * BALANCED * max(np.abs(place.loads).max(initial=0.0), 1e-300):
-        message = f"does not follow from the forces: {remains(Found(place, left, False))} remains unbalanced"
+    point = OperatingPoint(
+        mechanism, motion.model, equations, at_lane, clock_at(float(motion.time[lane]), stopped=False)
+    )
+    left = point.free.T @ point.loads.sum(axis=0)
+    if not np.abs(left).max(initial=0.0) <= 1e3 * BALANCED * max(np.abs(point.loads).max(initial=0.0), 1e-300):
+        message = f"does not follow from the forces: {remains(SearchResult(point, left, False))} remains unbalanced"
         raise MechanismError(message, name="motion", value=motion)
-    return place
+    return point
 
 
 def _at(motion: Motion, time: Any) -> tuple[Motion, int]:
@@ -174,31 +176,31 @@ def _at(motion: Motion, time: Any) -> tuple[Motion, int]:
     return motion, lane
 
 
-def _check_free(place: Place, about: Equilibrium | None, released: Sequence[str]) -> None:
+def _check_free(point: OperatingPoint, about: Equilibrium | None, released: Sequence[str]) -> None:
     """Raise MobilityError where nothing can move, or more than the constraints allow elsewhere."""
     if about is not None and about.singular:
         raise MobilityError(f"there are no linear equations of motion: {about.reason}")
-    if not place.free.shape[1] and not released:
-        drivers = ", ".join(place.mechanism.drivers)
+    if not point.free.shape[1] and not released:
+        drivers = ", ".join(point.mechanism.drivers)
         advice = f"leave a driver out of the equilibrium, or release it ({drivers})" if drivers else "free a joint"
         raise MobilityError(f"no degree of freedom: joints and drivers hold all bodies, nothing can move; {advice}")
 
 
 def _check(reduction: Reduction) -> None:
     """Raise MechanismError where a body that can move has no mass, or a force is not smooth."""
-    place, mass = reduction.place, reduction.part(2)
+    point, mass = reduction.point, reduction.part(2)
     even = np.sqrt(np.maximum(np.diag(reduction.noise(2)), 1e-300))
     values, vectors = np.linalg.eigh((mass + mass.T) / 2 / np.outer(even, even))
     if values[0] <= 1e-12 * values[-1]:
         moving = (reduction.basis / even) @ vectors[:, 0]
-        shares = np.abs(moving).reshape(len(place.model.bodies), -1)
+        shares = np.abs(moving).reshape(len(point.model.bodies), -1)
         lacking = [
-            k for k, body in enumerate(place.mechanism.bodies.values()) if body.mass is None or body.inertia is None
+            k for k, body in enumerate(point.mechanism.bodies.values()) if body.mass is None or body.inertia is None
         ]
         chosen = max(lacking or range(len(shares)), key=lambda k: shares[k].max())
-        body = place.model.bodies[chosen]
-        lacks = "mass" if place.mechanism.bodies[body].mass is None else "inertia"
-        moved = freely_moving(place.model, moving[None])
+        body = point.model.bodies[chosen]
+        lacks = "mass" if point.mechanism.bodies[body].mass is None else "inertia"
+        moved = freely_moving(point.model, moving[None])
         message = f"{moved} can move without moving a mass, so its acceleration is not determined; give it a mass"
         raise MechanismError(message, name=f"bodies.{body}.{lacks}")
     if names := kinked(reduction):

@@ -60,7 +60,7 @@ class Pieces(NamedTuple):
         s; lengths are negative backward in time.
     state : State
         At the start of each, (steps, components, bodies).
-    kept : array of bool, shape (steps, order + 1)
+    used : array of bool, shape (steps, order + 1)
         Which coefficients of the series are used.
     kinks : Kinks, optional
         Where there are some.
@@ -69,15 +69,15 @@ class Pieces(NamedTuple):
     start: Float[np.ndarray, " step"]
     length: Float[np.ndarray, " step"]
     state: State
-    kept: Bool[np.ndarray, "step order"]
+    used: Bool[np.ndarray, "step order"]
     kinks: Kinks | None = None
 
     def at(self, instants: Float[np.ndarray, " time"]) -> Int[np.ndarray, " time"]:
         """Return in which of them instants are."""
         sign = -1.0 if self.length[0] < 0 else 1.0
         begins = self.start if self.kinks is None else self.kinks.begins
-        found = np.searchsorted(sign * begins, sign * instants, "right") - 1
-        return np.clip(found, 0, len(self.start) - 1)
+        index = np.searchsorted(sign * begins, sign * instants, "right") - 1
+        return np.clip(index, 0, len(self.start) - 1)
 
     def padded(self) -> "Pieces":
         """Return as many as a power of two, the last again and again with no length: few lengths are compiled."""
@@ -97,17 +97,17 @@ class Pieces(NamedTuple):
         """
         if not kinks:
             return self
-        places = np.array(sorted(kinks))
-        before, first = np.isin(np.arange(len(self.start)), places), np.isin(np.arange(len(self.start)), places + 1)
+        indices = np.array(sorted(kinks))
+        before, first = np.isin(np.arange(len(self.start)), indices), np.isin(np.arange(len(self.start)), indices + 1)
         which = np.repeat(np.arange(len(self.start)), np.where(first, 1 + ROUNDS, 1))
         back = np.append(which[1:] == which[:-1], False)
         length, begins = self.length.copy(), self.start.copy()
         remaining, weights = np.zeros(len(length)), [np.zeros(part.shape) for part in self.state[2:]]
-        for place, kink in kinks.items():
-            remaining[place + 1], length[place] = length[place] - kink.since, kink.since
-            begins[place + 1] = self.start[place] + kink.since
-            weights[0][place + 1], weights[1][place + 1] = kink.velocity, kink.spin
-        whole = self._replace(length=length, kept=self.kept | (before | first)[:, None]).chosen(which)
+        for index, kink in kinks.items():
+            remaining[index + 1], length[index] = length[index] - kink.since, kink.since
+            begins[index + 1] = self.start[index] + kink.since
+            weights[0][index + 1], weights[1][index + 1] = kink.velocity, kink.spin
+        whole = self._replace(length=length, used=self.used | (before | first)[:, None]).chosen(which)
         over = Kinks(begins[which], back, *(part[which] for part in weights))
         return whole._replace(length=np.where(back, -remaining[which], whole.length), kinks=over)
 
@@ -149,24 +149,24 @@ def divided_steps(
     leaves = jax.tree.leaves(equations)
     along, turns = _directions([leaves[k] for k in moving])
     settings = {"moving": tuple(moving), "order": order, "expand": expand}
-    kept, span = _kept(dense), abs(dense.end - float(dense.start[0]))
+    used, duration = _used_coefficients(dense), abs(dense.end - float(dense.start[0]))
     count = np.ones(len(dense.start), int)
     while True:
-        found, which = _parts(dense, kept, count)
+        pieces, which = _parts(dense, used, count)
         over = {int(np.searchsorted(which, kink.step)): kink for kink in kinks}
         if allowed is None:
-            return found
-        sizes = _sizes(equations, found.padded(), along, turns, np.asarray(length), **settings)
-        sizes = np.stack(sizes)[..., : len(found.start)]
-        lacking = which[_needed(sizes, found, span, allowed) > 1]
+            return pieces
+        sizes = _sizes(equations, pieces.padded(), along, turns, np.asarray(length), **settings)
+        sizes = np.stack(sizes)[..., : len(pieces.start)]
+        lacking = which[_needed(sizes, pieces, duration, allowed) > 1]
         lacking = lacking[~np.isin(lacking, [kink.step for kink in kinks])]
         if not lacking.size:
-            return found.over(over)
-        if not kept[lacking].all():  # a body that hardly moves took a long step of low order: first with all orders
-            kept[lacking] = True
+            return pieces.over(over)
+        if not used[lacking].all():  # a body that hardly moves took a long step of low order: first with all orders
+            used[lacking] = True
             continue
         parts = count.copy()
-        needed = np.where(np.isin(which, lacking), _needed(sizes, found, span, allowed / FINER), 1)
+        needed = np.where(np.isin(which, lacking), _needed(sizes, pieces, duration, allowed / FINER), 1)
         np.maximum.at(parts, which, count[which] * needed)
         if parts.sum() > MOST_STEPS:
             message = f"changes of this motion are so fast that more than {MOST_STEPS} steps are needed; simulate less"
@@ -174,7 +174,7 @@ def divided_steps(
         count = parts
 
 
-def _kept(dense: DenseOutput) -> Bool[np.ndarray, "step order"]:
+def _used_coefficients(dense: DenseOutput) -> Bool[np.ndarray, "step order"]:
     """Return which coefficients steps were taken with: all, where the series ended before it could be cut."""
     used = np.any([np.any(np.asarray(part) != 0, axis=tuple(range(2, part.ndim))) for part in dense.polynomial], axis=0)
     orders = np.arange(used.shape[1])
@@ -183,7 +183,7 @@ def _kept(dense: DenseOutput) -> Bool[np.ndarray, "step order"]:
 
 
 def _parts(
-    dense: DenseOutput, kept: Bool[np.ndarray, "step order"], count: Int[np.ndarray, " step"]
+    dense: DenseOutput, used: Bool[np.ndarray, "step order"], count: Int[np.ndarray, " step"]
 ) -> tuple[Pieces, Int[np.ndarray, " part"]]:
     """Return the parts that steps have, and of which step each is."""
     which = np.repeat(np.arange(len(count)), count)
@@ -191,31 +191,31 @@ def _parts(
     length = np.asarray(dense.length)[which] / count[which]
     polynomial = dense.polynomial.map(lambda c: np.moveaxis(np.asarray(c)[which], (0, 1), (-1, 0)))
     state = evaluated(polynomial, part * length).map(lambda x: np.moveaxis(np.asarray(x), -1, 0))
-    return Pieces(np.asarray(dense.start)[which] + part * length, length, state, kept[which]), which
+    return Pieces(np.asarray(dense.start)[which] + part * length, length, state, used[which]), which
 
 
 def _needed(
-    sizes: Float[np.ndarray, "part order direction step"], pieces: Pieces, span: float, allowed: float
+    sizes: Float[np.ndarray, "part order direction step"], pieces: Pieces, duration: float, allowed: float
 ) -> Int[np.ndarray, " step"]:
     """Return into how many parts, powers of two, steps are to be divided.
 
     What is left out of a series is what follows the orders that are kept: the sizes known of it, or, where all are
     kept, as much less than the last two terms as those are less than the two before. It counts by the largest change,
-    that of velocities over the whole span.
+    that of velocities over the whole duration.
     """
-    places, velocities = sizes
-    orders = np.arange(len(places))[:, None, None]
-    beyond, whole = ~pieces.kept.T[:, None], pieces.kept.all(axis=1)
-    found = np.full(len(pieces.length), 2**HALVINGS)
+    positions, velocities = sizes
+    orders = np.arange(len(positions))[:, None, None]
+    beyond, whole = ~pieces.used.T[:, None], pieces.used.all(axis=1)
+    counts = np.full(len(pieces.length), 2**HALVINGS)
     for parts in 2 ** np.arange(HALVINGS)[::-1]:
         powers = (np.abs(pieces.length) / parts) ** orders
-        terms = places * powers
-        largest = np.maximum(terms, span * velocities * powers).max(axis=0)
+        terms = positions * powers
+        largest = np.maximum(terms, duration * velocities * powers).max(axis=0)
         last, before = terms[-2:].max(axis=0), terms[-4:-2].max(axis=0)
         following = last * np.minimum(last / np.maximum(before, 1e-300), 1.0)
         left_out = np.where(whole, following, np.where(beyond, terms, 0.0).max(axis=0))
-        found[(left_out <= allowed * largest).all(axis=0)] = parts
-    return found
+        counts[(left_out <= allowed * largest).all(axis=0)] = parts
+    return counts
 
 
 def _directions(numbers: Sequence[Any]) -> tuple[list[np.ndarray], np.ndarray]:
@@ -251,8 +251,8 @@ def _sizes(
         whole = list(leaves)
         for k, number in zip(moving, numbers, strict=True):
             whole[k] = number
-        found = expand(jax.tree.unflatten(structure, whole), state, pieces.start[None], order)
-        scaled = found._replace(position=found.position / length, velocity=found.velocity / length)
+        expansion = expand(jax.tree.unflatten(structure, whole), state, pieces.start[None], order)
+        scaled = expansion._replace(position=expansion.position / length, velocity=expansion.velocity / length)
         flat = scaled.map(lambda part: part.reshape(order + 1, -1, len(pieces.start)))
         return jnp.concatenate(flat[:2], axis=1), jnp.concatenate(flat[2:], axis=1)
 

@@ -34,12 +34,12 @@ def shifted(series: State, step: Any = 0.0, count: int = KINKED) -> State:
 
     def part(c: Any) -> Any:
         padded = jnp.concatenate([c, jnp.zeros((count, *c.shape[1:]))])
-        found = []
+        shifted_breaks = []
         for level in range(count):
             weights = np.array([math.comb(level + k, level) for k in range(len(c))], float)
             terms = padded[level : level + len(c)] * weights[:, None, None, None]
-            found.append(evaluated(State(terms, terms, terms, terms), jnp.broadcast_to(step, (1,))).position)
-        return jnp.stack(found)
+            shifted_breaks.append(evaluated(State(terms, terms, terms, terms), jnp.broadcast_to(step, (1,))).position)
+        return jnp.stack(shifted_breaks)
 
     return series.map(part)
 

@@ -101,22 +101,22 @@ class JointEventDetector:
         def chunk(lanes: np.ndarray) -> Any:
             return _at_samples(self._function, *(x[..., lanes] for x in given))
 
-        found = in_chunks(chunk, time.size, WIDTHS)
-        return np.asarray(found).reshape(time.shape)
+        values = in_chunks(chunk, time.size, WIDTHS)
+        return np.asarray(values).reshape(time.shape)
 
     def detect(self, steps: RobotSteps) -> list[tuple[int, float]]:
         """Return the crossings in the next steps, each as the number of the step and the time from its beginning."""
-        values, found = self._values(steps) - self.event.value, []
+        values, roots = self._values(steps) - self.event.value, []
         for k, coefficients in enumerate(values @ INTERPOLATION.T):
-            for root, sense in crossings(coefficients, first=k == 0 and not self._begun):
+            for root, direction in crossings(coefficients, first=k == 0 and not self._begun):
                 length = steps.length[k]
-                after, rising = float(root * length), float(sense * np.sign(length))
+                after, rising = float(root * length), float(direction * np.sign(length))
                 again = self._last[1] == rising and abs(steps.start[k] + after - self._last[0]) < 2 * EDGE * abs(length)
                 self._last = float(steps.start[k] + after), rising
                 if not again and self.event.direction * rising >= 0:
-                    found.append((k, after))
+                    roots.append((k, after))
         self._begun = True
-        return found
+        return roots
 
 
 @jax.jit
@@ -128,7 +128,7 @@ def _at_samples(function: OfSample | None, time: Any, q: Any, rates: Any) -> Any
 
 def _at(coefficients: np.ndarray, since: np.ndarray, derivative: int) -> np.ndarray:
     """Return values of a derivative of polynomials, (steps, order + 1), at times from their beginnings."""
-    found = np.zeros_like(since)
+    values = np.zeros_like(since)
     for k in range(coefficients.shape[1] - 1, derivative - 1, -1):
-        found = found * since + (coefficients[:, k] * math.perm(k, derivative))[:, None]
-    return found
+        values = values * since + (coefficients[:, k] * math.perm(k, derivative))[:, None]
+    return values

@@ -135,7 +135,7 @@ def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) 
     angles = measured(equations, state)
     equations = equations.near(angles)
     inverse = inverted(equations.factored(state, time[None]))
-    expansion = _kept(expand(equations, state, time[None], order, inverse))
+    expansion = _without_unused(expand(equations, state, time[None], order, inverse))
     outcome = jnp.where(_finite(expansion), int(Outcome.RUNNING), int(Outcome.LOST))
     none, nothing = jnp.full(time.shape, -1), jnp.zeros(time.shape)
     known = mobility_of(equations, inverse), near_singular(equations, inverse)
@@ -195,7 +195,7 @@ def march(
     length = equations.system.column_scale[0]
     order, bodies = len(current.expansion.state.position) - 1, current.expansion.state.position.shape[2]
     here = current.expansion.state.map(lambda part: part[0])
-    keeps = method.controlled and is_balanced(equations, here, current.time[None])
+    checked = method.controlled and is_balanced(equations, here, current.time[None])
 
     def attempt(current: IntegratorState) -> tuple[IntegratorState, tuple[DenseOutput, Any]]:
         left = stop - current.time - current.rest
@@ -205,9 +205,9 @@ def march(
         step = wished * REFUSED ** current.refused.astype(float)
         look = Lookahead(jnp.sign(left) * step, jnp.ones(step.shape, bool), jnp.full(step.shape, -1), current.blocked)
         angles = followed(equations, current.angles, start.state, look.step)
-        span = jnp.abs(stop - current.begun)
+        duration = jnp.abs(stop - current.begun)
         if method.controlled:
-            limits = span, allowed, finest(span, current.time, current.crossing + current.refused)
+            limits = duration, allowed, finest(duration, current.time, current.crossing + current.refused)
             look = look_ahead(equations, start.state, angles, current.mobility, current.time, look.step, *limits)
         suspect = (look.kink >= 0) & (jnp.abs(look.step) < step) | (current.refused >= STUBBORN)
         step = jnp.abs(look.step)
@@ -224,19 +224,19 @@ def march(
         arrived = method.arrive(there, start, current.time, step)
         state, distance, inverse = projected(there, arrived, time[None])
         state = jax.tree.map(lambda a, b: jnp.where(opening, a, b), arrived, state)  # it is on the constraints already
-        expansion = _kept(expand(there, state, time[None], order, inverse))
+        expansion = _without_unused(expand(there, state, time[None], order, inverse))
         error = method.error(start, expansion, step, length)
         good = _finite(expansion) & jnp.isfinite(distance) & (error <= MARGIN * allowed) & running & look.resolved
         if method.controlled:
             kick = 0.5 * order * (order + 1) * error
-            good = good & ~(suspect & _lasting(kick, step, span, MARGIN * allowed, current))
+            good = good & ~(suspect & _lasting(kick, step, duration, MARGIN * allowed, current))
         balanced, balance = jnp.ones(step.shape, bool), current.balance
-        if keeps:
-            found = energies(there, state, time[None])
+        if checked:
+            energies_there = energies(there, state, time[None])
             kick = MARGIN * allowed * order / jnp.maximum(wished, 1e-300)
             leeway = kick * length * jnp.sqrt(equations.scale * bodies)
-            balance, balanced = follow_balance(current.balance, found, leeway)
-            balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), begun(found), balance)
+            balance, balanced = follow_balance(current.balance, energies_there, leeway)
+            balance = jax.tree.map(lambda a, b: jnp.where(opening, a, b), begun(energies_there), balance)
             good = good & balanced
         tiny = jnp.abs(step) < SMALLEST_STEP * jnp.maximum(jnp.abs(current.time), jnp.abs(stop - current.time))
         polynomial = method.polynomial(start, expansion, step)
@@ -250,10 +250,10 @@ def march(
         drift = jnp.where(opening, current.drift, jnp.maximum(current.drift, distance))
         known = mobility_of(equations, inverse), near_singular(equations, inverse)
         fresh, reached = jnp.zeros_like(current.refused), measured(there, state)
-        farthest = jnp.where(reach > longest, jnp.minimum(jnp.minimum(reach, longest / SHORT), span), jnp.abs(step))
+        farthest = jnp.where(reach > longest, jnp.minimum(jnp.minimum(reach, longest / SHORT), duration), jnp.abs(step))
         farthest = jnp.maximum(current.longest, farthest)
-        crossing = steps_counted(current.crossing, step, span, look.kink >= 0)
-        short = steps_counted(current.short, step, span)
+        crossing = steps_counted(current.crossing, step, duration, look.kink >= 0)
+        short = steps_counted(current.short, step, duration)
         balance = balance._replace(broken=balance.broken & (short > 0))
         reaching = time, rest, expansion, fresh, outcome, drift, current.begun
         ahead = jnp.where(look.limiting >= 0, look.limiting, current.blocked)
@@ -269,14 +269,14 @@ def march(
         return jnp.any(jnp.isin(current.outcome, MOVING)) & (tried < count)
 
     def iterate(carry: Any) -> Any:
-        current, kept, tried = carry
+        current, previous, tried = carry
         current, steps = attempt(current)
         if keep:
-            kept = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), kept, steps)
-        return current, kept, tried + 1
+            previous = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), previous, steps)
+        return current, previous, tried + 1
 
-    kept = _blank(method, current, count) if keep else None
-    start = (current, kept, 0)
+    previous = _blank(method, current, count) if keep else None
+    start = (current, previous, 0)
     return jax.lax.while_loop(unfinished, iterate, start)
 
 
@@ -290,18 +290,18 @@ def _blank(
     return jax.tree.map(lambda part: jnp.zeros((count, *part.shape), part.dtype), room)
 
 
-def _lasting(kick: Lanes, step: Lanes, span: Lanes, bound: Lanes, current: IntegratorState) -> Flags:
+def _lasting(kick: Lanes, step: Lanes, duration: Lanes, bound: Lanes, current: IntegratorState) -> Flags:
     """Tell where a kink at the beginning of a step kicks bodies so that they move by more than is harmless in the run.
 
     What is left of it in the accelerations at the end is no next term of a series there: `kick` is the displacement
     within the step of accelerations that are wrong all along it.
     """
-    span = jnp.maximum(span, jnp.abs(step))
-    moved = kick * span / jnp.maximum(jnp.abs(step), SHORTEST * span)
-    return (moved > jnp.maximum(bound, HARMLESS)) & (jnp.abs(step) > SHORTEST * span) & ~current.singular
+    duration = jnp.maximum(duration, jnp.abs(step))
+    moved = kick * duration / jnp.maximum(jnp.abs(step), SHORTEST * duration)
+    return (moved > jnp.maximum(bound, HARMLESS)) & (jnp.abs(step) > SHORTEST * duration) & ~current.singular
 
 
-def _kept(expansion: Expansion) -> Expansion:
+def _without_unused(expansion: Expansion) -> Expansion:
     """Return an expansion without what steps do not need."""
     return expansion._replace(acceleration=expansion.acceleration[:1], multipliers=expansion.multipliers[:1])
 

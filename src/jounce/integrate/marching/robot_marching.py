@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.execution.compilation import compiled
 from jounce.integrate.marching.marching import SHORT as UNUSUAL, Outcome
-from jounce.integrate.steps.lookahead import HARMLESS, NEAR, POINTS, SHORTEST, SPAN_POINTS, finest, steps_counted
+from jounce.integrate.steps.lookahead import HARMLESS, NEAR, POINTS, RUN_POINTS, SHORTEST, finest, steps_counted
 from jounce.integrate.steps.methods import MARGIN, NEEDED, ROUNDING, Lanes, furthest
 from jounce.jet.series import Recursion
 from jounce.modules import Module
@@ -111,10 +111,10 @@ class RobotProblem(Module):
             return start.at[0].set(recursion.outputs)
 
         def level(k: Any, carry: Any) -> Any:
-            history, found = carry
+            history, coefficients = carry
             ticks = jnp.where(k == 1, jnp.ones_like(time), jnp.zeros_like(time))
             newest, history = recursion.advanced(history, k, (ticks,))
-            return history, jax.lax.dynamic_update_index_in_dim(found, newest, k, 0)
+            return history, jax.lax.dynamic_update_index_in_dim(coefficients, newest, k, 0)
 
         first = recursion.history, start.at[0].set(recursion.outputs)
         return jax.lax.fori_loop(1, order + 1, level, first)[1]
@@ -122,9 +122,9 @@ class RobotProblem(Module):
     def _prescribed_accelerations(self, state: RobotState, time: Any, order: int) -> Any:
         if not self.prescribed.changing:
             return jnp.zeros((order + 1, *state.coordinates.shape))
-        places = self.prescribed_series(state.coordinates, time, order + 2)
+        coordinates = self.prescribed_series(state.coordinates, time, order + 2)
         numbers = jnp.arange(1.0, order + 2)
-        return places[2:] * (numbers * (numbers + 1.0))[:, None, None]
+        return coordinates[2:] * (numbers * (numbers + 1.0))[:, None, None]
 
     def departures(self, state: RobotState, rates: RobotState, time: Any) -> tuple[Any, Any]:
         """Return by how much the equations give other accelerations than a path, and how large those are, in its sizes.
@@ -221,14 +221,14 @@ def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:
     levels = len(polynomial.rates)
     numbers = jnp.arange(1.0, levels + 1)[:, None]
     scale = jnp.asarray(problem.scale)[None, :, None]
-    found = jnp.max(jnp.abs(polynomial.rates) / scale, axis=1, initial=0.0) / numbers
+    sizes = jnp.max(jnp.abs(polynomial.rates) / scale, axis=1, initial=0.0) / numbers
     if polynomial.position is None:
-        return found
+        return sizes
     moved = jnp.max(jnp.abs(polynomial.position[1:]), axis=1) / problem.length
     turned = 2.0 * jnp.max(jnp.abs(polynomial.quaternion[1:]), axis=1)
     twist = jnp.max(jnp.abs(polynomial.twist[:, 3:]), axis=1) / numbers
-    found = jnp.maximum(found, twist)
-    return jnp.concatenate([jnp.maximum(found[:-1], jnp.maximum(moved, turned)), found[-1:]])
+    sizes = jnp.maximum(sizes, twist)
+    return jnp.concatenate([jnp.maximum(sizes[:-1], jnp.maximum(moved, turned)), sizes[-1:]])
 
 
 @compiled("order", "count")
@@ -270,7 +270,7 @@ def march_robot(
     taken : int
         How many there are.
     """
-    span = jnp.abs(stop - begun)
+    duration = jnp.abs(stop - begun)
 
     def look(polynomial: RobotState, time: Any, step: Any, first: Any, usual: Any) -> tuple[Any, Any]:
         """Return the error that a part of the places on a step shows, as part of what is allowed, and if it is finite.
@@ -278,8 +278,8 @@ def march_robot(
         A velocity that is wrong goes on to the end of the run, so that jumps count by what they move until then. What
         the equations miss at the beginning, where the series follows from them, is rounding.
         """
-        places = jnp.maximum(_places(step), POINTS)
-        shares = jnp.concatenate([jnp.zeros(1), (first + jnp.arange(1.0, POINTS + 1)) / places])
+        point_count = jnp.maximum(_point_count(step), POINTS)
+        shares = jnp.concatenate([jnp.zeros(1), (first + jnp.arange(1.0, POINTS + 1)) / point_count])
         since = jnp.minimum(shares, 1.0) * step
         state, rates = at(polynomial, since), rates_at(polynomial, since)
         gap, size = problem.departures(state, rates, (time + since)[None])
@@ -287,11 +287,11 @@ def march_robot(
         largest = jnp.maximum(jnp.max(jnp.abs(gap[:, 1:])) - rounding, 0.0)
         local = largest * step**2 / (order * (order + 1.0)) / (MARGIN * tolerance)
         harmless = jnp.clip(UNSEEN * jnp.abs(step) / (STEEP * usual), HARMLESS, UNSEEN)
-        lasting = largest * jnp.abs(step) * span / jnp.maximum(tolerance, harmless)
+        lasting = largest * jnp.abs(step) * duration / jnp.maximum(tolerance, harmless)
         return jnp.maximum(local, lasting), jnp.all(jnp.isfinite(gap))
 
-    def _places(step: Any) -> Any:
-        return float(POINTS) if problem.blind else jnp.maximum(SPAN_POINTS * jnp.abs(step) / span, POINTS)
+    def _point_count(step: Any) -> Any:
+        return float(POINTS) if problem.blind else jnp.maximum(RUN_POINTS * jnp.abs(step) / duration, POINTS)
 
     def fits(polynomial: RobotState, time: Any, step: Any, usual: Any) -> tuple[Any, Any, Any]:
         """Tell whether a step keeps to the equations all along, whether it is finite, and whether it leads over a jump.
@@ -301,15 +301,15 @@ def march_robot(
 
         def further(carry: Any) -> Any:
             first, error, finite = carry
-            found, fine = look(polynomial, time, step, first, usual)
-            return first + POINTS, jnp.maximum(error, found), finite & fine
+            crossed, fine = look(polynomial, time, step, first, usual)
+            return first + POINTS, jnp.maximum(error, crossed), finite & fine
 
         def open_(carry: Any) -> Any:
             first, error, finite = carry
-            return (first < _places(step)) & finite & (error <= 1.0)
+            return (first < _point_count(step)) & finite & (error <= 1.0)
 
         _, error, finite = jax.lax.while_loop(open_, further, (jnp.zeros(()), jnp.zeros(()), jnp.ones((), bool)))
-        return finite & (error <= 1.0), finite, (error > 0.0) & (jnp.abs(step) <= SHORTEST * span)
+        return finite & (error <= 1.0), finite, (error > 0.0) & (jnp.abs(step) <= SHORTEST * duration)
 
     def attempt(current: Progress) -> tuple[Progress, Any, Any]:
         time, left = current.time, stop - current.time[0] - current.rest[0]
@@ -317,17 +317,17 @@ def march_robot(
         sizes = _sizes(problem, whole)
         known = jnp.all(jnp.isfinite(sizes[:NEEDED]))
         sizes = jnp.where(jnp.isfinite(sizes), sizes, jnp.inf)
-        kept, reach = furthest(sizes, jnp.full(time.shape, tolerance), UNUSUAL * current.longest)
-        polynomial = jax.tree.map(lambda c: jnp.where(kept[: len(c), None], c, 0.0), whole)
+        used, reach = furthest(sizes, jnp.full(time.shape, tolerance), UNUSUAL * current.longest)
+        polynomial = jax.tree.map(lambda c: jnp.where(used[: len(c), None], c, 0.0), whole)
         step = jnp.minimum(jnp.minimum(reach[0], longest), jnp.abs(left))
         step = jnp.where(step >= 0.999 * jnp.abs(left), jnp.abs(left), step)
-        shortest, wished = finest(span, time, current.crossing)[0], step
-        sense, usual = jnp.sign(left), jnp.maximum(current.longest[0], step)
+        shortest, wished = finest(duration, time, current.crossing)[0], step
+        direction, usual = jnp.sign(left), jnp.maximum(current.longest[0], step)
 
         def narrowed(carry: Any) -> Any:
             low, high, over = carry
             step = jnp.where(low > 0, 0.5 * (low + high), 0.5 * high)
-            good, finite, jump = fits(polynomial, time[0], sense * step, usual)
+            good, finite, jump = fits(polynomial, time[0], direction * step, usual)
             taken = good | ((step <= shortest) & finite)
             return jnp.where(taken, step, low), jnp.where(taken, high, step), jnp.where(taken, jump, over)
 
@@ -336,16 +336,16 @@ def march_robot(
             nearer = (high - low > NEAR * low) & (low < STEEP * usual)  # to a jump; what is only steep is seen better
             return jnp.where(low > 0, (low < high) & nearer, high > 0.25 * shortest)
 
-        good, _, over = fits(polynomial, time[0], sense * step, usual)
+        good, _, over = fits(polynomial, time[0], direction * step, usual)
         low, _, over = jax.lax.while_loop(open_, narrowed, (jnp.where(good, step, 0.0), step, over))
         step = jnp.where(low > 0, low, shortest)
         last = step >= jnp.abs(left)
-        arrived = at(polynomial, sense * step[None])
-        since = sense * step + current.rest[0]
+        arrived = at(polynomial, direction * step[None])
+        since = direction * step + current.rest[0]
         onwards = jnp.where(last, stop, time[0] + since)
         rest = jnp.where(last, 0.0, since - (onwards - time[0]))
         short = (step < SHORT * wished) & ~last
-        stuck = steps_counted(current.stuck, step, span)
+        stuck = steps_counted(current.stuck, step, duration)
         moves = known & (low > 0) & (stuck < STUCK)
         again = (
             known & (low == 0.0) & (stuck < STUCK) & (current.crossing < AGAIN)
@@ -353,25 +353,25 @@ def march_robot(
         outcome = jnp.where(last, int(Outcome.ARRIVED), int(Outcome.RUNNING))
         failed = jnp.where(again, int(Outcome.RUNNING), jnp.where(known, int(Outcome.COLLAPSED), int(Outcome.LOST)))
         outcome = jnp.where(moves, outcome, failed)
-        crossing = steps_counted(current.crossing, step, span, over | (low == 0.0))
+        crossing = steps_counted(current.crossing, step, duration, over | (low == 0.0))
         longest_so_far = jnp.maximum(current.longest, step)
         after = Progress(onwards[None], arrived, outcome, stuck, crossing, rest[None], longest_so_far)
-        steps = RobotSteps(time[0], sense * step, jax.tree.map(lambda c: c[..., 0], polynomial), short | over)
+        steps = RobotSteps(time[0], direction * step, jax.tree.map(lambda c: c[..., 0], polynomial), short | over)
         stay = current._replace(outcome=outcome, crossing=crossing)
         return jax.tree.map(lambda a, b: jnp.where(moves, a, b), after, stay), steps, moves
 
     def iterate(carry: Any) -> Any:
-        current, kept, taken = carry
+        current, used, taken = carry
         current, steps, moves = attempt(current)
-        kept = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, taken, 0), kept, steps)
-        return current, kept, taken + moves.astype(int)
+        used = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, taken, 0), used, steps)
+        return current, used, taken + moves.astype(int)
 
     def unfinished(carry: Any) -> Any:
         current, _, taken = carry
         return (current.outcome == int(Outcome.RUNNING)) & (taken < count)
 
     room = jax.tree.map(lambda x: jnp.zeros((count, order + 2, x.shape[0])), current.state)
-    kept = RobotSteps(jnp.zeros(count), jnp.zeros(count), room, jnp.zeros(count, bool))
+    used = RobotSteps(jnp.zeros(count), jnp.zeros(count), room, jnp.zeros(count, bool))
 
     # one piece of machine code, as of mechanisms, has been seen to abort XLA here, and gains nothing at this size
-    return jax.lax.while_loop(unfinished, iterate, (current, kept, jnp.zeros((), int)))
+    return jax.lax.while_loop(unfinished, iterate, (current, used, jnp.zeros((), int)))

@@ -62,7 +62,7 @@ def breaks(dense: DenseOutput, length: float) -> list[Break]:
     """
     velocity, spin = (np.asarray(part) for part in dense.polynomial[2:])
     parts = [(velocity / length).reshape(*velocity.shape[:2], -1), spin.reshape(*spin.shape[:2], -1)]
-    series, found = np.concatenate(parts, axis=2), []
+    series, breaks_found = np.concatenate(parts, axis=2), []
     if series.shape[1] <= LAST:
         return []
     largest = [float(np.nanmax(np.abs(series[:, k]), initial=0.0)) for k in range(3)]
@@ -72,8 +72,8 @@ def breaks(dense: DenseOutput, length: float) -> list[Break]:
         if order:
             weights = weight[: parts[0].shape[2]] / length, weight[parts[0].shape[2] :]
             shaped = (w.reshape(part.shape[2:]) for w, part in zip(weights, (velocity, spin), strict=True))
-            found.append(Break(step, order, since, *shaped))
-    return found
+            breaks_found.append(Break(step, order, since, *shaped))
+    return breaks_found
 
 
 def _bent(

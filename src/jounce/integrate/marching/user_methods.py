@@ -71,10 +71,10 @@ def integrator(method: AbstractMethod, equations: Equations, current: Integrator
     def whole(*given: Any) -> Any:
         method, equations, current = jax.tree.unflatten(tree, given)
         step, length = jnp.ones(current.time.shape), equations.system.column_scale[0]
-        start, *told = method.prepared(current.expansion, length, jnp.ones(()), current.singular, step)
+        start, *prepared = method.prepared(current.expansion, length, jnp.ones(()), current.singular, step)
         arrived = method.arrive(equations, start, current.time, step)
         ends = method.polynomial(start, current.expansion, step), method.error(start, current.expansion, step, length)
-        return jax.tree.leaves((start, told, arrived, ends))
+        return jax.tree.leaves((start, prepared, arrived, ends))
 
     try:
         key = value_key(read_off(whole, *leaves).traced)

@@ -21,7 +21,7 @@ from jounce.integrate.results.simulation import expanded
 from jounce.integrate.steps.events import pose_coordinates
 from jounce.integrate.steps.methods import AbstractMethod
 from jounce.integrate.steps.options import checked_options, instants_of
-from jounce.integrate.steps.revolution_counts import PLACES, attitudes_at
+from jounce.integrate.steps.revolution_counts import POINTS_IN_STEP, attitudes_at
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, whole_periods
 from jounce.kinematics import Status
@@ -172,7 +172,7 @@ class _Runs:
         self.steps = np.zeros(len(rows), int)
         self._made = parametric.of(rows)
         self._reached = np.zeros((len(rows), len(instants)), bool)
-        self._sense = 1.0 if instants[-1] >= instants[0] else -1.0
+        self._direction = 1.0 if instants[-1] >= instants[0] else -1.0
         lost = max((output.lost_orders for output in parametric.mechanism.outputs.values()), default=0)
         self._expansion = max(order + max(lost, 1), 2)  # turns of angles are counted by two derivatives
         self._current: Any = None
@@ -203,12 +203,12 @@ class _Runs:
     @property
     def outputs(self) -> dict[str, np.ndarray]:
         """See `Batch`."""
-        found = {}
+        values_by_name = {}
         for which, values in self._values.items():
             for k, name in enumerate(self.parametric.model.outputs[which]):
                 plain = np.moveaxis(np.asarray(plain_derivatives(np.moveaxis(values[..., k], 2, 0))), 0, 2)
-                found[name] = plain[..., 0] if plain.shape[-1] == 1 else plain
-        return {name: found[name] for name in self.parametric.mechanism.outputs if name in found}
+                values_by_name[name] = plain[..., 0] if plain.shape[-1] == 1 else plain
+        return {name: values_by_name[name] for name in self.parametric.mechanism.outputs if name in values_by_name}
 
     def lots(self, runs: np.ndarray) -> list[np.ndarray]:
         """Return runs in lots of one size; the last repeats its last run."""
@@ -241,13 +241,13 @@ class _Runs:
         tolerance, longest, method = self.settings
         current = jax.tree.map(lambda x: x[..., runs], self._current)
         method = integrator(method, equations, current)
-        found = march(equations, current, self.instants[-1], tolerance, longest, method=method, count=STEPS)
-        current, (steps, taken), tried = jax.tree.map(np.asarray, found)
+        marched = march(equations, current, self.instants[-1], tolerance, longest, method=method, count=STEPS)
+        current, (steps, taken), tried = jax.tree.map(np.asarray, marched)
         self._put(runs, current)
         self.steps[runs] += taken.sum(axis=0)
         angles = self._counted(runs, steps, int(tried))
-        begin, now = self._sense * steps.start, self._sense * self.instants
-        end = self._sense * current.time + 1e-14 * np.abs(current.time)
+        begin, now = self._direction * steps.start, self._direction * self.instants
+        end = self._direction * current.time + 1e-14 * np.abs(current.time)
         near = np.flatnonzero((now >= begin[0].min()) & (now <= end.max()))
         passed = taken & (begin <= now[near, None, None])  # instants, steps, runs
         step = passed.shape[1] - 1 - np.argmax(passed[:, ::-1], axis=1)
@@ -276,7 +276,7 @@ class _Runs:
 
     def _counted(self, runs: np.ndarray, steps: DenseOutput, tried: int) -> dict[int, np.ndarray]:
         """Return the series of turning outputs where steps begin, turns counted on, steps and runs last."""
-        found = {}
+        counted = {}
         time = np.concatenate([self._begun[runs][None], steps.start[:tried]])
         self._begun[runs] = time[-1]
         every = np.tile(runs, len(steps.start))
@@ -291,15 +291,19 @@ class _Runs:
                 whole = np.concatenate([last[..., runs][..., None, :], series], axis=-2)
                 series[0] -= np.cumsum(turned(whole[..., :-1, :], whole[..., 1:, :], np.diff(time, axis=0)), axis=-2)
                 last[..., runs] = series[..., -1, :]
-                found[which] = series
-        return found
+                counted[which] = series
+        return counted
 
     def _counted_about_axes(
-        self, runs: np.ndarray, steps: DenseOutput, taken: np.ndarray, places: tuple[np.ndarray, np.ndarray, np.ndarray]
+        self,
+        runs: np.ndarray,
+        steps: DenseOutput,
+        taken: np.ndarray,
+        positions: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> dict[int, np.ndarray]:
-        """Return angles about axes near places, (instances, places) for each group of outputs, and count them on.
+        """Return angles about axes near positions, (instances, positions) for each group of outputs, and count them on.
 
-        The places are given by step, lane and share of the step.
+        The positions are given by step, lane and share of the step.
         """
         lane, step = np.nonzero(taken.T)
         if not lane.size:
@@ -307,7 +311,7 @@ class _Runs:
         number = np.zeros(taken.shape, int)
         number[step, lane] = np.arange(len(lane))
         last = np.append(lane[1:] != lane[:-1], True)  # of the steps of a run
-        found = {}
+        counted_angles = {}
         measuring = [which for which, group in enumerate(self._made[1]) if measures_angle(group)]
         for which, turns in zip(measuring, self._turns_reached, strict=True):
 
@@ -317,10 +321,10 @@ class _Runs:
                 _, outputs = self._picked(runs[of], Turns((), self._begun_with(runs[of])))
                 return raw_angles([outputs[which]], {"quaternion": attitudes})[0]
 
-            counted = counted_along(measured, lane, turns[:, runs[lane]], PLACES)
-            found[which] = counted.near(number[places[0], places[1]], places[2])
+            counted = counted_along(measured, lane, turns[:, runs[lane]], POINTS_IN_STEP)
+            counted_angles[which] = counted.near(number[positions[0], positions[1]], positions[2])
             turns[:, runs[lane[last]]] = counted.near(np.flatnonzero(last), np.ones(last.sum()))
-        return found
+        return counted_angles
 
     def _note(
         self,
@@ -343,8 +347,8 @@ class _Runs:
             time = self.instants[at[lanes]]
             since = time - begin[lanes]
             started = polynomial.map(lambda part, lanes=lanes: part[..., lanes])
-            *_, found = expanded.on_xla(shared, (turned_by, started, since, time), (("order", self._expansion),))
-            for which, (group, series) in enumerate(zip(outputs, map(np.array, found), strict=True)):
+            *_, noted = expanded.on_xla(shared, (turned_by, started, since, time), (("order", self._expansion),))
+            for which, (group, series) in enumerate(zip(outputs, map(np.array, noted), strict=True)):
                 if which in before and measures_angle(group):
                     series[0, 0] = brought_near(series[0, 0], before[which][:, lanes])
                 elif which in before:

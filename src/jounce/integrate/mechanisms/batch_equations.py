@@ -156,8 +156,8 @@ class BatchStart:
         if (equations if rank is None else rank) < coordinates and parametric.guesses_differ(rows):
             own = [consistent_start(parametric.varied(row), instant) for row in rows.tolist()]
             self._own = State(*(np.concatenate(parts, axis=-1) for parts in zip(*(s.state for s in own), strict=True)))
-            found = [_turns_of(s.model.system.forces, s.model.system.outputs) for s in own]
-            self._turns = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1), *found)
+            turns_of_starts = [_turns_of(s.model.system.forces, s.model.system.outputs) for s in own]
+            self._turns = jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1), *turns_of_starts)
             return
         self._made, last = parametric.of(rows), begun.of(rows)
         count = max(STAGES, int(np.ceil(self._turned(last, len(rows)) / LARGEST_STAGE)))
@@ -181,8 +181,10 @@ class BatchStart:
         measuring = [group for group in (*equations.system.forces, *outputs) if measures_angle(group)]
         angles = [np.asarray(group.element.datum.near) for group in measuring]
         clock = np.full((1, len(runs)), self._instant)
-        still = self._state._replace(velocity=np.zeros_like(self._state.velocity), spin=np.zeros_like(self._state.spin))
-        state = still.map(lambda part: np.repeat(np.asarray(part), len(runs), axis=-1))
+        at_rest = self._state._replace(
+            velocity=np.zeros_like(self._state.velocity), spin=np.zeros_like(self._state.spin)
+        )
+        state = at_rest.map(lambda part: np.repeat(np.asarray(part), len(runs), axis=-1))
         stages = [self._begun.picked(made, runs)[0] for made in self._stages]
         together = np.ones(len(runs), bool)
         for stage in stages:
@@ -194,24 +196,24 @@ class BatchStart:
                 angles = [brought_near(angle, near) for near, angle in zip(angles, raw, strict=True)]
         count = len([group for group in equations.system.forces if measures_angle(group)])
         turns = Turns(tuple(angles[:count]), tuple(angles[count:]))
-        found = jax.tree.map(np.array, (with_rates(stages[-1], state, clock), turns))
-        for place in np.flatnonzero(~together).tolist():
-            self._put_alone(found, place, int(runs[place]))
-        return found
+        start = jax.tree.map(np.array, (with_rates(stages[-1], state, clock), turns))
+        for lane in np.flatnonzero(~together).tolist():
+            self._put_one(start, lane, int(runs[lane]))
+        return start
 
-    def _put_alone(self, found: tuple[State, Turns], place: int, run: int) -> None:
+    def _put_one(self, starts: tuple[State, Turns], lane: int, run: int) -> None:
         """Put a run to which no way from the first was found together from its own guess; NaN where that fails."""
         try:
             start = consistent_start(self._parametric.varied(self._rows[run].tolist()), self._instant)
         except JounceError as error:
             reason = Status.SINGULAR if isinstance(error, MobilityError) else Status.INADMISSIBLE
             self.failed[run] = getattr(error, "status", None) or reason
-            for part in found[0]:
-                part[..., place] = np.nan
+            for part in starts[0]:
+                part[..., lane] = np.nan
             return
         own = start.state, _turns_of(start.model.system.forces, start.model.system.outputs)
-        for whole, part in zip(jax.tree.leaves(found), jax.tree.leaves(own), strict=True):
-            whole[..., place] = part[..., 0]
+        for whole, part in zip(jax.tree.leaves(starts), jax.tree.leaves(own), strict=True):
+            whole[..., lane] = part[..., 0]
 
 
 def _turns_of(forces: Sequence[Group], outputs: Sequence[Group]) -> Turns:

@@ -56,15 +56,15 @@ class ProgramsAhead(ExitStack):
     ):
         super().__init__()
         self._mechanism, self._instants = mechanism, instants
-        self._order, self._highest = order, derivatives_of_motion(mechanism, order)
+        self._order, self._max_order = order, derivatives_of_motion(mechanism, order)
         self._method, self._limits = method, (tolerance, longest)
         self._expansion = method.expansion_order(tolerance)
-        self._wanted = False
+        self._pending = False
 
     def begin(self, model: Model) -> None:
         """Begin with what is built already, if the programs depend on nothing else."""
-        self._wanted = first_time("march", model.system, self._expansion, self._highest, self._method)
-        if not self._wanted:
+        self._pending = first_time("march", model.system, self._expansion, self._max_order, self._method)
+        if not self._pending:
             return
         model = released(model) if self._mechanism.initial else model
         rows, columns = model.system.shape
@@ -75,11 +75,11 @@ class ProgramsAhead(ExitStack):
 
     def go_on(self, start: ConsistentStart) -> None:
         """Begin with the start, if that was not possible before."""
-        if self._wanted:
+        if self._pending:
             self._compile(start.equations, start.model, start.state)
 
     def _compile(self, equations: Equations, model: Model, state: State) -> None:
-        self._wanted = False
+        self._pending = False
         first, last = self._instants[:1], self._instants[-1]  # of the types that the run has: XLA tells them apart
 
         def begun() -> IntegratorState:
@@ -94,39 +94,41 @@ class ProgramsAhead(ExitStack):
         def evaluated() -> None:
             dense = self._one_step(begun(), last - first[0])
             outputs, some = model.system.outputs, self._instants[: FEW_INSTANTS + 1]
-            motion_at(equations, outputs, dense, some, np.zeros(len(some), int), self._highest)
+            motion_at(equations, outputs, dense, some, np.zeros(len(some), int), self._max_order)
 
         def forces() -> None:
-            still = pose_coordinates(state.map(lambda part: np.asarray(part)[None]))
-            pose = {name: part[0] for name, part in still.items() if len(part)}  # angular velocities begin one later
-            ask_forces_at_rest(self._mechanism, model, pose, self._instants, self._order, self._highest + 1)
+            coordinates = pose_coordinates(state.map(lambda part: np.asarray(part)[None]))
+            pose = {
+                name: part[0] for name, part in coordinates.items() if len(part)
+            }  # angular velocities begin one later
+            ask_forces_at_rest(self._mechanism, model, pose, self._instants, self._order, self._max_order + 1)
 
         before = None
-        for rehearsal in (arrived, forces, evaluated):  # those that LLVM takes longest for are written first
-            before = self._after(before, rehearsal)
+        for program in (arrived, forces, evaluated):  # those that LLVM takes longest for are written first
+            before = self._after(before, program)
 
-    def _after(self, before: threading.Event | None, rehearsal: Callable[[], None]) -> threading.Event:
+    def _after(self, before: threading.Event | None, program: Callable[[], None]) -> threading.Event:
         """Begin with programs as soon as those before are written, which LLVM then compiles; and tell when they are."""
         written = threading.Event()
 
-        def told() -> None:
+        def compile_in_turn() -> None:
             if before is not None and is_wanted():
                 before.wait()
             try:
                 check_wanted()  # the start may have been refused meanwhile
                 with telling(written.set):
-                    rehearsal()
+                    program()
             finally:
                 written.set()
 
-        self.enter_context(rehearsed(told, wanted=True))
+        self.enter_context(rehearsed(compile_in_turn, wanted=True))
         return written
 
     def _one_step(self, current: IntegratorState, length: float) -> DenseOutput:
         """Return one step, at rest, in the form of those that will be taken."""
         form = jax.eval_shape(self._method.polynomial, current.expansion, current.expansion, current.time)
-        still = jax.tree.map(lambda x: np.zeros((1, *x.shape[:-1])), form)
-        for part, known in zip(still, current.expansion.state, strict=True):
+        zeros = jax.tree.map(lambda x: np.zeros((1, *x.shape[:-1])), form)
+        for part, known in zip(zeros, current.expansion.state, strict=True):
             part[0, 0] = np.asarray(known)[0, ..., 0]
         angles = tuple(np.asarray(part).T for part in current.angles)
-        return DenseOutput(np.asarray(current.time), np.full(1, length), still, np.full(1, -1), angles)
+        return DenseOutput(np.asarray(current.time), np.full(1, length), zeros, np.full(1, -1), angles)

@@ -274,14 +274,14 @@ def unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float
     if order < 1:
         return ""
     pose = pose_of(cut(coordinates, order), start.model.pose_type)
-    clock, found = Jet.variable(np.array([[instant]]), order), []
+    clock, names = Jet.variable(np.array([[instant]]), order), []
     for group, members in zip(start.equations.system.forces, start.model.forces, strict=True):
         with np.errstate(all="ignore"):  # what is not finite is told by name
             sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])
         sizes = np.broadcast_to(sizes, (*sizes.shape[:2], len(members), 1))
         good = np.atleast_1d(np.isfinite(sizes).all(axis=(0, 1, 3)))
-        found += [f"forces.{name}" for name, fit in zip(members, good, strict=True) if not fit]
-    return ", ".join(found)
+        names += [f"forces.{name}" for name, fit in zip(members, good, strict=True) if not fit]
+    return ", ".join(names)
 
 
 class _Run:
@@ -300,7 +300,7 @@ class _Run:
         self.parts: list[DenseOutput] = []
         self.ending = (Status.OK, "")
         self.backends: set[str] = set()
-        self.sense = 1.0  # of time
+        self.direction = 1.0  # of time
 
     @property
     def dense_output(self) -> DenseOutput:
@@ -310,23 +310,23 @@ class _Run:
     def go(self, instants: np.ndarray, progress: Callable[[int, int], None] | None) -> None:
         """March from the first to the last instant."""
         equations, stop = self.start.equations, instants[-1]
-        self.sense = sense = np.sign(instants[-1] - instants[0])
+        self.direction = direction = np.sign(instants[-1] - instants[0])
         order = self.method.expansion_order(self.tolerance)
         current = unexpanded(equations, self.start.state, instants[:1], order=order)
         method = integrator(self.method, equations, current)
         how, options = (stop, self.tolerance, self.longest), {"method": method, "count": STEPS}
         while current.outcome.item() in GOING and self.events.stopped_at is None:
             current, steps, attempts = march(equations, current, *how, **options)
-            found, taken = steps
-            self.backends.add(backend_of(found))
+            output, taken = steps
+            self.backends.add(backend_of(output))
             taken = np.asarray(taken)[: int(attempts), 0]
             if taken.any():
                 # a view, unless some were refused: they are joined, and so copied, at the end
                 chosen = slice(len(taken)) if taken.all() else np.flatnonzero(taken)
-                part = jax.tree.map(lambda x, k=chosen: np.asarray(x)[k, ..., 0], found)
+                part = jax.tree.map(lambda x, k=chosen: np.asarray(x)[k, ..., 0], output)
                 self.parts.append(self.events.noted(part))
             if progress is not None:
-                progress(int(np.sum(sense * instants <= sense * current.time.item())), len(instants))
+                progress(int(np.sum(direction * instants <= direction * current.time.item())), len(instants))
         if not self.parts:
             self._stand(current)
         if current.outcome.item() in (Outcome.COLLAPSED, Outcome.LOST, Outcome.UNBALANCED):
@@ -342,7 +342,7 @@ class _Run:
         """Return why steps did not go on, and where to look: a force that is not finite, or the most urgent body."""
         series, time = current.expansion.state, current.time.item()
         here = dataclasses.replace(self.start, equations=self.start.equations.near(current.angles))
-        onwards = self.sense * AHEAD * max(abs(time), abs(time - current.begun.item()))
+        onwards = self.direction * AHEAD * max(abs(time), abs(time - current.begun.item()))
         ahead = evaluated(series.map(lambda part: part[:2]), np.array([onwards]))
         for state, instant in ((series.map(lambda part: part[0]), time), (ahead, time + onwards)):
             finite = all(np.isfinite(part).all() for part in state)

@@ -124,9 +124,9 @@ class RobotSimulation(Displayed):
         """Times at which a force had a jump or a kink, s: derivatives do not exist there."""
         length, kink = np.abs(self.steps.length), self.steps.kink
         ends = self.steps.start + self.steps.length
-        found = [k for k in np.flatnonzero(kink) if k == 0 or length[: k + 1].max() > MUCH_LONGER * length[k]]
-        close = [a for a, b in itertools.pairwise(found) if abs(ends[b] - ends[a]) <= CLOSE * length.max()]
-        return [float(ends[k]) for k in found if k not in close]
+        indices = [k for k in np.flatnonzero(kink) if k == 0 or length[: k + 1].max() > MUCH_LONGER * length[k]]
+        close = [a for a, b in itertools.pairwise(indices) if abs(ends[b] - ends[a]) <= CLOSE * length.max()]
+        return [float(ends[k]) for k in indices if k not in close]
 
     @cached_property
     def torque(self) -> Float[np.ndarray, "time level n"]:
@@ -135,21 +135,23 @@ class RobotSimulation(Displayed):
         Those of driven joints are what it takes to drive them. Where drives count, they are the torques before
         armature, damping and friction.
         """
-        found = inverse_dynamics(
+        torques = inverse_dynamics(
             self.robot,
             self.q,
             drives=self._problem.equations.drives,
             base=self._cut_base(),
-            wrenches=[self._told(*both) for both in zip(self._wrenches, self._problem.wrenches.parts, strict=True)],
+            wrenches=[
+                self._along_motion(*both) for both in zip(self._wrenches, self._problem.wrenches.parts, strict=True)
+            ],
             time=self.time if self._wrenches else None,
         )
-        found = found if self.base is None else found[..., 6:]
-        return np.asarray(found)
+        torques = torques if self.base is None else torques[..., 6:]
+        return np.asarray(torques)
 
-    def _told(self, wrench: Wrench, parts: Sequence[WrenchPart]) -> Wrench:
+    def _along_motion(self, wrench: Wrench, parts: Sequence[WrenchPart]) -> Wrench:
         """Return a wrench with its values along the motion where it depends on the state; functions as they were."""
-        told = {name: self._along(part) for name, part in zip(("force", "torque"), parts, strict=True)}
-        return dataclasses.replace(wrench, **told)
+        values = {name: self._along(part) for name, part in zip(("force", "torque"), parts, strict=True)}
+        return dataclasses.replace(wrench, **values)
 
     def _along(self, part: WrenchPart) -> Any:
         """Return the derivatives of a function of time and state along the motion, or what depends on time alone."""
@@ -164,11 +166,11 @@ class RobotSimulation(Displayed):
             shares = q / factorials[:, None]
 
             def component(i: int, since: Any) -> Any:
-                place, rate = shares[-1], jnp.zeros(q.shape[1:])
+                q_there, rate = shares[-1], jnp.zeros(q.shape[1:])
                 for share in shares[-2::-1]:  # Horner's rule, and its derivative
-                    rate = rate * since + place
-                    place = place * since + share
-                return jnp.asarray(given(time + since, place, rate), float)[i]
+                    rate = rate * since + q_there
+                    q_there = q_there * since + share
+                return jnp.asarray(given(time + since, q_there, rate), float)[i]
 
             zero = Jet.variable(jnp.zeros(()), levels - 1)
             return jnp.stack([compose(partial(component, i), zero).derivatives() for i in range(3)], axis=-1)
@@ -231,8 +233,8 @@ class RobotSimulation(Displayed):
         variables = {}
         for k, name in enumerate(self.robot.joint_names):
             unit = "rad" if self.robot.joints[name].turning else "m"
-            told = {"units": unit, "long_name": derivatives_of(name)}
-            variables[name] = (tuple(axes), self.q[:, :, k], told)
+            attributes = {"units": unit, "long_name": derivatives_of(name)}
+            variables[name] = (tuple(axes), self.q[:, :, k], attributes)
         return xarray.Dataset(variables, axes, attrs={"title": self.robot.name, "source": "jounce"})
 
 
@@ -241,10 +243,12 @@ _at = jax.jit(at)  # outside of a program its loop would be compiled at each cal
 
 def _states(steps: RobotSteps, instants: np.ndarray) -> tuple[np.ndarray, RobotState]:
     """Return which instants the steps reach, and the states there, batch last."""
-    sense = 1.0 if steps.length[0] >= 0 else -1.0
+    direction = 1.0 if steps.length[0] >= 0 else -1.0
     rounding = 1e-14 * max(abs(steps.start[0]), abs(steps.end))
-    reached = (sense * (instants - steps.start[0]) >= -rounding) & (sense * (instants - steps.end) <= rounding)
-    chosen = np.clip(np.searchsorted(sense * steps.start, sense * instants, side="right") - 1, 0, len(steps.start) - 1)
+    reached = (direction * (instants - steps.start[0]) >= -rounding) & (direction * (instants - steps.end) <= rounding)
+    chosen = np.clip(
+        np.searchsorted(direction * steps.start, direction * instants, side="right") - 1, 0, len(steps.start) - 1
+    )
     since = instants - steps.start[chosen]
     since = np.where(reached, since, 0.0)
     polynomial = jax.tree.map(lambda c: np.moveaxis(np.asarray(c)[chosen], 0, -1), steps.polynomial)

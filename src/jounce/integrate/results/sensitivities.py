@@ -102,21 +102,21 @@ def _recorded(
     simulate: Callable[..., Simulation], mechanism: Mechanism, options: Mapping[str, Any]
 ) -> tuple[Simulation, Mechanism] | None:
     """Return the simulation at the values that JAX traces, and the mechanism that has them; None if it knows none."""
-    made, found = template(mechanism), []
+    made, recordings = template(mechanism), []
 
     @jax.custom_jvp
     def record(values: tuple[Any, ...]) -> Any:
         if not any(isinstance(value, Tracer) for value in values):
             known = made(values)
-            found.append((simulate(known, **options), known))
+            recordings.append((simulate(known, **options), known))
         return jnp.zeros(())
 
     @record.defjvp
-    def held(primals: tuple[Any], _: tuple[Any]) -> tuple[Any, Any]:
+    def record_jvp(primals: tuple[Any], _: tuple[Any]) -> tuple[Any, Any]:
         return record(*primals), jnp.zeros(())
 
     record(_values(mechanism))
-    return found[-1] if found else None
+    return recordings[-1] if recordings else None
 
 
 def _values(mechanism: Mechanism) -> tuple[Any, ...]:
@@ -135,7 +135,7 @@ def _called(simulate: Callable[..., Any], mechanism: Mechanism, options: Mapping
     shapes = solved_shapes(mechanism, len(instants), levels)
     options = {**options, "time": instants, "strict": False}
 
-    def found(values: tuple[Any, ...]) -> Solved:
+    def solved_at(values: tuple[Any, ...]) -> Solved:
         try:
             motion = simulate(made(values), **options)
         except (AssemblyError, MobilityError, SolveError) as error:
@@ -143,7 +143,7 @@ def _called(simulate: Callable[..., Any], mechanism: Mechanism, options: Mapping
             return failed(shapes, status)
         return motion.solved if motion.traced else _solved(motion, dict(motion.poses[1]))
 
-    solved = called(found, shapes, _values(mechanism))
+    solved = called(solved_at, shapes, _values(mechanism))
     model = traced_model(mechanism, solved.length, solved.angles, first_of(solved.coordinates))
     check_not_redundant(model)
     return TracedMotion(mechanism, (model, model), instants, order, solved)
@@ -159,10 +159,10 @@ def _solved(simulation: Simulation, coordinates: dict[str, Any]) -> Solved:
 def _angles(simulation: Simulation) -> Angles:
     """Return the angles about axes that the outputs of a simulation measure, with their turns at its instants."""
     outputs = simulation.model.system.outputs
-    found = angles_of(simulation.model, (simulation.model.system.forces, outputs))
+    angles = angles_of(simulation.model, (simulation.model.system.forces, outputs))
     measured = [k for k, group in enumerate(outputs) if measures_angle(group)]
     near = tuple(np.asarray(simulation.output_values(k)[0, 0]) for k in measured)
-    return found._replace(near=(found.near[0], near))
+    return angles._replace(near=(angles.near[0], near))
 
 
 def _model_of(mechanism: Mechanism, simulation: Simulation) -> tuple[Model, Equations]:
@@ -180,8 +180,8 @@ def _model_of(mechanism: Mechanism, simulation: Simulation) -> tuple[Model, Equa
 def _first(simulation: Simulation) -> dict[str, Any]:
     """Return the coordinates of all bodies at the start."""
     state = simulation.dense_output.polynomial.map(lambda part: np.asarray(part)[0, :1, ..., None])
-    found = pose_coordinates(state)
-    return {name: found[name] for name in found if name != "angular_velocity"}
+    coordinates = pose_coordinates(state)
+    return {name: coordinates[name] for name in coordinates if name != "angular_velocity"}
 
 
 def _allowed(options: Mapping[str, Any]) -> float | None:
@@ -193,10 +193,10 @@ def _allowed(options: Mapping[str, Any]) -> float | None:
 
 def _kinks(simulation: Simulation) -> list[Break]:
     """Return the kinks of forces along a simulation, or raise UnsupportedError if a force or a velocity jumps."""
-    dense, found = simulation.dense_output, breaks(simulation.dense_output, float(simulation.model.length))
+    dense, kinks = simulation.dense_output, breaks(simulation.dense_output, float(simulation.model.length))
     names = watched_names(simulation.model)
     for order, what in ((1, "has a kink, so that velocities jump"), (2, "jumps")):
-        for jump in found:
+        for jump in kinks:
             if jump.order == order:
                 name, time = names[int(dense.kink[jump.step])], float(dense.start[jump.step] + jump.since)
                 message = (
@@ -204,7 +204,7 @@ def _kinks(simulation: Simulation) -> list[Break]:
                     "is not differentiated over it: give the law a steep passage, such as tanh(x/width)"
                 )
                 raise UnsupportedError(message, name=name)
-    return found
+    return kinks
 
 
 def _pieces(
@@ -239,7 +239,7 @@ def _start(mechanism: Mechanism, simulation: Simulation, equations: Equations) -
 @compiled(narrow=True)
 def _jacobian(equations: Equations, state: State, instant: Instants) -> Float[Numbers, "row column"]:
     """Return the Jacobian at a state."""
-    return equations.system.jacobian(equations.still(state.position, state.attitude), Jet([instant]))[..., 0]
+    return equations.system.jacobian(equations.pose_at_rest(state.position, state.attitude), Jet([instant]))[..., 0]
 
 
 @compiled(narrow=True)
@@ -255,10 +255,10 @@ def _assembled(
     It changes by the shortest step onto the constraints, as that of the assembly: `inverse` is that of the Jacobian.
     """
     position, attitude = guess
-    still = equations.still(position, attitude)
-    gap = equations.system.residual(still, Jet([instant])).coefficients[0]
+    rest_pose = equations.pose_at_rest(position, attitude)
+    gap = equations.system.residual(rest_pose, Jet([instant])).coefficients[0]
     column = -(inverse @ gap)
-    pose = still.displaced(*equations.system.coordinates(column, still.shifts))
+    pose = rest_pose.displaced(*equations.system.coordinates(column, rest_pose.shifts))
     state = known._replace(position=pose.position.coefficients[0][:, 1:], attitude=equations.attitude_of(pose))
     factor = jax.lax.stop_gradient(equations).factored(known, instant)
     return equations.with_rates(factor, state, instant)
@@ -288,18 +288,18 @@ def _coordinates(
     since = instants - pieces.start[chosen]
     pieces = pieces.padded()
     known = pieces.state.map(lambda part: part[..., None])
-    highest = pieces.kept.shape[1] - 1
-    path = pieces.kept, *pieces[:2], pieces.kinks
-    state = _marched(equations, start, known, *path, chosen, since, instants, order=order, highest=highest)
+    max_order = pieces.used.shape[1] - 1
+    path = pieces.used, *pieces[:2], pieces.kinks
+    state = _marched(equations, start, known, *path, chosen, since, instants, order=order, max_order=max_order)
     return pose_coordinates(state)
 
 
-@compiled("order", "highest", narrow=True)
+@compiled("order", "max_order", narrow=True)
 def _marched(
     equations: Equations,
     start: State,
     known: State,
-    kept: Any,
+    used: Any,
     begun: Float[Numbers, " step"],
     steps: Float[Numbers, " step"],
     kinks: Kinks | None,
@@ -308,7 +308,7 @@ def _marched(
     instants: Float[Numbers, " time"],
     *,
     order: int,
-    highest: int,
+    max_order: int,
 ) -> State:
     """Return the series of the motion at instants, (order + 1, ..., time), after a march over steps that are known.
 
@@ -316,39 +316,39 @@ def _marched(
     ----------
     known : State
         At the beginning of all steps, (steps, ..., 1): what comes of the march here has these values.
-    kept : array of bool, shape (steps, highest + 1)
+    used : array of bool, shape (steps, max_order + 1)
         Which coefficients of the series the steps were taken with.
     kinks : Kinks, optional
         Which of the steps lead over kinks.
     """
 
-    def series(state: State, kept: Any, time: Any) -> State:
-        return _expanded(equations, state, time[None], highest).map(
-            lambda part: jnp.where(kept[:, None, None], part, 0.0)
+    def series(state: State, used: Any, time: Any) -> State:
+        return _expanded(equations, state, time[None], max_order).map(
+            lambda part: jnp.where(used[:, None, None], part, 0.0)
         )
 
     @jax.checkpoint
     def march(carry: Any, step: Any) -> tuple[Any, State]:
         state, kinked = carry
-        here, kept, time, length, over = step
+        here, used, time, length, over = step
         time, length, state = time[None], length[None], jax.tree.map(with_value, state, here)
-        found = series(state, kept[:, None], time)
-        arrived, end = evaluated(found, length), time + length
+        expanded = series(state, used[:, None], time)
+        arrived, end = evaluated(expanded, length), time + length
         if over is not None:
-            behind, late = met(state, found, length, kinked, over)
-            left = Kinked(shifted(found, length), jnp.zeros_like(length))
+            behind, late = met(state, expanded, length, kinked, over)
+            left = Kinked(shifted(expanded, length), jnp.zeros_like(length))
             back = (behind, time, kinked._replace(late=late))
             arrived, end, kinked = jax.tree.map(lambda a, b: jnp.where(over.back, a, b), back, (arrived, end, left))
         return (_corrected(equations, arrived, end[None]), kinked), state
 
     none = None if kinks is None else Kinked(shifted(start.map(lambda part: part[None])), jnp.zeros(1))
-    _, states = jax.lax.scan(march, (start, none), (known, kept, begun, steps, kinks))
+    _, states = jax.lax.scan(march, (start, none), (known, used, begun, steps, kinks))
     chosen_states = states.map(lambda part: jnp.moveaxis(part[chosen, ..., 0], 0, -1))
     time = instants - since
 
     @jax.checkpoint
     def arrive(state: State) -> State:
-        arrived = evaluated(series(state, kept[chosen].T, time), since)
+        arrived = evaluated(series(state, used[chosen].T, time), since)
         return _expanded(equations, _corrected(equations, arrived, instants[None]), instants[None], order)
 
     return arrive(chosen_states)
@@ -379,10 +379,10 @@ def _inverse(matrix: Any, known: Any) -> Any:
 def _corrected(equations: Equations, state: State, time: Instants) -> State:
     """Return the state after one correction onto the constraints and their rates; see `projected`."""
     state = state._replace(attitude=normalised(state.attitude))
-    held, fixed = jax.lax.stop_gradient((equations, state))
-    factor = held.factored(fixed, time)
-    still = equations.still(state.position, state.attitude)
-    gap = equations.system.residual(still, Jet([time])).coefficients[0]
-    pose = still.displaced(*equations.system.coordinates(equations.least_change(factor, gap), still.shifts))
+    constant, fixed = jax.lax.stop_gradient((equations, state))
+    factor = constant.factored(fixed, time)
+    rest_pose = equations.pose_at_rest(state.position, state.attitude)
+    gap = equations.system.residual(rest_pose, Jet([time])).coefficients[0]
+    pose = rest_pose.displaced(*equations.system.coordinates(equations.least_change(factor, gap), rest_pose.shifts))
     position, attitude = pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)
     return equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)

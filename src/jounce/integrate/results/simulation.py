@@ -24,7 +24,7 @@ from jounce.integrate.steps.lookahead import watched_names
 from jounce.integrate.steps.methods import evaluated
 from jounce.integrate.steps.projection import projected
 from jounce.integrate.steps.revolution_counts import (
-    PLACES,
+    POINTS_IN_STEP,
     AnglesOfForces,
     attitudes_along,
     attitudes_at,
@@ -89,8 +89,8 @@ class Simulation(Motion):
         self.events = [] if events is None else events
         self._ending = ending
         reached, chosen = _steps_of(dense, instants)
-        outputs, highest = start.model.system.outputs, derivatives_of_motion(mechanism, order)
-        (state, self._angles, found), backend = motion_at(start.equations, outputs, dense, instants, chosen, highest)
+        outputs, max_order = start.model.system.outputs, derivatives_of_motion(mechanism, order)
+        (state, self._angles, found), backend = motion_at(start.equations, outputs, dense, instants, chosen, max_order)
         coordinates = pose_coordinates(state)
         found = zip(outputs, found, strict=True)
         groups = tuple(self._counted(group, series, instants) for group, series in found)
@@ -147,8 +147,8 @@ class Simulation(Motion):
         names = watched_names(self._start.model)
         before = [length[max(k - APPROACH, 0) : k].max(initial=0.0) for k in range(len(length) - 1)]
         short = MUCH_LONGER * length[:-1]
-        places = np.flatnonzero((kink[:-1] >= 0) & (length[1:] > short) & (np.array(before) > short))
-        since = {int(k): float(self.dense_output.length[k]) for k in places}
+        indices = np.flatnonzero((kink[:-1] >= 0) & (length[1:] > short) & (np.array(before) > short))
+        since = {int(k): float(self.dense_output.length[k]) for k in indices}
         # series that do not go on as the next tell when it was; and after a long approach they alone tell that it was
         since |= {x.step: x.since for x in breaks(self.dense_output, float(self.model.length)) if kink[x.step] >= 0}
         return [(float(self.dense_output.start[k] + since[k]), names[kink[k]]) for k in sorted(since)]
@@ -199,9 +199,9 @@ class Simulation(Motion):
         dense = self.dense_output
         if not dense.length.any():
             return AttitudeHistory(self._attitudes_at(dense.start), dense.start)
-        instants = (dense.start[:, None] + dense.length[:, None] * (np.arange(PLACES) / PLACES)).ravel()
+        instants = (dense.start[:, None] + dense.length[:, None] * (np.arange(POINTS_IN_STEP) / POINTS_IN_STEP)).ravel()
         instants = np.append(instants, dense.end)
-        along = attitudes_along(dense.polynomial.attitude, dense.length, PLACES)
+        along = attitudes_along(dense.polynomial.attitude, dense.length, POINTS_IN_STEP)
         return AttitudeHistory(along, instants, between=self._attitudes_at)
 
     def _attitudes_at(self, instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, "4 bodies time"]:
@@ -239,16 +239,16 @@ class Simulation(Motion):
         """Energy, drift and kinetic energy."""
         pose_type, coordinates = self.poses
         equations = self._start.equations.near(self._angles)
-        found = _checks(equations, cut(coordinates, 1), self.time[None], pose_type)
-        return [np.where(self.status == Status.OK, part, np.nan) for part in found]
+        checks = _checks(equations, cut(coordinates, 1), self.time[None], pose_type)
+        return [np.where(self.status == Status.OK, part, np.nan) for part in checks]
 
 
 def _steps_of(dense: DenseOutput, instants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return which instants the steps reach, and the step in which each of them is."""
-    sense = 1.0 if dense.length[0] >= 0 else -1.0
+    direction = 1.0 if dense.length[0] >= 0 else -1.0
     rounding = 1e-14 * max(abs(dense.start[0]), abs(dense.end))
-    reached = (sense * (instants - dense.start[0]) >= -rounding) & (sense * (instants - dense.end) <= rounding)
-    chosen = np.searchsorted(sense * dense.start, sense * instants, side="right") - 1
+    reached = (direction * (instants - dense.start[0]) >= -rounding) & (direction * (instants - dense.end) <= rounding)
+    chosen = np.searchsorted(direction * dense.start, direction * instants, side="right") - 1
     return reached, np.clip(chosen, 0, len(dense.start) - 1)
 
 
@@ -268,15 +268,15 @@ def motion_at(
     """Return what `expanded` does at instants in chosen steps, all of them, and what computes it."""
     shared = equations, outputs
 
-    def lanes_of(places: np.ndarray) -> Any:
-        steps, now = chosen[places], instants[places]
+    def lanes_of(lanes: np.ndarray) -> Any:
+        steps, now = chosen[lanes], instants[lanes]
         polynomial = dense.polynomial.map(lambda part: part[steps].transpose(1, 2, 3, 0))
         return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
 
     example = lanes_of(np.zeros(1, int))
     program = expanded.program(shared, example, large=LARGE, hasty=is_wanted_soon(), order=order)
-    found = in_chunks(lambda places: program(lanes_of(places)), len(instants), (FEW_INSTANTS, *WIDTHS))
-    return found, program.backend
+    values = in_chunks(lambda lanes: program(lanes_of(lanes)), len(instants), (FEW_INSTANTS, *WIDTHS))
+    return values, program.backend
 
 
 @mapped(widths=(FEW_INSTANTS, *WIDTHS), narrow=True)
@@ -310,8 +310,8 @@ def expanded(
     there = equations.near(followed(equations, begun, polynomial, step).at(step))
     state, _, inverse = projected(there, evaluated(polynomial, step), instants[None])
     series = expand(there, state, instants[None], order, inverse).state
-    found = output_series(outputs, pose_coordinates(series), equations.pose_type)
-    return series, measured(there, state), found
+    outputs_found = output_series(outputs, pose_coordinates(series), equations.pose_type)
+    return series, measured(there, state), outputs_found
 
 
 def continuous(group: Any, series: np.ndarray, instants: np.ndarray) -> np.ndarray:

@@ -21,7 +21,9 @@ from jounce.mechanism.system import Group
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
-KEPT = 1e-8  # of the largest kinetic energy and the largest change of the other: so much changes by rounding at most
+ENERGY_TOLERANCE = (
+    1e-8  # of the largest kinetic energy and the largest change of the other: so much changes by rounding at most
+)
 OFFSET = 1e-12  # of all energies, however little of them is exchanged
 EXCHANGED = 1e-13  # of the power of a force: what differs by more from the rate of what is stored is taken or given
 
@@ -74,21 +76,21 @@ def is_balanced(equations: Equations, state: State, time: Instants) -> bool:
 
     It is looked at where a joint could be overlooked, at less than a tenth of the cost of a step.
     """
-    still, pose = equations.still(state.position, state.attitude), equations.pose(state)
+    at_rest, pose = equations.pose_at_rest(state.position, state.attitude), equations.pose(state)
     groups, forces = equations.system.groups, equations.system.forces
-    if not hiding(equations, state, time) or any(_is_moved(group, still, time) for group in groups):
+    if not hiding(equations, state, time) or any(_is_moved(group, at_rest, time) for group in groups):
         return False
 
     def power(group: Group) -> Callable[[Instants], Numbers]:
         return lambda now: group.power(pose, Jet.variable(now, 1)).coefficients[0]
 
-    told = all(type(group.element).energy is not AbstractForce.energy for group in forces)
-    return told and not any(uses(jax.make_jaxpr(power(group))(time)) for group in forces)
+    known = all(type(group.element).energy is not AbstractForce.energy for group in forces)
+    return known and not any(uses(jax.make_jaxpr(power(group))(time)) for group in forces)
 
 
-def _is_moved(group: Group, still: Pose, time: Instants) -> bool:
+def _is_moved(group: Group, at_rest: Pose, time: Instants) -> bool:
     """Tell whether the residual of joints or drivers depends on time."""
-    return uses(jax.make_jaxpr(lambda now: group.residual(still, Jet([now])).coefficients[0])(time))
+    return uses(jax.make_jaxpr(lambda now: group.residual(at_rest, Jet([now])).coefficients[0])(time))
 
 
 def energies(equations: Equations, state: State, time: Instants) -> Energies:
@@ -108,10 +110,10 @@ def energies(equations: Equations, state: State, time: Instants) -> Energies:
     return Energies(kinetic, potential, size, exchanging > 0)
 
 
-def begun(found: Energies) -> Balance:
+def begun(energies: Energies) -> Balance:
     """Return what is known of the energy where runs begin."""
-    nothing = jnp.zeros_like(found.kinetic)
-    return Balance(found, found.kinetic, nothing, found.exchanging, nothing > 0)
+    nothing = jnp.zeros_like(energies.kinetic)
+    return Balance(energies, energies.kinetic, nothing, energies.exchanging, nothing > 0)
 
 
 def unknown(nothing: Lanes) -> Balance:
@@ -120,22 +122,22 @@ def unknown(nothing: Lanes) -> Balance:
     return Balance(Energies(nothing, nothing, nothing, none), nothing, nothing, none, none)
 
 
-def followed(balance: Balance, found: Energies, leeway: Lanes) -> tuple[Balance, Flags]:
+def followed(balance: Balance, energies: Energies, leeway: Lanes) -> tuple[Balance, Flags]:
     """Return the balance with one more state, and whether it holds.
 
     Parameters
     ----------
     balance : Balance
         So far.
-    found : Energies
+    energies : Energies
         At the end of a step.
     leeway : array of shape (batch,)
         By how much the error that the step is allowed may change a velocity, times the square root of a mass.
     """
-    change = found.potential - balance.start.potential
-    exchanged = jnp.maximum(balance.exchanged, jnp.maximum(found.kinetic, jnp.abs(change)))
+    change = energies.potential - balance.start.potential
+    exchanged = jnp.maximum(balance.exchanged, jnp.maximum(energies.kinetic, jnp.abs(change)))
     allowed = balance.leeway + leeway * (jnp.sqrt(2.0 * exchanged) + leeway)
-    opened = balance.open | found.exchanging
-    gap = jnp.abs(change + found.kinetic - balance.start.kinetic)
-    kept = gap <= KEPT * exchanged + OFFSET * jnp.maximum(found.size, balance.start.size) + allowed
-    return Balance(balance.start, exchanged, allowed, opened, balance.broken), kept | opened
+    opened = balance.open | energies.exchanging
+    gap = jnp.abs(change + energies.kinetic - balance.start.kinetic)
+    conserved = gap <= ENERGY_TOLERANCE * exchanged + OFFSET * jnp.maximum(energies.size, balance.start.size) + allowed
+    return Balance(balance.start, exchanged, allowed, opened, balance.broken), conserved | opened

@@ -35,7 +35,7 @@ MOST_PIECES = 256  # of a step on average
 WIDTHS = (64,)  # instants evaluated together: one program for few and for many
 REAL = 1e-4  # of a step: an imaginary part below may be that of a real root of several, blurred by rounding
 FAINT = 1e-14  # of a polynomial's coefficients: values below are rounding
-BESIDE = 1e-3  # of a step: where the sign is looked at beside a root
+NEIGHBORHOOD = 1e-3  # of a step: where the sign is looked at beside a root
 EDGE = 1e-9  # of a step: a root at its very end may be found just beyond it, and then again in the next step
 
 
@@ -206,10 +206,10 @@ def _unresolved(
     coefficients = values[..., :-2] @ INTERPOLATION.T
     local = np.abs(coefficients).max(axis=-1)
     size = local if size is None else size
-    beside = np.abs(coefficients @ AT_ENDS.T - values[..., -2:]).max(axis=-1)
+    difference = np.abs(coefficients @ AT_ENDS.T - values[..., -2:]).max(axis=-1)
     last = np.abs(coefficients[..., -LAST:]).max(axis=-1)
     scale = np.maximum(np.maximum(local, LEAST * size[..., step]), 1e-300)
-    return size, (np.maximum(last, beside) / scale).max(axis=0, initial=0.0)
+    return size, (np.maximum(last, difference) / scale).max(axis=0, initial=0.0)
 
 
 def _at(
@@ -274,17 +274,17 @@ class EventDetector:
             series[0] = history[1, -len(time) :].reshape(series[0].shape)
             self._angle = history[:, -1:]
         values = series[derivative] * math.factorial(derivative) - self.event.value
-        found = []
-        for place, coefficients in enumerate(values @ INTERPOLATION.T):
-            k, begin, end = int(pieces.step[place]), pieces.begin[place], pieces.end[place]
-            for root, sense in crossings(coefficients, first=place == 0 and not self._begun):
-                after, rising = float((begin + root * (end - begin)) * length[k]), float(sense * np.sign(length[k]))
+        events = []
+        for index, coefficients in enumerate(values @ INTERPOLATION.T):
+            k, begin, end = int(pieces.step[index]), pieces.begin[index], pieces.end[index]
+            for root, direction in crossings(coefficients, first=index == 0 and not self._begun):
+                after, rising = float((begin + root * (end - begin)) * length[k]), float(direction * np.sign(length[k]))
                 again = self._last[1] == rising and abs(start[k] + after - self._last[0]) < 2 * EDGE * abs(length[k])
                 self._last = float(start[k] + after), rising
                 if not again and self.event.direction * rising >= 0:
-                    found.append((k, after))
+                    events.append((k, after))
         self._begun = True
-        return found
+        return events
 
 
 def crossings(coefficients: Float[np.ndarray, " order"], *, first: bool = False) -> list[tuple[float, float]]:
@@ -310,24 +310,27 @@ def crossings(coefficients: Float[np.ndarray, " order"], *, first: bool = False)
     if not size or not np.isfinite(size) or abs(coefficients[0]) > 1.001 * np.abs(coefficients[1:]).sum():
         return []
     polynomial, faint = np.polynomial.Chebyshev(coefficients, [0, 1]), FAINT * size
-    places = _real_roots(polynomial)
+    roots = _real_roots(polynomial)
     if first and abs(polynomial(0.0)) <= faint:
-        places = np.append(places, 0.0)
+        roots = np.append(roots, 0.0)
     clusters: list[list[float]] = []
-    for place in np.sort(places):
+    for root in np.sort(roots):
         # roots between which the polynomial stays at rounding are one place
-        if clusters and abs(polynomial(0.5 * (clusters[-1][-1] + place))) <= faint:
-            clusters[-1].append(float(place))
+        if clusters and abs(polynomial(0.5 * (clusters[-1][-1] + root))) <= faint:
+            clusters[-1].append(float(root))
         else:
-            clusters.append([float(place)])
+            clusters.append([float(root)])
     edges = [-np.inf, *((a[-1] + b[0]) / 2 for a, b in itertools.pairwise(clusters)), np.inf]
-    found = []
+    crossings_found = []
     for cluster, before, after in zip(clusters, edges, edges[1:], strict=False):
-        place = cluster[len(cluster) // 2]
-        low, high = polynomial(max(before, cluster[0] - BESIDE)), polynomial(min(after, cluster[-1] + BESIDE))
-        if low * high < 0 and -EDGE <= place <= 1 + EDGE and not (first and 0.0 in cluster):
-            found.append((min(max(place, 0.0), 1.0), float(np.sign(high))))
-    return found
+        root = cluster[len(cluster) // 2]
+        low, high = (
+            polynomial(max(before, cluster[0] - NEIGHBORHOOD)),
+            polynomial(min(after, cluster[-1] + NEIGHBORHOOD)),
+        )
+        if low * high < 0 and -EDGE <= root <= 1 + EDGE and not (first and 0.0 in cluster):
+            crossings_found.append((min(max(root, 0.0), 1.0), float(np.sign(high))))
+    return crossings_found
 
 
 def _real_roots(polynomial: np.polynomial.Chebyshev) -> Float[np.ndarray, " root"]:
@@ -336,12 +339,12 @@ def _real_roots(polynomial: np.polynomial.Chebyshev) -> Float[np.ndarray, " root
     last = np.flatnonzero(sizes > 1e-17 * sizes.max())[-1]  # what is below rounding has no root near
     polynomial = polynomial.truncate(last + 1)
     roots = polynomial.roots() if last else np.zeros(0)
-    real = np.real(roots[(np.abs(np.imag(roots)) <= REAL) & (np.abs(np.real(roots) - 0.5) < 0.5 + 10 * BESIDE)])
+    real = np.real(roots[(np.abs(np.imag(roots)) <= REAL) & (np.abs(np.real(roots) - 0.5) < 0.5 + 10 * NEIGHBORHOOD)])
     slope = polynomial.deriv()
     for _ in range(2):
         rate = slope(real)
         step = np.where(rate != 0, polynomial(real) / np.where(rate == 0, 1.0, rate), 0.0)
-        real = real - np.where(np.abs(step) < BESIDE, step, 0.0)
+        real = real - np.where(np.abs(step) < NEIGHBORHOOD, step, 0.0)
     return np.unique(real)
 
 
@@ -369,16 +372,16 @@ class EventLog:
 
     def noted(self, part: Any) -> Any:
         """Note the events in some steps; return those up to the first that is terminal, the last step cut there."""
-        found = [
+        events = [
             (step, after, which)
             for which, detector in enumerate(self.detectors)
             for step, after in detector.detect(part)
         ]
-        for step, after, which in sorted(found, key=lambda x: (x[0], abs(x[1]))):
+        for step, after, which in sorted(events, key=lambda x: (x[0], abs(x[1]))):
             instant = float(part.start[step] + after)
             self.happened[which].append(instant)
             if self.detectors[which].event.terminal:
                 self.stopped_at = instant
-                kept = jax.tree.map(lambda x, count=step + 1: x[:count], part)
-                return kept._replace(length=np.append(part.length[:step], after))
+                cut = jax.tree.map(lambda x, count=step + 1: x[:count], part)
+                return cut._replace(length=np.append(part.length[:step], after))
         return part

@@ -12,7 +12,7 @@ from jax.extend.core import ClosedJaxpr, Literal
 from jounce.jet.operations import ADDITIVE, REARRANGING
 from jounce.jet.programs import inner_program
 
-HIGHEST_DEGREE = 8  # of what is moving: a power such as x**40 is flat, and then a wall
+MAX_DEGREE = 8  # of what is moving: a power such as x**40 is flat, and then a wall
 SUMS = (ADDITIVE | REARRANGING | frozenset(["neg", "optimization_barrier"])) - {"select_n", "gather", "dynamic_slice"}
 WAVES = frozenset(["sin", "cos"])
 PRODUCTS = frozenset(["mul", "dot_general"])
@@ -30,7 +30,7 @@ def is_plain(program: ClosedJaxpr) -> bool:
     False
     """
     degrees = _degrees(program.jaxpr, [1] * len(program.jaxpr.invars))
-    return degrees is not None and max(degrees, default=0) <= HIGHEST_DEGREE
+    return degrees is not None and max(degrees, default=0) <= MAX_DEGREE
 
 
 def uses(program: ClosedJaxpr) -> bool:
@@ -55,10 +55,10 @@ def _degrees(jaxpr: Any, arguments: Sequence[int]) -> list[int] | None:
 
     for equation in jaxpr.eqns:
         degrees = [of(x) for x in equation.invars]
-        found = [0] * len(equation.outvars) if not any(degrees) else _made(equation, degrees)
-        if found is None:
+        degrees_out = [0] * len(equation.outvars) if not any(degrees) else _made(equation, degrees)
+        if degrees_out is None:
             return None
-        known.update(zip(equation.outvars, found, strict=True))
+        known.update(zip(equation.outvars, degrees_out, strict=True))
     return [of(x) for x in jaxpr.outvars]
 
 

@@ -50,12 +50,12 @@ def _derivative(function: Callable[[Numbers], Any], shapes: Any, count: int, deg
         return jax.tree.map(np.asarray, slope(jnp.asarray(vector)))
 
     @jax.custom_jvp
-    def found(vector: Numbers) -> Any:
+    def jvp(vector: Numbers) -> Any:
         return called_back(on_the_host, whole, vector, vmap_method="sequential")
 
-    @found.defjvp
+    @jvp.defjvp
     def along(primals: tuple[Numbers], tangents: tuple[Numbers]) -> tuple[Any, Any]:
         higher = _derivative(function, shapes, count, degree + 1)(*primals)
-        return found(*primals), jax.tree.map(lambda x: x @ tangents[0], higher)
+        return jvp(*primals), jax.tree.map(lambda x: x @ tangents[0], higher)
 
-    return found
+    return jvp

@@ -39,7 +39,7 @@ from jounce.shapes import Numbers
 
 POINTS = 32  # at which each step is looked at,
 ROUNDS_OF_JOINTS = 4  # times as many where joints are looked at
-SPAN_POINTS = 8192  # in the whole run, at least, where steps are few
+RUN_POINTS = 8192  # in the whole run, at least, where steps are few
 HARMLESS = 1e-15  # rad or sizes of the mechanism: what is overlooked may move a body by this
 SHAKE = 2.0**-51  # relative change of state and time by which the rounding of a force is measured
 SPARSE = 7  # of so many nodes, one is used for that, both ways: a jump beside it shows one way only
@@ -95,22 +95,22 @@ def hiding(equations: Equations, state: State, time: Instants) -> dict[int, Floa
 
     The law of a driver is looked at by itself.
     """
-    pose, clock = equations.still(state.position, state.attitude), Jet([time])
-    found, first = {}, 0
+    pose, clock = equations.pose_at_rest(state.position, state.attitude), Jet([time])
+    names, first = {}, 0
     for k, group in enumerate(equations.system.groups):
         bare = law_left_out(group) if group.is_driver else group
         program = jax.make_jaxpr(lambda pose, clock, bare=bare: bare.residual(pose, clock).coefficients[0])(pose, clock)
         rows, count = program.out_avals[0].shape[0], group.instances
         if not is_plain(program):
-            found[k] = equations.system.row_scale[first : first + rows * count].reshape(rows, count, -1)
+            names[k] = equations.system.row_scale[first : first + rows * count].reshape(rows, count, -1)
         first += rows * count
-    return found
+    return names
 
 
 def hiding_names(model: Model, equations: Equations, state: State, time: Instants) -> list[str]:
     """Return the names of the constraints that a series could overlook."""
-    rows, found = group_rows(model), hiding(equations, state, time)
-    return [name for k in found for name in model.rows[rows[k]][: model.system.groups[k].instances]]
+    rows, hidden = group_rows(model), hiding(equations, state, time)
+    return [name for k in hidden for name in model.rows[rows[k]][: model.system.groups[k].instances]]
 
 
 def look_ahead(
@@ -120,7 +120,7 @@ def look_ahead(
     mobility: BodyMobility,
     time: Lanes,
     step: Lanes,
-    span: Lanes,
+    duration: Lanes,
     bound: Lanes,
     shortest: Lanes,
 ) -> Lookahead:
@@ -138,7 +138,7 @@ def look_ahead(
         As `mobility_of` gives it.
     time, step : array of shape (batch,)
         Where the step begins, and its length, negative backward in time, s.
-    span : array of shape (batch,)
+    duration : array of shape (batch,)
         Of the whole run, s: the longer the step in it, the more points it is looked at.
     bound : array of shape (batch,)
         By how much a body may move otherwise than seen, rad or sizes of the mechanism.
@@ -151,7 +151,7 @@ def look_ahead(
     bound = jnp.maximum(bound, HARMLESS)
 
     def seen(part: Any) -> Lookahead:
-        away, moved = signals.departure(part * step, span, mobility)
+        away, moved = signals.departure(part * step, duration, mobility)
         short = jnp.abs(part * step) <= shortest
         over = jnp.where(jnp.isfinite(moved), moved / signals.allowed(bound, short), jnp.inf)
         resolved, index = jnp.all(over <= 1.0, axis=0), jnp.asarray(signals.numbers)[jnp.argmax(over, axis=0)]
@@ -182,16 +182,16 @@ def look_ahead(
     return Lookahead(step * jnp.where(low > 0, low, high), low > 0, kink, best.limiting)
 
 
-def finest(span: Numbers, time: Numbers, crossing: Numbers) -> Numbers:
+def finest(duration: Numbers, time: Numbers, crossing: Numbers) -> Numbers:
     """Return how long a step over a jump may be, s, after so many that have not led over it."""
     longer = jnp.minimum(FINEST * COARSER ** crossing.astype(float), SHORTEST)
-    return longer * jnp.maximum(span, jnp.abs(time))
+    return longer * jnp.maximum(duration, jnp.abs(time))
 
 
-def steps_counted(before: Numbers, step: Numbers, span: Numbers, count: Numbers | bool = True) -> Numbers:
+def steps_counted(before: Numbers, step: Numbers, duration: Numbers, count: Numbers | bool = True) -> Numbers:
     """Return how many steps that hardly move on there are one after the other, with one more; it counts if told."""
-    short = jnp.abs(step) <= SHORTEST * span
-    return jnp.where(short & count, before + 1, jnp.where(jnp.abs(step) > AWAY * span, 0, before))
+    short = jnp.abs(step) <= SHORTEST * duration
+    return jnp.where(short & count, before + 1, jnp.where(jnp.abs(step) > AWAY * duration, 0, before))
 
 
 class _Signals:
@@ -207,10 +207,10 @@ class _Signals:
         watched = hiding(equations, path.map(lambda part: part[0]), time[None])
         joints = [groups[k] for k in watched]
         bodies = sorted({body for group in (*forces, *joints) for slot in group.bodies for body in slot} - {0})
-        places = {body: k for k, body in enumerate([0, *bodies])}
+        columns = {body: k for k, body in enumerate([0, *bodies])}
 
         def among_these(group: Group) -> Group:
-            return Group(group.element, tuple(tuple(places[body] for body in slot) for slot in group.bodies))
+            return Group(group.element, tuple(tuple(columns[body] for body in slot) for slot in group.bodies))
 
         self._equations, self._time, self._drivers, self._given = equations, time, drivers, forces
         self._angles = angles
@@ -230,27 +230,27 @@ class _Signals:
     def allowed(self, bound: Lanes, short: Flags) -> Signals:
         """Return what may be overlooked; over the shortest steps forces may jump, laws and joints hardly."""
         forces, laws = self._split
-        place = np.arange(len(self.numbers))[:, None]
-        least = jnp.where(place < laws, bound[None], jnp.maximum(MARGIN * bound, GAP)[None])
-        jump = jnp.where(place < forces, jnp.finfo(float).max, jnp.maximum(JUMP, bound)[None])
+        index = np.arange(len(self.numbers))[:, None]
+        least = jnp.where(index < laws, bound[None], jnp.maximum(MARGIN * bound, GAP)[None])
+        jump = jnp.where(index < forces, jnp.finfo(float).max, jnp.maximum(JUMP, bound)[None])
         return jnp.where(short[None], jump, least)
 
-    def departure(self, step: Lanes, span: Lanes, mobility: BodyMobility) -> tuple[Signals, Signals]:
+    def departure(self, step: Lanes, duration: Lanes, mobility: BodyMobility) -> tuple[Signals, Signals]:
         """Return how far forces and laws are from the polynomials through the nodes of a step, and what that moves.
 
         Of joints, how far they are from being fulfilled. What may be rounding is taken off. The second is in rad or
         sizes of the mechanism: of a force, what its departure over the step moves bodies by in the whole run.
         """
-        places, shakes = (np.concatenate(parts) for parts in zip((NODES, 0.0 * NODES), _SHAKEN, strict=True))
-        found = jax.vmap(lambda s, shake: self._values(s * step, shake))(places, shakes)
-        knots, shaken = found[: len(NODES)], found[len(NODES) :]
+        points, shakes = (np.concatenate(parts) for parts in zip((NODES, 0.0 * NODES), _SHAKEN, strict=True))
+        signals = jax.vmap(lambda s, shake: self._values(s * step, shake))(points, shakes)
+        knots, shaken = signals[: len(NODES)], signals[len(NODES) :]
         coefficients = _combined(INTERPOLATION, knots)
         if self._joints:
             followed = (np.arange(len(self.numbers)) < self._split[1])[None, None, :, None]
             coefficients = jnp.where(followed, coefficients, 0.0)
         least = ROUNDS_OF_JOINTS if self._joints else 1
-        wanted = jnp.max(jnp.where(span > 0, jnp.abs(step) / span, 0.0)) * (SPAN_POINTS / POINTS)
-        rounds = jnp.clip(jnp.ceil(wanted), least, SPAN_POINTS // POINTS)
+        rounds_needed = jnp.max(jnp.where(duration > 0, jnp.abs(step) / duration, 0.0)) * (RUN_POINTS / POINTS)
+        rounds = jnp.clip(jnp.ceil(rounds_needed), least, RUN_POINTS // POINTS)
         count = rounds * POINTS
         size = jnp.max(jnp.abs(knots), axis=0)
         shaken = jnp.abs(shaken.reshape(2, -1, *shaken.shape[1:]) - knots[None, ::SPARSE])
@@ -259,14 +259,14 @@ class _Signals:
 
         def look(k: Any, carry: tuple[Any, Any]) -> tuple[Any, Any]:
             share = (k * POINTS + jnp.arange(POINTS)).astype(float) / (count - 1.0)  # both ends too
-            found = jax.vmap(lambda s: self._values(s * step, 0.0))(share)
-            away = jnp.abs(found - _combined(_chebyshev(2.0 * share - 1.0).T, coefficients))
-            away = jnp.maximum(away - jnp.maximum(noise[None], FAINT * jnp.abs(found)), 0.0)
+            signals = jax.vmap(lambda s: self._values(s * step, 0.0))(share)
+            away = jnp.abs(signals - _combined(_chebyshev(2.0 * share - 1.0).T, coefficients))
+            away = jnp.maximum(away - jnp.maximum(noise[None], FAINT * jnp.abs(signals)), 0.0)
             return jnp.maximum(carry[0], jnp.max(away, axis=0)), carry[1] + jnp.sum(away, axis=0)
 
         largest, total = jax.lax.fori_loop(0, rounds.astype(int), look, (jnp.zeros_like(size), jnp.zeros_like(size)))
         largest, mean = jnp.max(largest, axis=0), jnp.max(total, axis=0) / count
-        return largest, self._moved(largest, mean * jnp.abs(step * span)[None], mobility)
+        return largest, self._moved(largest, mean * jnp.abs(step * duration)[None], mobility)
 
     def _moved(self, largest: Signals, impulse: Signals, mobility: BodyMobility) -> Signals:
         """Return by how much bodies move for departures of forces, by their impulses in N s^2, and of laws."""
@@ -322,7 +322,7 @@ def _signs(shape: tuple[int, ...]) -> Float[np.ndarray, "component body 1"]:
 
 def _chebyshev(x: Float[Numbers, " place"]) -> Float[Numbers, "polynomial place"]:
     """Return the Chebyshev polynomials at some places."""
-    found = [jnp.ones_like(x), x]
-    while len(found) < len(INTERPOLATION):
-        found.append(2.0 * x * found[-1] - found[-2])
-    return jnp.stack(found)
+    polynomials = [jnp.ones_like(x), x]
+    while len(polynomials) < len(INTERPOLATION):
+        polynomials.append(2.0 * x * polynomials[-1] - polynomials[-2])
+    return jnp.stack(polynomials)

@@ -19,7 +19,7 @@ from jounce.shapes import Numbers
 Number = float | Float[Numbers, ""]
 Sizes = Float[Numbers, "order batch"]
 
-HIGHEST_ORDER = 40
+MAX_ORDER = 40
 LOWEST_ORDER = 4
 NEEDED = (
     LOWEST_ORDER + 2
@@ -197,8 +197,8 @@ def furthest(sizes: Sizes, allowed: Lanes, usual: Lanes | None = None) -> tuple[
         shorter = (cuts + 1.0) * steps - 2.0 * jnp.log(jnp.maximum(usual, 1e-300))[None]
         steps = jnp.minimum(steps, shorter / (cuts - 1.0))
     best = jnp.argmax(steps, axis=0)
-    kept = np.arange(len(sizes))[:, None] <= best[None] + LOWEST_ORDER
-    return kept, jnp.exp(jnp.max(steps, axis=0))
+    used = np.arange(len(sizes))[:, None] <= best[None] + LOWEST_ORDER
+    return used, jnp.exp(jnp.max(steps, axis=0))
 
 
 class Taylor(AbstractMethod):
@@ -222,8 +222,8 @@ class Taylor(AbstractMethod):
     step: float | int | None = None
 
     def __check_init__(self):
-        if self.order is not None and not (isinstance(self.order, int) and 4 <= self.order <= HIGHEST_ORDER):
-            message = f"the order of Taylor series is a whole number from 4 to {HIGHEST_ORDER}"
+        if self.order is not None and not (isinstance(self.order, int) and 4 <= self.order <= MAX_ORDER):
+            message = f"the order of Taylor series is a whole number from 4 to {MAX_ORDER}"
             raise JounceError(message, name="order", value=self.order)
         check_step(self.step)
 
@@ -251,10 +251,10 @@ class Taylor(AbstractMethod):
             return super().prepared(expansion, length, tolerance, singular, usual)
         sizes = coefficient_sizes(expansion, length)
         allowed = jnp.where(singular & _drowned(sizes), jnp.maximum(tolerance, ROUGH), tolerance)
-        kept, step = furthest(sizes, allowed, usual)
+        used, step = furthest(sizes, allowed, usual)
 
         def cut(part: Any) -> Any:
-            return jnp.where(kept[:, None, None], part, 0.0)
+            return jnp.where(used[:, None, None], part, 0.0)
 
         return expansion._replace(state=expansion.state.map(cut)), step, in_proportion(allowed, step, usual)
 
@@ -273,8 +273,11 @@ class Taylor(AbstractMethod):
         order = len(start.state.position) - 1
         series = jnp.concatenate(list(start.state[2:]), axis=1)
         rates = series[1:] * jnp.arange(1.0, order + 1)[:, None, None, None]
-        found = end.acceleration[0]
-        departure = jnp.abs(_horner(rates, step) - found) - ROUNDING * jnp.max(jnp.abs(found), axis=(0, 1))[None, None]
+        acceleration = end.acceleration[0]
+        departure = (
+            jnp.abs(_horner(rates, step) - acceleration)
+            - ROUNDING * jnp.max(jnp.abs(acceleration), axis=(0, 1))[None, None]
+        )
         shifts = start.state.velocity.shape[1]
         size = jnp.maximum(_largest(departure[:shifts]) / length, _largest(departure[shifts:]))
         return jnp.maximum(size, 0.0) * step**2 / (order * (order + 1))

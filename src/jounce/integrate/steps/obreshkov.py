@@ -85,8 +85,8 @@ class Obreshkov(AbstractMethod):
         known = _known(expansion, step, self.highest)
 
         def improved(end: State) -> State:
-            found = expand(equations, end, later, self.highest).state
-            return State(*(a - _terms(c, -step, self.highest) for a, c in zip(known, found, strict=True)))
+            state = expand(equations, end, later, self.highest).state
+            return State(*(a - _terms(c, -step, self.highest) for a, c in zip(known, state, strict=True)))
 
         def iterate(carry: Any) -> Any:
             end, before, _, count = carry
@@ -130,16 +130,16 @@ class Obreshkov(AbstractMethod):
         return jnp.maximum(_size(departure, measure, signed=True), 0.0)
 
 
-def _known(expansion: Expansion, step: Lanes, highest: int) -> State:
+def _known(expansion: Expansion, step: Lanes, max_derivative: int) -> State:
     """Return what the formula takes from the start of a step."""
-    return State(*(c[0] + _terms(c, step, highest) for c in expansion.state))
+    return State(*(c[0] + _terms(c, step, max_derivative) for c in expansion.state))
 
 
 def _terms(
-    coefficients: Float[Numbers, "order component body batch"], step: Lanes, highest: int
+    coefficients: Float[Numbers, "order component body batch"], step: Lanes, max_derivative: int
 ) -> Float[Numbers, "component body batch"]:
     """Return what the formula adds for the derivatives of one end; seen from the other end, the step is negative."""
-    weights = _weights(highest)
+    weights = _weights(max_derivative)
     return total(float(w) * step[None, None] ** j * coefficients[j] for j, w in enumerate(weights, 1))
 
 

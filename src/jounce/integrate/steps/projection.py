@@ -45,12 +45,12 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
 
     def correction(position: Any, attitude: Any) -> tuple[Any, Any]:
         factor = equations.factored(state._replace(position=position, attitude=attitude), time)
-        gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
+        gap = equations.system.residual(equations.pose_at_rest(position, attitude), clock).coefficients[0]
         return factor, gap
 
     def moved(position: Any, attitude: Any, column: Any) -> tuple[Any, Any]:
         change = equations.system.coordinates(column, equations.pose_type.shifts)
-        pose = equations.still(position, attitude).displaced(*change)
+        pose = equations.pose_at_rest(position, attitude).displaced(*change)
         return pose.position.coefficients[0][:, 1:], equations.attitude_of(pose)
 
     def iterate(carry: Any) -> Any:
@@ -60,16 +60,18 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
         factor, gap = correction(position, attitude)
         column = equations.least_change(factor, gap)
         size = jnp.where(inverting, last, jnp.max(jnp.abs(column), axis=0))
-        place = [jnp.where(inverting, x, y) for x, y in zip(carry[:2], moved(position, attitude, column), strict=True)]
+        moved_pose = [
+            jnp.where(inverting, x, y) for x, y in zip(carry[:2], moved(position, attitude, column), strict=True)
+        ]
         known = inverting | jnp.all(size <= CLOSE)
-        return *place, factor, size, jnp.where(count == 0, size, first), count + 1, known
+        return *moved_pose, factor, size, jnp.where(count == 0, size, first), count + 1, known
 
     start = (position, attitude, equations.blank_factor(lanes), jnp.full(lanes, jnp.inf), jnp.zeros(lanes), 0, False)
     position, attitude, factor, last, first, *_ = jax.lax.while_loop(lambda carry: ~carry[-1], iterate, start)
     moving = equations.with_rates(factor, state._replace(position=position, attitude=attitude), time)
     fulfilled = last <= 1e-9
     if equations.system.rank is not None:
-        gap = equations.system.residual(equations.still(position, attitude), clock).coefficients[0]
+        gap = equations.system.residual(equations.pose_at_rest(position, attitude), clock).coefficients[0]
         fulfilled &= jnp.max(jnp.abs(gap), axis=0) <= LARGEST_GAP
     return moving, jnp.where(fulfilled, first, jnp.inf), inverted(factor)
 

@@ -17,7 +17,7 @@ from jounce.jet import Jet
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.shapes import Numbers
 
-PLACES = 16  # in a step: series carry over about one turn in it at most
+POINTS_IN_STEP = 16  # in a step: series carry over about one turn in it at most
 
 
 AnglesOfForces = tuple[Float[Numbers, "_ batch"], ...]
@@ -29,23 +29,23 @@ class Angles(NamedTuple):
 
     Parameters
     ----------
-    places : tuple of array of shape (places, instances, batch)
+    samples : tuple of array of shape (points, instances, batch)
         For each group of forces that measures an angle about an axis, at even parts of the step, rad.
     step : array of shape (batch,)
         s.
     """
 
-    places: tuple[Float[Numbers, "place _ batch"], ...]
+    samples: tuple[Float[Numbers, "place _ batch"], ...]
     step: Lanes
 
     def at(self, since: Lanes) -> AnglesOfForces:
         """Return the angles a time after the beginning, (instances, batch) each, to within half a turn."""
-        if not self.places:
+        if not self.samples:
             return ()
         share = jnp.clip(since / jnp.where(self.step == 0.0, 1.0, self.step), 0.0, 1.0)
-        away = jnp.abs(share[None] * PLACES - jnp.arange(PLACES + 1.0)[:, None])
+        away = jnp.abs(share[None] * POINTS_IN_STEP - jnp.arange(POINTS_IN_STEP + 1.0)[:, None])
         weights = jnp.maximum(1.0 - away, 0.0)[:, None]
-        return tuple(jnp.sum(weights * angles, axis=0) for angles in self.places)
+        return tuple(jnp.sum(weights * angles, axis=0) for angles in self.samples)
 
 
 def measured(equations: Equations, state: State) -> AnglesOfForces:
@@ -56,10 +56,10 @@ def measured(equations: Equations, state: State) -> AnglesOfForces:
     groups = [group for group in equations.system.forces if measures_angle(group)]
     if not groups:
         return ()
-    pose, clock = equations.still(state.position, state.attitude), Jet([jnp.zeros_like(state.position[:1, 0])])
+    pose, clock = equations.pose_at_rest(state.position, state.attitude), Jet([jnp.zeros_like(state.position[:1, 0])])
     shape = state.position.shape[-1:]
-    found = [group.displacement(pose, clock).coefficients[0][0] for group in groups]
-    return tuple(jnp.broadcast_to(angle, angle.shape[:1] + shape) for angle in found)
+    angles = [group.displacement(pose, clock).coefficients[0][0] for group in groups]
+    return tuple(jnp.broadcast_to(angle, angle.shape[:1] + shape) for angle in angles)
 
 
 def followed(equations: Equations, angles: AnglesOfForces, path: State, step: Lanes) -> Angles:
@@ -80,25 +80,25 @@ def followed(equations: Equations, angles: AnglesOfForces, path: State, step: La
         return Angles((), step)
 
     def onwards(near: Any, share: Any) -> tuple[Any, Any]:
-        found = measured(equations.near(near), evaluated(path, share * step))
-        return found, found
+        angles_there = measured(equations.near(near), evaluated(path, share * step))
+        return angles_there, angles_there
 
-    _, found = jax.lax.scan(onwards, angles, jnp.arange(1.0, PLACES + 1) / PLACES)
-    return Angles(tuple(jnp.concatenate([a[None], b]) for a, b in zip(angles, found, strict=True)), step)
+    _, angles_there = jax.lax.scan(onwards, angles, jnp.arange(1.0, POINTS_IN_STEP + 1) / POINTS_IN_STEP)
+    return Angles(tuple(jnp.concatenate([a[None], b]) for a, b in zip(angles, angles_there, strict=True)), step)
 
 
 def attitudes_at(
     series: Float[Numbers, "place order 4 bodies"], since: Float[np.ndarray, " place"]
 ) -> Float[np.ndarray, "4 bodies+1 place"]:
     """Return the Euler parameters of all bodies, the ground first, a time into steps of known Taylor coefficients."""
-    found = np.zeros((len(since), *series.shape[2:]))
+    attitudes = np.zeros((len(since), *series.shape[2:]))
     for k in range(series.shape[1])[::-1]:
-        found = found * since[:, None, None] + np.asarray(series[:, k])
-    return np.asarray(turns_with_ground(np.moveaxis(found, 0, -1)))
+        attitudes = attitudes * since[:, None, None] + np.asarray(series[:, k])
+    return np.asarray(turns_with_ground(np.moveaxis(attitudes, 0, -1)))
 
 
 def attitudes_along(
-    series: Float[Numbers, "step order 4 bodies"], length: Float[np.ndarray, " step"], places: int
+    series: Float[Numbers, "step order 4 bodies"], length: Float[np.ndarray, " step"], points: int
 ) -> Float[np.ndarray, "4 bodies+1 place"]:
     """Return the Euler parameters of all bodies, the ground first, at even parts of steps, and at the end of the last.
 
@@ -108,6 +108,6 @@ def attitudes_along(
     with np.errstate(over="ignore"):  # powers of long steps, in which bodies turn evenly
         powers = length[:, None, None] ** np.arange(series.shape[1])[:, None]
     terms = np.multiply(known, powers, where=known != 0, out=np.zeros_like(known))
-    shares = (np.arange(places)[:, None] / places) ** np.arange(series.shape[1])
-    found = np.concatenate([(shares @ terms).reshape(-1, known.shape[-1]), terms[-1:].sum(axis=1)])
-    return np.asarray(turns_with_ground(np.moveaxis(found.reshape(-1, *series.shape[2:]), 0, -1)))
+    shares = (np.arange(points)[:, None] / points) ** np.arange(series.shape[1])
+    attitudes = np.concatenate([(shares @ terms).reshape(-1, known.shape[-1]), terms[-1:].sum(axis=1)])
+    return np.asarray(turns_with_ground(np.moveaxis(attitudes.reshape(-1, *series.shape[2:]), 0, -1)))

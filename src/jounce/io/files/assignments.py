@@ -33,12 +33,12 @@ def assignments(
     >>> assignments(["BC=15 cm"], "--set", "a parameter is set by NAME=VALUE")
     {'BC': '15 cm'}
     """
-    found: dict[str, str] = {}
+    assigned: dict[str, str] = {}
     for text in texts:
         name, _, value = (part.strip() for part in text.partition("="))
         if not name or not value:
             raise error_type(form, name=option, value=text)
-        if name in found:
-            raise error_type(f"is given more than once, as {found[name]} and as {value}", name=f"{option} {name}")
-        found[name] = value
-    return found
+        if name in assigned:
+            raise error_type(f"is given more than once, as {assigned[name]} and as {value}", name=f"{option} {name}")
+        assigned[name] = value
+    return assigned

@@ -39,12 +39,12 @@ def dumped(data: Mapping[str, Any], suffix: str, path: str = "") -> str:
     """
     from jounce.io.files import parsers
 
-    kept = {key: value for key, value in data.items() if value is not None}
+    entries = {key: value for key, value in data.items() if value is not None}
     write = {".toml": _toml, ".json": _json}.get(suffix, _yaml)
     read = {".toml": parsers.read_toml, ".json": parsers.read_json}.get(suffix, parsers.read_yaml)
-    text = write(kept)
-    found = read(path, text).data
-    if not _same({key: found.get(key) for key in kept}, kept) or len(found) != len(kept):
+    text = write(entries)
+    read_back = read(path, text).data
+    if not _same({key: read_back.get(key) for key in entries}, entries) or len(read_back) != len(entries):
         raise OutputError(f"the data cannot be held by a file of the kind {suffix}", path=path)
     return text
 

@@ -56,28 +56,28 @@ class Source:
 
     def error(self, message: str, location: Location = (), **value: Any) -> JounceError:
         """Return an error that names the file, the line and the dotted name of an entry."""
-        return self.error_type(message, **self.place(location), **value)
+        return self.error_type(message, **self.error_fields(location), **value)
 
-    def place(self, location: Location = ()) -> dict[str, Any]:
+    def error_fields(self, location: Location = ()) -> dict[str, Any]:
         """Return where an entry stands, as errors take it: file, line and dotted name."""
         return {"path": self.path, "line": self.line(location), "name": dotted(location) or None}
 
     def at(self, location: Location) -> Any:
         """Return what stands at a location, None where nothing does."""
-        found = self.data
+        entry = self.data
         for step in location:
-            found = found.get(step) if isinstance(found, dict) else None
-        return found
+            entry = entry.get(step) if isinstance(entry, dict) else None
+        return entry
 
     def mapping(self, location: Location = (), keys: Iterable[str] | None = None) -> dict[str, Any]:
         """Return the mapping at a location, which is not empty and has, where they are given, known keys only."""
-        found = self.at(location)
-        if not isinstance(found, dict) or not found:
-            raise self.error("must be a mapping with at least one entry", location, value=found)
-        for key in found:
+        entry = self.at(location)
+        if not isinstance(entry, dict) or not entry:
+            raise self.error("must be a mapping with at least one entry", location, value=entry)
+        for key in entry:
             if keys is not None and key not in keys:
                 raise self.error(unknown("key", key, keys), (*location, key))
-        return found
+        return entry
 
     def value(
         self,

@@ -38,16 +38,16 @@ class NetcdfParts:
 
     def __init__(self, stream: io.FileIO, example: Any, count: int):
         layout = _layout(example, count)
-        self._stream, self._places = stream, layout.places
+        self._stream, self._offsets = stream, layout.offsets
         _reserve(stream, layout.size)
         for number, block in layout.blocks.items():
             _write_at(stream, number * BLOCK, memoryview(block)[: layout.size - number * BLOCK])
 
     def put(self, part: xarray.Dataset, first: int) -> None:
         """Write the values of a part, of which the first instant has an index in the whole."""
-        for name, (place, dims, dtype) in self._places.items():
+        for name, (offset, dims, dtype) in self._offsets.items():
             values = np.ascontiguousarray(part[name].transpose(*dims).values, dtype)
-            _write_at(self._stream, place + first * values[0].nbytes, values.reshape(-1).view(np.uint8))
+            _write_at(self._stream, offset + first * values[0].nbytes, values.reshape(-1).view(np.uint8))
 
 
 class _Layout(NamedTuple):
@@ -59,20 +59,20 @@ class _Layout(NamedTuple):
         Bytes of the whole file.
     blocks : dict of int to bytearray
         What it holds besides these values, block by block; a block that is not there is left to them.
-    places : dict of str to tuple
+    offsets : dict of str to tuple
         Where the values of a variable begin, its dimensions and its type.
     """
 
     size: int
     blocks: dict[int, bytearray]
-    places: dict[str, tuple[int, tuple[str, ...], np.dtype]]
+    offsets: dict[str, tuple[int, tuple[str, ...], np.dtype]]
 
 
 def _layout(example: Any, count: int) -> _Layout:
     """Return the layout of a file as the example is, but with another number of instants."""
     import h5netcdf
 
-    file, places = _SparseFile(), {}
+    file, offsets = _SparseFile(), {}
     with h5netcdf.File(io.BytesIO(example), "r") as small, h5netcdf.File(file, "w") as large:
         ordered = sorted(small.dimensions.items(), key=lambda named: named[1]._dimid)
         large.dimensions = {name: count if name == "time" else each.size for name, each in ordered}
@@ -81,15 +81,15 @@ def _layout(example: Any, count: int) -> _Layout:
             along = "time" in given.dimensions
             attributes = dict(given.attrs)
             missing = attributes.pop("_FillValue", None)
-            kept = {"dcpl": _left_empty()} if along else {}
-            made = large.create_variable(name, given.dimensions, given.dtype, fillvalue=missing, **kept)
+            settings = {"dcpl": _left_empty()} if along else {}
+            made = large.create_variable(name, given.dimensions, given.dtype, fillvalue=missing, **settings)
             made.attrs.update(attributes)
             if not along:
                 made[...] = given[...]
                 continue
-            place = made._h5ds.id.get_offset()
-            places[name] = place, given.dimensions, made.dtype
-    return _Layout(file.size, file.blocks, places)
+            offset = made._h5ds.id.get_offset()
+            offsets[name] = offset, given.dimensions, made.dtype
+    return _Layout(file.size, file.blocks, offsets)
 
 
 def _left_empty() -> Any:
@@ -114,8 +114,8 @@ def _reserve(stream: io.FileIO, size: int) -> None:
                 raise
 
 
-def _write_at(stream: io.FileIO, place: int, values: Any) -> None:
-    stream.seek(place)
+def _write_at(stream: io.FileIO, offset: int, values: Any) -> None:
+    stream.seek(offset)
     left = memoryview(values)
     while left.nbytes:
         left = left[stream.write(left) :]
@@ -126,7 +126,7 @@ class _SparseFile(io.RawIOBase):
 
     def __init__(self) -> None:
         self.blocks: dict[int, bytearray] = {}
-        self.size = self._place = 0
+        self.size = self._position = 0
 
     def readable(self) -> bool:
         return True
@@ -137,24 +137,24 @@ class _SparseFile(io.RawIOBase):
     def seekable(self) -> bool:
         return True
 
-    def seek(self, place: int, whence: int = os.SEEK_SET) -> int:
-        self._place = place + (0, self._place, self.size)[whence]
-        return self._place
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        self._position = offset + (0, self._position, self.size)[whence]
+        return self._position
 
     def tell(self) -> int:
-        return self._place
+        return self._position
 
     def truncate(self, size: int | None = None) -> int:
-        self.size = self._place if size is None else size
+        self.size = self._position if size is None else size
         return self.size
 
     def readinto(self, into: Any) -> int:
         view = memoryview(into).cast("B")
-        length = max(0, min(len(view), self.size - self._place))
+        length = max(0, min(len(view), self.size - self._position))
         for start, number, part in self._parts(length):
             block = self.blocks.get(number)
             view[start : start + len(part)] = bytes(len(part)) if block is None else block[part.start : part.stop]
-        self._place += length
+        self._position += length
         return length
 
     def write(self, values: Any) -> int:
@@ -162,15 +162,15 @@ class _SparseFile(io.RawIOBase):
         for start, number, part in self._parts(len(view)):
             block = self.blocks.setdefault(number, bytearray(BLOCK))
             block[part.start : part.stop] = view[start : start + len(part)]
-        self._place += len(view)
-        self.size = max(self.size, self._place)
+        self._position += len(view)
+        self.size = max(self.size, self._position)
         return len(view)
 
     def _parts(self, length: int) -> Iterator[tuple[int, int, range]]:
         """Yield where in a span of bytes from here each block begins, the block, and the bytes of it."""
         start = 0
         while start < length:
-            number, within = divmod(self._place + start, BLOCK)
+            number, within = divmod(self._position + start, BLOCK)
             part = range(within, min(BLOCK, within + length - start))
             yield start, number, part
             start += len(part)

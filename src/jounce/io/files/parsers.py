@@ -188,10 +188,10 @@ def read_toml(path: str, text: str) -> Source:
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
+        match = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
         reason = re.sub(r"\s*\(at .*\)$", "", str(error)).encode("ascii", "backslashreplace").decode("ascii")
         reason = re.sub(r"^Cannot (overwrite a value|declare .* twice).*", r"duplicate name (\g<0>)", reason)
-        line = int(place[1]) if place else text.count("\n") + 1
+        line = int(match[1]) if match else text.count("\n") + 1
         raise MechanismFileError(f"the TOML cannot be read: {reason}", path=path, line=line) from None
     except (RecursionError, ValueError) as error:
         raise MechanismFileError(f"the TOML cannot be read: {error}", path=path) from None
@@ -247,7 +247,7 @@ class _TomlLines:
         self.table: Location = ()  # whose keys come
         self.open: list[Location] = []  # arrays and inline tables around the place, where they are
         self.parts: list[str] | None = []  # of the key that is read; None within a value
-        self.place: Location = ()  # of the value that is read
+        self.location: Location = ()  # of the value that is read
 
     def found(self, text: str) -> dict[Location, int]:
         """Return the lines."""
@@ -264,7 +264,7 @@ class _TomlLines:
                 header = 1
             elif token == "=":
                 around = self.open[-1] if self.open else self.table
-                self.place, self.parts = self._note((*around, *self.parts), line), None
+                self.location, self.parts = self._note((*around, *self.parts), line), None
             elif token == "}":
                 self._close()
             elif token != ".":
@@ -295,19 +295,19 @@ class _TomlLines:
             self._close()
             return
         if token == ",":
-            around, last = self.open[-1], self.place[-1]
-            if len(self.place) > len(around) and isinstance(last, int):  # in an array
-                self.place = (*around, last + 1)
+            around, last = self.open[-1], self.location[-1]
+            if len(self.location) > len(around) and isinstance(last, int):  # in an array
+                self.location = (*around, last + 1)
             else:
                 self.parts = []
             return
-        self.lines.setdefault(self.place, line)
+        self.lines.setdefault(self.location, line)
         if token in ("[", "{"):
-            self.open.append(self.place)
-            self.place, self.parts = ((*self.place, 0), None) if token == "[" else (self.place, [])
+            self.open.append(self.location)
+            self.location, self.parts = ((*self.location, 0), None) if token == "[" else (self.location, [])
 
     def _close(self) -> None:
-        self.place, self.parts = self.open.pop(), None
+        self.location, self.parts = self.open.pop(), None
 
     def _note(self, location: Location, line: int) -> Location:
         for length in range(1, len(location)):

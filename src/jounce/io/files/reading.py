@@ -92,10 +92,10 @@ def read_file(
 @contextmanager
 def recording() -> Iterator[dict[str, str]]:
     """Give a dictionary that gets the digest of every input that is read meanwhile, by its real path."""
-    found: dict[str, str] = {}
-    before = _recorded.set(found)
+    texts: dict[str, str] = {}
+    before = _recorded.set(texts)
     try:
-        yield found
+        yield texts
     finally:
         _recorded.reset(before)
 
@@ -121,12 +121,12 @@ def reason_of(error: Exception) -> str:
 
 def _nearby(path: str) -> str:
     """Suggest a file of nearly the same name in the same folder."""
-    wanted = Path(path)
+    requested = Path(path)
     try:
-        names = [entry.name for entry in wanted.parent.iterdir() if entry.suffix == wanted.suffix][:1000]
+        names = [entry.name for entry in requested.parent.iterdir() if entry.suffix == requested.suffix][:1000]
     except (OSError, ValueError):
         return ""
-    suggestion = did_you_mean(wanted.name, names, limit=0)
+    suggestion = did_you_mean(requested.name, names, limit=0)
     return f"; {suggestion}" if suggestion.startswith("did") else ""
 
 
@@ -170,17 +170,17 @@ def named_file(
     JounceError
         Of the type `error`: the file lies elsewhere, where its symbolic links are followed.
     """
-    beside = Path(os.fsdecode(holder)).parent
+    folder_of_holder = Path(os.fsdecode(holder)).parent
     try:
-        found = os.path.realpath((beside if folder is None else Path(folder)) / name)
-        bases = [beside, Path(os.path.realpath(holder)).parent, *allow]
-        below = any(Path(found).is_relative_to(os.path.realpath(base)) for base in bases)
+        resolved = os.path.realpath((folder_of_holder if folder is None else Path(folder)) / name)
+        bases = [folder_of_holder, Path(os.path.realpath(holder)).parent, *allow]
+        below = any(Path(resolved).is_relative_to(os.path.realpath(base)) for base in bases)
     except (OSError, ValueError) as reason:
         raise error(f"cannot be the name of a file: {reason_of(reason)}", value=name) from None
     if not below:
         advice = "put it there, or allow its folder with --allow DIR (in Python allow=[DIR])"
         raise error(f"lies outside the folder of the file that names it; {advice}", value=name)
-    return found
+    return resolved
 
 
 def check_allowed(folders: Iterable[str | PathLike[str]]) -> tuple[str, ...]:
@@ -191,11 +191,11 @@ def check_allowed(folders: Iterable[str | PathLike[str]]) -> tuple[str, ...]:
     MechanismFileError
         One is no folder.
     """
-    found = (folders,) if isinstance(folders, str | PathLike) else tuple(folders)
-    for folder in found:
+    allowed = (folders,) if isinstance(folders, str | PathLike) else tuple(folders)
+    for folder in allowed:
         if not Path(folder).is_dir():
             raise MechanismFileError("must be a folder that exists", name="allow", value=os.fsdecode(folder))
-    return tuple(os.fsdecode(folder) for folder in found)
+    return tuple(os.fsdecode(folder) for folder in allowed)
 
 
 def read_rows(path: str | PathLike[str], error: type[JounceError]) -> Iterator[tuple[int, list[str]]]:

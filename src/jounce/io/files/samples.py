@@ -113,17 +113,21 @@ def read_columns(
     time = table.find("time")
     if len(header) < 2:
         raise table.error("there is no column besides 'time'; give one for each joint", line=line)
-    found = {}
+    columns = {}
     for k, name in enumerate(header):
         rate = _RATE.search(name)
         order = derivative + (int(rate[1]) if rate else 0)
-        found[name] = np.array(table.column(k, (TIME,) if k == time else rates(("angle", "length"), order)))
-    times = found.pop(header[time])
+        columns[name] = np.array(table.column(k, (TIME,) if k == time else rates(("angle", "length"), order)))
+    times = columns.pop(header[time])
     for k in np.flatnonzero(np.diff(times) <= 0)[:1]:
         what = "repeats" if times[k + 1] == times[k] else "comes before"
         message = f"times must increase; this one {what} that of line {table.rows[k][0]}"
         raise table.error(message, line=table.rows[k + 1][0], name="time", value=float(times[k + 1]))
-    return times, found, {name: table.unit(k)[1] for k, name in enumerate(header) if name in found and table.units[k]}
+    return (
+        times,
+        columns,
+        {name: table.unit(k)[1] for k, name in enumerate(header) if name in columns and table.units[k]},
+    )
 
 
 def column_names(path: str | Path, error_type: type[JounceError] = MechanismFileError) -> list[str]:
@@ -133,7 +137,7 @@ def column_names(path: str | Path, error_type: type[JounceError] = MechanismFile
 
 
 def read_chosen(
-    path: str | Path, time: str, wanted: Sequence[str], error_type: type[JounceError] = MechanismFileError
+    path: str | Path, time: str, selection: Sequence[str], error_type: type[JounceError] = MechanismFileError
 ) -> tuple[Float[np.ndarray, " time"], Float[np.ndarray, "time column"]]:
     """Read a column of increasing times, and others in the order given; what else there is may be anything.
 
@@ -151,7 +155,7 @@ def read_chosen(
     for k in np.flatnonzero(np.diff(times) <= 0)[:1]:
         message = f"times must increase; this one does not come after that of line {table.rows[k][0]}"
         raise table.error(message, line=table.rows[k + 1][0], name=time, value=float(times[k + 1]))
-    return times, np.stack([table.column(table.find(name)) for name in wanted], axis=1)
+    return times, np.stack([table.column(table.find(name)) for name in selection], axis=1)
 
 
 def read_table(
@@ -220,7 +224,7 @@ def read_points(
             message = "points have two or three columns; name them in the first row where there are others"
             raise table.error(message, line=table.rows[0][0], value=len(table.header))
         return None, np.stack([table.column(k) for k in range(len(table.header))], axis=1)
-    found = {}
+    targets = {}
     for letter in "xyz":
         named = [k for k, name in enumerate(table.header) if name == letter or name.endswith(f"_{letter}")]
         exact = [k for k in named if table.header[k] == letter] or named
@@ -228,11 +232,11 @@ def read_points(
             message = f"several columns may be the {letter} of the points; name one of them '{letter}'"
             raise table.error(message, line=table.header_line)
         if exact:
-            found[letter] = table.column(exact[0], rates(("length",), 0))
-    if list(found) not in (["x", "y"], ["x", "y", "z"]):
+            targets[letter] = table.column(exact[0], rates(("length",), 0))
+    if list(targets) not in (["x", "y"], ["x", "y", "z"]):
         message = "points need columns x and y, and in space z"
         raise table.error(message, line=table.header_line, value=", ".join(table.header))
-    points = np.stack(list(found.values()), axis=1)
+    points = np.stack(list(targets.values()), axis=1)
     times = np.array(table.column(table.header.index("time"), (TIME,))) if "time" in table.header else None
     return times, points
 
@@ -254,8 +258,8 @@ class _Table:
             pairs = [name_and_unit(known_name(name)) for name in names]
             self.header, self.units = [name for name, _ in pairs], [unit for _, unit in pairs]
 
-    def error(self, message: str, **place: object) -> JounceError:
-        return self.error_type(message, path=self.path, **place)  # type: ignore[arg-type]
+    def error(self, message: str, **location: object) -> JounceError:
+        return self.error_type(message, path=self.path, **location)  # type: ignore[arg-type]
 
     def _check_commas(self) -> None:
         """Refuse a file in which semicolons or tabs are between the entries, as spreadsheets of many countries do."""
@@ -278,28 +282,28 @@ class _Table:
         unit = self.units[number]
         if unit is None:
             return 1.0, NUMBER
-        place = {"line": self.header_line, "name": self.header[number], "value": unit}
+        location = {"line": self.header_line, "name": self.header[number], "value": unit}
         try:
             size, dimension = unit_size(unit)
         except UnitError as error:
-            raise self.error(error.message, **place) from None
+            raise self.error(error.message, **location) from None
         if allowed and dimension not in allowed:
             words = " or ".join(map(describe_dimension, allowed))
-            raise self.error(f"the unit measures {describe_dimension(dimension)}, not {words}", **place)
+            raise self.error(f"the unit measures {describe_dimension(dimension)}, not {words}", **location)
         return size, dimension
 
     def column(self, number: int, allowed: Sequence[Dimension] = ()) -> list[float]:
         """Return the numbers of a column, in SI units."""
         size, _ = self.unit(number, allowed)
-        found = []
+        values = []
         for line, row in self.rows:
             text = row[number] if number < len(row) else ""
             entry = _number(text)
             entry = math.nan if entry is None else entry
             if fault := fault_of_number(entry):
                 raise self.error(fault, line=line, name=self.header[number], value=text)
-            found.append(entry * size)
-        return found
+            values.append(entry * size)
+        return values
 
 
 def _number(text: str) -> float | None:

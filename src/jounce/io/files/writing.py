@@ -102,7 +102,7 @@ def replacing(path: str | PathLike[str], *, overwrite: bool = False) -> Iterator
             before = target.stat() if target.exists() else None
             os.close(os.open(scratch, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666 if before is None else 0o600))
             yield scratch
-            _put_in_place(scratch, target, before)
+            _replace_target(scratch, target, before)
         note_result(target)
     except OutputError as error:
         raise error.located(path=fspath(path)) from None
@@ -110,7 +110,7 @@ def replacing(path: str | PathLike[str], *, overwrite: bool = False) -> Iterator
         raise OutputError(f"cannot be written: {reason_of(error)}", path=fspath(path)) from error
 
 
-def _put_in_place(scratch: Path, target: Path, before: os.stat_result | None) -> None:
+def _replace_target(scratch: Path, target: Path, before: os.stat_result | None) -> None:
     """Put a whole file in the place of the target, with the owner and permissions of the one there."""
     _sync(scratch)
     if before is not None and not _take_over(scratch, before):

@@ -88,7 +88,7 @@ class _CamFile:
             check_name("parameter", name, known, MechanismFileError, name="--set")
         for name, raw in known.items():
             at = ("parameters", name)
-            check_parameter_name(name, source.error_type, **source.place(at))
+            check_parameter_name(name, source.error_type, **source.error_fields(at))
             value = source.value(at, told.get(name, raw), "any", self.parameters, self.dimensions)
             if value.dimension is not None:
                 self.dimensions[name] = value.dimension
@@ -103,7 +103,7 @@ class _CamFile:
         body = self.source.mapping(("cam",), CAM_KEYS)
         base = self._length(("cam", "base_radius"), body)
         sense = body.get("sense", "counterclockwise")
-        check_choice("sense", sense, SENSES, self.source.error_type, **self.source.place(("cam", "sense")))
+        check_choice("sense", sense, SENSES, self.source.error_type, **self.source.error_fields(("cam", "sense")))
         follower = self._follower()
         law = self._law("angle" if follower.turning else "length")
         title = self.data.get("title", "")

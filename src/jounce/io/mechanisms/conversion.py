@@ -77,10 +77,10 @@ def _move_samples(
             if any(Path(file).is_relative_to(folder) for folder in folders):
                 entry["samples"] = Path(os.path.relpath(file, folders[0])).as_posix()
             else:
-                beside = there / Path(file).name
-                while copies.setdefault(beside, file) != file:  # another of the same name
-                    beside = beside.with_name(f"{beside.stem}_{beside.suffix}")
-                entry["samples"] = beside.name
+                target = there / Path(file).name
+                while copies.setdefault(target, file) != file:  # another of the same name
+                    target = target.with_name(f"{target.stem}_{target.suffix}")
+                entry["samples"] = target.name
         _move_samples(entry, path, there, allow, copies)
 
 
@@ -110,16 +110,16 @@ def assigned(robot: Robot, texts: Iterable[str], option: str, *, law: bool) -> d
     >>> assigned(scara, ["quill=5 cm"], "--start", law=False)
     {'quill': 0.05}
     """
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     form = "a joint is given a value by JOINT=VALUE, such as 'elbow=30 deg'"
     for name, value in assignments(texts, option, form).items():
         check_name("moving joint", name, robot.joint_names, JounceError, name=option)
         kind = "angle" if robot.joints[name].turning else "length"
         try:
-            found[name] = parse_value(_number_or_text(value), kind, ("t",) if law else ()).value
+            values[name] = parse_value(_number_or_text(value), kind, ("t",) if law else ()).value
         except JounceError as error:
             raise error.located(name=f"{option} {name}", value=value) from None
-    return found
+    return values
 
 
 def _number_or_text(text: str) -> float | str:
@@ -147,15 +147,15 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
     """
     links = _file_names(name for name in robot.links if name != robot.base)
     links[robot.base] = robot.base
-    held = _file_names([*robot.joints, *robot.closures])
-    changed = {old: new for names in (links, held) for old, new in names.items() if old != new}
+    file_names = _file_names([*robot.joints, *robot.closures])
+    changed = {old: new for names in (links, file_names) for old, new in names.items() if old != new}
     if not changed:
         return robot, {}
 
     def joint(given: Any) -> Any:
-        mimic = given.mimic and dataclasses.replace(given.mimic, joint=held[given.mimic.joint])
+        mimic = given.mimic and dataclasses.replace(given.mimic, joint=file_names[given.mimic.joint])
         ends = {"parent": links[given.parent], "child": links[given.child]}
-        return dataclasses.replace(given, name=held[given.name], mimic=mimic, **ends)
+        return dataclasses.replace(given, name=file_names[given.name], mimic=mimic, **ends)
 
     made = Robot(
         robot.name,
@@ -163,7 +163,7 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
         [joint(given) for given in robot.joints.values()],
         robot.gravity,
         [
-            dataclasses.replace(given, name=held[given.name], links=[links[name] for name in given.links])
+            dataclasses.replace(given, name=file_names[given.name], links=[links[name] for name in given.links])
             for given in robot.closures.values()
         ],
         robot.strict,
@@ -172,17 +172,17 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
 
 
 def _file_names(names: Iterable[str]) -> dict[str, str]:
-    found: dict[str, str] = {}
+    by_name: dict[str, str] = {}
     names = list(names)
     for name in names:
         new = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:80] or "part"
         new = f"_{new}" if new.startswith("-") else new
         if new == GROUND or names_column(new):
             new += "_"
-        while new in found.values() or (new != name and new in names):
+        while new in by_name.values() or (new != name and new in names):
             new += "_"
-        found[name] = new
-    return found
+        by_name[name] = new
+    return by_name
 
 
 def robot_mechanism(

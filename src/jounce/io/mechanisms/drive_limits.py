@@ -52,30 +52,30 @@ def load_drive_limits(path: str | PathLike[str], mechanism: Mechanism) -> dict[s
     """
     source = read_source(path, kind="limits", error_type=MechanismFileError)
     data = source.mapping((), ("title", "drivers", "outputs"))
-    found: dict[str, Limits] = {}
+    limits: dict[str, Limits] = {}
     for kind, known in (("drivers", mechanism.drivers), ("outputs", mechanism.outputs)):
         for name in source.mapping((kind,)) if kind in data else ():
             at: Location = (kind, name)
             if name not in known:
                 raise source.error(no_such(kind[:-1], name, list(known)), at)
-            if name in found:
+            if name in limits:
                 raise source.error("a driver and an output of one name cannot both have limits; rename one", at)
             keys = (*RATES, *EFFORTS) if kind == "drivers" else tuple(RATES)
             values: dict[str, float] = {}
             for key, raw in source.mapping(at, keys).items():
                 value = source.value((*at, key), raw)
                 turns = _turns(mechanism, kind, name)
-                wanted = _dimension(key, turns)
-                if value.dimension and value.dimension != wanted:
-                    message = f"must be {describe_dimension(wanted)}, not {describe_dimension(value.dimension)}"
+                dimension = _dimension(key, turns)
+                if value.dimension and value.dimension != dimension:
+                    message = f"must be {describe_dimension(dimension)}, not {describe_dimension(value.dimension)}"
                     raise source.error(message, (*at, key), value=raw)
                 if not isinstance(value.value, float) or not math.isfinite(value.value) or value.value <= 0:
                     raise source.error("must be a finite number greater than zero", (*at, key), value=raw)
                 values[key] = value.value
-            found[name] = dataclasses.replace(Limits(), **values)
-    if not found:
+            limits[name] = dataclasses.replace(Limits(), **values)
+    if not limits:
         raise source.error("a file of limits of a mechanism has the keys 'drivers', 'outputs' or both")
-    return found
+    return limits
 
 
 def _turns(mechanism: Mechanism, kind: str, name: str) -> bool:

@@ -41,8 +41,8 @@ class FileLaws:
         if isinstance(value, AbstractMotion):
             return value
         if hasattr(value, "held"):
-            held = self.law((*location, "law"), value.held, following)
-            return OutputMotion(value.output, held if isinstance(held, AbstractMotion | Expression) else repr(held))
+            fixed = self.law((*location, "law"), value.held, following)
+            return OutputMotion(value.output, fixed if isinstance(fixed, AbstractMotion | Expression) else repr(fixed))
         if hasattr(value, "samples"):
             law, by = self._spline(location, value), value.of
         elif hasattr(value, "driver"):

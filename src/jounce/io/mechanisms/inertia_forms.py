@@ -69,14 +69,14 @@ def _pseudo(raw: dict[str, Any], size: int, info: Any) -> dict[str, Any]:
     matrix = raw["pseudo"]
     if not isinstance(matrix, (list, tuple)) or len(matrix) != size:
         raise problem(f"must be {size} rows of {size}", "pseudo", value=matrix)
-    found = []
+    moments = []
     for i, row in enumerate(matrix):
         if not isinstance(row, (list, tuple)) or len(row) != size:
             raise problem(f"must be a row of {size} values", "pseudo", i, value=row)
         kinds = ["inertia" if i < size - 1 else "first moment"] * (size - 1)
         kinds.append("first moment" if i < size - 1 else "mass")
-        found.append(tuple(parse(x, kinds[k], info, "pseudo", i, k).value for k, x in enumerate(row)))
-    return {"pseudo": tuple(found)}
+        moments.append(tuple(parse(x, kinds[k], info, "pseudo", i, k).value for k, x in enumerate(row)))
+    return {"pseudo": tuple(moments)}
 
 
 def _solid(raw: dict[str, Any], info: Any) -> dict[str, Any]:
@@ -94,13 +94,13 @@ def _solid(raw: dict[str, Any], info: Any) -> dict[str, Any]:
             raise problem("is missing", key, value=UNSET)
     if raw.get("axis", "x") not in AXES:
         raise problem("must be x, y or z", "axis", value=raw["axis"])
-    found = dict(raw)
+    entries = dict(raw)
     for key, value in raw.items():
         if key == "size":
-            found[key] = vector_value(value, 3, "length", info, key)
+            entries[key] = vector_value(value, 3, "length", info, key)
         elif key not in ("solid", "axis"):
-            found[key] = parse(value, "density" if key == "density" else "length", info, key).value
-    return found
+            entries[key] = parse(value, "density" if key == "density" else "length", info, key).value
+    return entries
 
 
 def _solid_keys(kind: str) -> tuple[str, ...]:
@@ -191,8 +191,8 @@ def expanded(given: dict[str, Any], parameters: dict[str, Any], *, planar: bool)
     axis = check_solid(kind, form.get("axis", ""), values)
     volume, moments = solid_moments(kind, axis, {key: _open(value) for key, value in sizes.items()})
     mass = _open(mass) if density is None else _open(density) * volume
-    found = [mass * moment for moment in moments]
-    return {"mass": _closed(mass), "inertia": _closed(found[2] if planar else found)}
+    products = [mass * moment for moment in moments]
+    return {"mass": _closed(mass), "inertia": _closed(products[2] if planar else products)}
 
 
 def _from_pseudo(matrix: Any, parameters: dict[str, Any], *, planar: bool) -> dict[str, Any]:

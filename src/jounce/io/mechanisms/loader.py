@@ -28,7 +28,7 @@ from jounce.settings import under_own_settings
 from jounce.trajectory import Expression
 from jounce.units.values import parse_value
 
-_Places = dict[str, tuple[Location, tuple[FileKey, ...]]]
+_Locations = dict[str, tuple[Location, tuple[FileKey, ...]]]
 """Where in the file the elements of a mechanism stand, by dotted name, and the keys of each."""
 
 
@@ -69,14 +69,14 @@ def load(path: str | PathLike[str], *, allow: Iterable[str | PathLike[str]] = ()
     source = read_source(path, allow)
     space = _space(source)
     model = _validate(source, space)
-    places: _Places = {}
+    locations: _Locations = {}
     try:
-        mechanism = _build(source, space, model, places)
+        mechanism = _build(source, space, model, locations)
         _check_values(mechanism)
     except MechanismFileError:
         raise
     except JounceError as error:
-        location = _find(error.name, places)
+        location = _find(error.name, locations)
         known = location if source.line(location) is not None else ()
         raise source.error(error.message, known or location, value=error.value) from None
     warn_of_units(source, mechanism)
@@ -128,30 +128,30 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
 
 def _driven_quantities(drivers: object, space: str) -> dict[str, str]:
     """Return what drivers drive, by their names: an angle, a length, or anything where that is not known (yet)."""
-    kinds, found = dict(catalogue(space, "driver")), {}
+    kinds, quantities = dict(catalogue(space, "driver")), {}
     for name, raw in drivers.items() if isinstance(drivers, dict) else ():
         given = raw if isinstance(raw, dict) else {}
         kind = kinds.get(str(given.get("type")))
         quantity = next((key.quantity for key in file_keys(kind) if key.kind == "motion"), "any") if kind else "any"
-        found[name] = at_coordinate(quantity, given.get("coordinate"))
-    return found
+        quantities[name] = at_coordinate(quantity, given.get("coordinate"))
+    return quantities
 
 
 def _dimensions(parameters: dict[str, Any]) -> dict[str, Any]:
     """Return the dimensions of those parameters that have a unit, or follow from others that have one."""
-    found: dict[str, Any] = {}
+    dimensions: dict[str, Any] = {}
     waiting, count = dict(parameters), -1
-    while len(found) > count:
-        count = len(found)
+    while len(dimensions) > count:
+        count = len(dimensions)
         for name, raw in list(waiting.items()):
             try:
-                dimension = parse_value(raw, "any", parameters, found).dimension
+                dimension = parse_value(raw, "any", parameters, dimensions).dimension
             except JounceError:  # told where it stands
                 continue
             if dimension is not None:
-                found[name] = dimension
+                dimensions[name] = dimension
                 del waiting[name]
-    return found
+    return dimensions
 
 
 def _plain(model: Any) -> dict[str, Any]:
@@ -159,7 +159,7 @@ def _plain(model: Any) -> dict[str, Any]:
     return {field.alias: getattr(model, name) for name, field in type(model).model_fields.items()}
 
 
-def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -> Mechanism:
+def _build(source: Source, space: str, model: dict[str, Any], locations: _Locations) -> Mechanism:
     parameters = model["parameters"]
     bare = Mechanism(
         space=space, bodies={"any": Body([0.0] * POSITION_COMPONENTS[space])}, joints={}, parameters=parameters
@@ -172,7 +172,7 @@ def _build(source: Source, space: str, model: dict[str, Any], places: _Places) -
     return Mechanism(
         space=space,
         bodies={name: _body(source, space, name, _plain(body), values) for name, body in model["bodies"].items()},
-        **{kind: _elements(laws, space, kind, model[kind], places) for kind in (*ROLES, "outputs")},
+        **{kind: _elements(laws, space, kind, model[kind], locations) for kind in (*ROLES, "outputs")},
         parameters=parameters,
         gravity=model["gravity"],
         time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
@@ -205,37 +205,39 @@ def _body(source: Source, space: str, name: str, given: dict[str, Any], paramete
 
 def _arguments(keys: tuple[FileKey, ...], given: dict[str, Any]) -> dict[str, Any]:
     """Turn values by key into values by field; keys not given are left to their defaults."""
-    found = {}
+    arguments = {}
     for key in keys:
         value = given[key.key]
         if value is not None:
-            found |= dict(zip(key.fields, value if len(key.fields) > 1 else (value,), strict=True))
-    return found
+            arguments |= dict(zip(key.fields, value if len(key.fields) > 1 else (value,), strict=True))
+    return arguments
 
 
-def _elements(laws: FileLaws, space: str, section: str, models: dict[str, Any], places: _Places) -> dict[str, Any]:
+def _elements(
+    laws: FileLaws, space: str, section: str, models: dict[str, Any], locations: _Locations
+) -> dict[str, Any]:
     """Build joints, drivers, forces or outputs, and note where their fields stand in the file."""
     from jounce.io.mechanisms.output_types import output_types  # as the schema, which was imported before
 
     outputs = {f"{space}_{tag.replace(' ', '_')}": kind for tag, (_, kind) in output_types(space).items()}
-    found = {}
+    elements = {}
     for name, model in models.items():
-        given, place = _plain(model), f"{section}.{name}"
+        given, name_in_file = _plain(model), f"{section}.{name}"
         if section == "outputs":
             kind: Any = outputs[type(model).__name__]
         else:
             kind = catalogue(space, ROLES[section])[given["type"]]
-        places[place] = ((section, name), file_keys(kind))
-        arguments = _arguments(places[place][1], given)
+        locations[name_in_file] = ((section, name), file_keys(kind))
+        arguments = _arguments(locations[name_in_file][1], given)
         arguments = {field: laws.law((section, name, field), x) for field, x in arguments.items()}
         if kind.body_count:
             arguments["bodies"] = given["bodies"] if kind.body_count > 1 else (given["body"],)
         try:
-            found[name] = kind(**arguments)
+            elements[name] = kind(**arguments)
         except JounceError as error:  # of a constructor, which knows its fields only
-            error.name = f"{place}.{error.name}" if error.name else place
+            error.name = f"{name_in_file}.{error.name}" if error.name else name_in_file
             raise
-    return found
+    return elements
 
 
 def _check_values(mechanism: Mechanism) -> None:
@@ -257,13 +259,13 @@ def _check_values(mechanism: Mechanism) -> None:
         time_grid(mechanism.time, parameters)
 
 
-def _find(name: str | None, places: _Places) -> Location:
+def _find(name: str | None, locations: _Locations) -> Location:
     """Return the location in the file of a dotted name of the mechanism."""
     if not name:
         return ()
-    for place, (location, keys) in places.items():
-        if name.startswith(f"{place}."):
-            return (*location, *location_of(keys, name.removeprefix(f"{place}.")))
-        if name == place:
+    for known, (location, keys) in locations.items():
+        if name.startswith(f"{known}."):
+            return (*location, *location_of(keys, name.removeprefix(f"{known}.")))
+        if name == known:
             return location
     return tuple(name.split("."))

@@ -75,13 +75,13 @@ def write_revised(
         with scratch.open("w", encoding="utf-8", newline="") as stream:
             stream.write(revised)
         try:
-            found = load(scratch, allow=allow)
+            read_back = load(scratch, allow=allow)
         except JounceError as error:
             error.path = fspath(path)
             raise
-        read = found.parameter_values
+        read = read_back.parameter_values
         wrong = [name for name, value in values.items() if abs(read[name] - value) > ROUNDING * abs(value)]
-        if wrong or found.assembly != mechanism.assembly:
+        if wrong or read_back.assembly != mechanism.assembly:
             message = "what would be written does not read back as the same design"
             raise MechanismFileError(message, path=fspath(path), name=f"parameters.{wrong[0]}" if wrong else "assembly")
 
@@ -157,8 +157,8 @@ def _spliced(text: str, values: Mapping[str, Any], assembly: Any) -> str:
     root = YAML(typ="rt", pure=True).compose(text)
     assert isinstance(root, MappingNode)
     entries = {key.value: node for key, node in root.value}
-    places = {key.value: node for key, node in entries["parameters"].value}
-    splices = [(places[name], _scalar(value, places[name])) for name, value in values.items()]
+    nodes = {key.value: node for key, node in entries["parameters"].value}
+    splices = [(nodes[name], _scalar(value, nodes[name])) for name, value in values.items()]
     if assembly is not None and "assembly" in entries:
         splices.append((entries["assembly"], str(assembly)))
     for node, new in sorted(splices, key=lambda splice: splice[0].start_mark.index, reverse=True):

@@ -254,6 +254,6 @@ def file_model(space: str, *, own_types: bool = True) -> type[BaseModel]:
     """
     types = []
     for role in ("joint", "driver", "force"):
-        found = catalogue(space, role).items()
-        types.append(tuple((n, kind) for n, kind in found if own_types or kind.__module__.startswith("jounce.")))
+        models = catalogue(space, role).items()
+        types.append(tuple((n, kind) for n, kind in models if own_types or kind.__module__.startswith("jounce.")))
     return _file_model(space, *types)

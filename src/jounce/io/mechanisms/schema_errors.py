@@ -116,21 +116,21 @@ def _unknown_type(source: Source, space: str, at: Location, entry: dict[str, Any
 def _unknown_output(source: Source, space: str, at: Location, entry: dict[str, Any]) -> JounceError:
     quantity, forms = entry.get("quantity"), output_types(space)
     quantities = {word for word, _ in forms.values() if word}
-    place = (*at, "quantity")
+    location = (*at, "quantity")
     for holder in ("driver", "joint", "force"):
         if holder in entry:
             valid = [word for word, kind in forms.values() if word and output_holder(kind) == holder]
             if quantity is None:
-                return source.error(f"is missing; valid: {', '.join(sorted(set(valid)))}", place)
+                return source.error(f"is missing; valid: {', '.join(sorted(set(valid)))}", location)
             message = f"a {holder} has no such quantity; {did_you_mean(quantity, valid)}"
-            return source.error(message, place, value=quantity)
+            return source.error(message, location, value=quantity)
     if quantity in ("force", "torque", "reaction"):
         message = "name a driver, joint or force, as in {driver: theta, quantity: torque}"
-        return source.error(message, place, value=quantity)
+        return source.error(message, location, value=quantity)
     if isinstance(quantity, str) and quantity in quantities:
         body = "bodies: [i, j]" if "bodies" not in entry else "body"
         return source.error(f"in {space} space the quantity '{quantity}' takes {body}", at, value=entry)
     if quantity is None:
         message = "give a point of one body, or a quantity"
         return source.error(f"{message}; {did_you_mean('', quantities)}", at, value=entry)
-    return source.error(no_such("output", quantity, quantities, "quantity"), place, value=quantity)
+    return source.error(no_such("output", quantity, quantities, "quantity"), location, value=quantity)

@@ -50,19 +50,19 @@ def warn_of_units(source: Source, mechanism: Mechanism) -> None:
     UnitWarning
         With the file, the line, the name and what may be meant.
     """
-    told = set()
+    warned = set()
     for location, value in _angles(source.data, mechanism):
         if why := number_doubt(value):
-            told.add(location[:3])
+            warned.add(location[:3])
             _warn(source, location, why)
     run, laws = _run(mechanism), list(laws_of_angles(mechanism))
     angles = frozenset(name for name, dimensions in mechanism.dimensions.items() if ANGLE in dimensions)
-    for found in laws:
-        at: Location = ("drivers", found.name, "motion")
-        why = degrees_doubt(found.law, *run)
-        if at in told or why:
-            settle(found.driver)  # told now, or known to be meant as it stands
-        if why and at not in told and not names_angle(found, angles) and not _has_unit(source, at):
+    for law in laws:
+        at: Location = ("drivers", law.name, "motion")
+        why = degrees_doubt(law.law, *run)
+        if at in warned or why:
+            settle(law.driver)  # told now, or known to be meant as it stands
+        if why and at not in warned and not names_angle(law, angles) and not _has_unit(source, at):
             _warn(source, at, why)
     _warn_of_lengths(source, mechanism, laws)
 
@@ -83,7 +83,7 @@ def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], op
     -----
     UnitWarning
     """
-    old, new, told = before.parameter_values, after.parameter_values, False
+    old, new, warned = before.parameter_values, after.parameter_values, False
     for name in given:
         dimensions, value = after.dimensions.get(name, ()), float(new[name])
         was = abs(float(old[name]))
@@ -93,17 +93,17 @@ def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], op
             hint = f"{value:g} m is {float(f'{abs(value) / was:.1g}'):g} times what it was: {value:g} mm?"
         else:
             continue
-        told = True
+        warned = True
         warnings.warn(UnitWarning(f"{option} {name}: {hint} {IN_SI}"), stacklevel=3)
     run = _run(before)
-    known = {found.name for found in laws_of_angles(before) if degrees_doubt(found.law, *run)}
+    known = {law.name for law in laws_of_angles(before) if degrees_doubt(law.law, *run)}
     run = _run(after)
-    for found in laws_of_angles(after):
-        if not (why := degrees_doubt(found.law, *run)):
+    for law in laws_of_angles(after):
+        if not (why := degrees_doubt(law.law, *run)):
             continue
-        settle(found.driver)
-        if not told and found.name not in known:
-            warnings.warn(UnitWarning(f"{option}: now the law of drivers.{found.name} {why} {IN_SI}"), stacklevel=3)
+        settle(law.driver)
+        if not warned and law.name not in known:
+            warnings.warn(UnitWarning(f"{option}: now the law of drivers.{law.name} {why} {IN_SI}"), stacklevel=3)
 
 
 def _is_thousandfold(value: float, usual: float) -> bool:
@@ -152,8 +152,8 @@ def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[AngleL
 def _too_large(mechanism: Mechanism, size: float, laws: Iterable[AngleLaw]) -> str:
     """Word why no mechanism of this one's motion or masses is of a size, m; nothing if there may be one."""
     first, last = _run(mechanism)
-    for found in laws:
-        values = values_of(found.law, first, last)
+    for law in laws:
+        values = values_of(law.law, first, last)
         if values is not None and last > first:
             fastest = float(np.abs(np.diff(values)).max()) * (len(values) - 1) / (last - first)
             if fastest * size > FAST:

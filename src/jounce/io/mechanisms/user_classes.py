@@ -30,8 +30,8 @@ def import_file(path: str | PathLike[str]) -> None:
     if not name.endswith(".py"):
         raise MechanismFileError("own joints come from a Python file, ending in .py", path=name)
     read_file(name)
-    place = zlib.crc32(os.fsencode(Path(name).resolve()))  # files of one name in two folders hold different classes
-    module_name = f"jounce_own_{Path(name).stem}_{place:08x}"
+    checksum = zlib.crc32(os.fsencode(Path(name).resolve()))  # files of one name in two folders hold different classes
+    module_name = f"jounce_own_{Path(name).stem}_{checksum:08x}"
     spec = importlib.util.spec_from_file_location(module_name, name)
     if spec is None or spec.loader is None:
         raise MechanismFileError("cannot be read as Python", path=name)
@@ -49,9 +49,9 @@ def import_file(path: str | PathLike[str]) -> None:
 
 def _line(error: BaseException, path: str) -> int | None:
     """Return the last line of the file that a traceback passes through."""
-    found, step = None, error.__traceback__
+    line, step = None, error.__traceback__
     while step is not None:
         if step.tb_frame.f_code.co_filename == path:
-            found = step.tb_lineno
+            line = step.tb_lineno
         step = step.tb_next
-    return found
+    return line

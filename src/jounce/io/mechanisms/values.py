@@ -193,12 +193,12 @@ def redundant_reactions() -> Any:
             if raw not in CHOICES:
                 raise problem(f"must be one of {', '.join(CHOICES)}, or stiffnesses by the names of joints")
             return raw
-        found: dict[Any, dict[str, Any]] = {}
+        stiffnesses: dict[Any, dict[str, Any]] = {}
         for name, given in raw.items():
             if not isinstance(given, dict) or not given or not set(given) <= set(STIFFNESSES):
                 raise problem("must be the stiffness of the joint: force, torque, or both", name, value=given)
-            found[name] = {key: parse(x, STIFFNESSES[key], info, name, key).value for key, x in given.items()}
-        return found
+            stiffnesses[name] = {key: parse(x, STIFFNESSES[key], info, name, key).value for key, x in given.items()}
+        return stiffnesses
 
     by_joint = object_schema({key: scalar_schema(kind) for key, kind in STIFFNESSES.items()}, ())
     forms = [{"enum": list(CHOICES)}, {"type": "object", "additionalProperties": by_joint, "minProperties": 1}]

@@ -64,11 +64,11 @@ def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrit
     data, samples = mechanism_data(mechanism, Path(path).stem)
     text = dumped(data, Path(path).suffix.lower(), str(path))
     tables = {Path(path).parent / name: columns for name, columns in samples.items()}
-    for beside in tables:  # all, before the first is replaced
-        check_target(beside, overwrite=overwrite)
-    for beside, (times, values) in tables.items():
+    for table_file in tables:  # all, before the first is replaced
+        check_target(table_file, overwrite=overwrite)
+    for table_file, (times, values) in tables.items():
         rows = "".join(f"{t!r},{x!r}\n" for t, x in zip(times, values, strict=True))
-        with replacing(beside, overwrite=overwrite) as scratch:
+        with replacing(table_file, overwrite=overwrite) as scratch:
             scratch.write_text(f"time,value\n{rows}", encoding="utf-8")
     with replacing(path, overwrite=overwrite) as scratch:
         scratch.write_text(text, encoding="utf-8")
@@ -137,64 +137,70 @@ class _Writer:
         return found, self.laws.samples
 
     def _body(self, name: str, body: Body) -> dict[str, Any]:
-        place = f"bodies.{name}"
-        found = {"position": plain(body.position, f"{place}.position")}
+        location = f"bodies.{name}"
+        entries = {"position": plain(body.position, f"{location}.position")}
         if self.mechanism.space == "planar":
-            found["angle"] = plain(body.angle, f"{place}.angle")
+            entries["angle"] = plain(body.angle, f"{location}.angle")
         elif body.orientation is not None:
             given = body.orientation
             form = given if isinstance(given, Mapping) else {"quaternion": given}
-            found["orientation"] = plain(form, f"{place}.orientation")
+            entries["orientation"] = plain(form, f"{location}.orientation")
         for key in ("mass", "inertia", "center_of_mass"):
             value = getattr(body, key)
             if value is not None:
-                found[key] = plain(_tensor(value) if key == "inertia" else value, f"{place}.{key}")
-        return found
+                entries[key] = plain(_tensor(value) if key == "inertia" else value, f"{location}.{key}")
+        return entries
 
     def _element(self, section: str, name: str, element: Any) -> dict[str, Any]:
-        place, kind = f"{section}.{name}", type(element)
+        location, kind = f"{section}.{name}", type(element)
         if catalogue(self.mechanism.space, ROLES[section]).get(kind.type_name) is not kind:
             message = f"the class {kind.__name__} has no type by which a file could name it"
-            raise MechanismError(message, name=place)
+            raise MechanismError(message, name=location)
         found: dict[str, Any] = {"type": kind.type_name}
-        alone = kind.body_count == 1
-        found |= {"body": element.bodies[0]} if alone else {"bodies": list(element.bodies)}
-        return found | self._values(place, element)
+        single = kind.body_count == 1
+        found |= {"body": element.bodies[0]} if single else {"bodies": list(element.bodies)}
+        return found | self._values(location, element)
 
     def _output(self, name: str, output: Any) -> dict[str, Any]:
-        place, kind = f"outputs.{name}", form_of(output)
+        location, kind = f"outputs.{name}", form_of(output)
         words = [word for word, known in OUTPUTS if known is kind]
         if not words:
-            raise MechanismError(f"the output {kind.__name__} has no form in a file", name=place)
+            raise MechanismError(f"the output {kind.__name__} has no form in a file", name=location)
         holder = output_holder(kind)
-        found: dict[str, Any] = {}
+        entries: dict[str, Any] = {}
         if kind.body_count:
-            found[holder] = output.bodies[0] if holder == "body" else list(output.bodies)
+            entries[holder] = output.bodies[0] if holder == "body" else list(output.bodies)
         elif holder == "mechanism":
-            found["mechanism"] = True
-        values = self._values(place, output, kind)
+            entries["mechanism"] = True
+        values = self._values(location, output, kind)
         if holder in values:
-            found[holder] = values.pop(holder)
+            entries[holder] = values.pop(holder)
         if words[-1] is not None:  # of a joint, reaction rather than force
-            found["quantity"] = words[-1]
-        return found | values
+            entries["quantity"] = words[-1]
+        return entries | values
 
+<<<<<<< HEAD
     def _values(self, place: str, element: Any, kind: type[Any] | None = None) -> dict[str, Any]:
         """Return the values of an element by key; those that a file need not give are left out."""
         kind = kind or type(element)
         found: dict[str, Any] = {}
+=======
+    def _values(self, location: str, element: Any) -> dict[str, Any]:
+        """Return the values of an element by key; those that a file need not give are left out."""
+        kind, entries = type(element), {}
+>>>>>>> names
         fields = value_fields(kind)
         for key in file_keys(kind):
             values = [getattr(element, field) for field in key.fields]
             if not key.required and all(_is_default(x, fields[f]) for x, f in zip(values, key.fields, strict=True)):
                 continue
-            where = f"{place}.{key.key}"
+            where = f"{location}.{key.key}"
             if key.kind in ("motion", "law", "laws"):
                 written: list[Any] = [self.laws.written(where, x, element) for x in values]
             else:
                 written = [plain(value, where) for value in values]
-            found[key.key] = written[0] if len(written) == 1 else written
-        return found
+            entries[key.key] = written[0] if len(written) == 1 else written
+        return entries
 
 
 def _is_default(value: Any, field: Any) -> bool:

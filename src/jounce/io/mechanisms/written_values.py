@@ -13,26 +13,26 @@ from jounce.errors import MechanismError
 from jounce.trajectory import Expression
 
 
-def plain(value: Any, place: str) -> Any:
+def plain(value: Any, location: str) -> Any:
     """Return a value as numbers, text and lists; whole numbers without a point."""
     if isinstance(value, Expression):
         return value.text
     if isinstance(value, str):
         return value
     if isinstance(value, numbers.Real) or (np.shape(value) == () and hasattr(value, "dtype")):
-        return plain_number(float(value), place)
+        return plain_number(float(value), location)
     if isinstance(value, Mapping):
-        return {key: plain(entry, place) for key, entry in value.items()}
+        return {key: plain(entry, location) for key, entry in value.items()}
     try:
-        return [plain(entry, place) for entry in (value.tolist() if hasattr(value, "tolist") else value)]
+        return [plain(entry, location) for entry in (value.tolist() if hasattr(value, "tolist") else value)]
     except TypeError:
         message = f"a {type(value).__name__} has no form in a file"
-        raise MechanismError(message, name=place) from None
+        raise MechanismError(message, name=location) from None
 
 
-def plain_number(value: float, place: str) -> float | int:
+def plain_number(value: float, location: str) -> float | int:
     """Return a finite number, a whole one without a point."""
     if not math.isfinite(value):
-        raise MechanismError("must be finite", name=place, value=value)
+        raise MechanismError("must be finite", name=location, value=value)
     whole = value.is_integer() and abs(value) < 1e9 and math.copysign(1.0, value) == (1.0 if value >= 0 else -1.0)
     return int(value) if whole else value

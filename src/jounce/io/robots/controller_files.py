@@ -19,7 +19,7 @@ from jounce.settings import under_own_settings
 from jounce.trajectory import HermiteMotion, JointTrajectory
 
 UNITS = ("", "/s", "/s^2")
-STILL = 1e-9  # rad/s or m/s: slower is at rest
+REST_SPEED = 1e-9  # rad/s or m/s: slower is at rest
 UNFORCED = 1e-6  # rad/s^2 or m/s^2
 NANO = 1_000_000_000
 LEVELS = ("positions", "velocities", "accelerations")
@@ -138,12 +138,12 @@ def _values(
     followed = FollowedTrajectory(robot, trajectory)
     q = followed.coordinates(times, order)
     columns = [robot.joint_names.index(name) for name in names]
-    found = [q[:, k, columns] for k in range(3)]
+    values = [q[:, k, columns] for k in range(3)]
     if efforts:
         felt = robot if known is None or known.gravity else robot.with_gravity([0.0, 0.0, 0.0])
         tau = inverse_dynamics(felt, q, drives=known is None or known.drives)
-        found += [np.asarray(tau)[:, k, columns] for k in range(efforts)]
-    return found
+        values += [np.asarray(tau)[:, k, columns] for k in range(efforts)]
+    return values
 
 
 def _table(
@@ -164,7 +164,7 @@ def _table(
     inside = np.minimum(times, trajectory.stop)
     values = _values(robot, trajectory, names, inside, len(known.efforts) if torques else 0, known)
     fastest, hardest = (float(np.abs(level[-1]).max()) for level in values[1:3])
-    if not exact and (fastest > STILL or hardest > UNFORCED):
+    if not exact and (fastest > REST_SPEED or hardest > UNFORCED):
         message = (
             f"the period does not divide the duration of {duration:.9g} s, and at its end the joints move at up to "
             f"{fastest:.3g} rad/s or m/s and accelerate at up to {hardest:.3g} rad/s^2 or m/s^2: a row after the end "
@@ -174,8 +174,8 @@ def _table(
     kinds = [_units(robot, name) for name in names]
     heading = [f"{known.time} [s]" if units else known.time]
     for k, level in enumerate(levels):
-        told = [f" [{kind[k]}]" if units else "" for kind in kinds]
-        heading += [f"{level}_{j}{unit}" for j, unit in enumerate(told)]
+        unit_texts = [f" [{kind[k]}]" if units else "" for kind in kinds]
+        heading += [f"{level}_{j}{unit}" for j, unit in enumerate(unit_texts)]
     table = np.column_stack([times, *values])
     line = ",".join(["%.17g"] * table.shape[1])
     return "\n".join([",".join(heading), *(line % tuple(row) for row in table.tolist()), ""]), times
@@ -235,8 +235,8 @@ def read_table(path: str, joints: Iterable[str] | None = None) -> JointTrajector
     count = joint_count(known, columns)
     names = _named(joints, count, path)
     levels = [level for level in known.levels if f"{level}_0" in columns]
-    wanted = [f"{level}_{j}" for level in levels for j in range(count)]
-    times, values = read_chosen(path, known.time, wanted, TrajectoryError)
+    expected = [f"{level}_{j}" for level in levels for j in range(count)]
+    times, values = read_chosen(path, known.time, expected, TrajectoryError)
     table = values.reshape(len(times), len(levels), count)
     return _through(times, table, names, path)
 
@@ -276,16 +276,16 @@ def read_message(source: Source, joints: Iterable[str] | None = None) -> JointTr
 def _row(source: Source, at: Any, given: Any, count: int) -> list[float]:
     numbers = isinstance(given, list) and all(isinstance(x, int | float) and not isinstance(x, bool) for x in given)
     if not numbers or len(given) != count or not np.isfinite(given).all():
-        place = at if given is not None else at[:-1]
-        raise source.error(f"must be {count} finite numbers, one for each joint: {at[-1]}", place, value=given)
+        location = at if given is not None else at[:-1]
+        raise source.error(f"must be {count} finite numbers, one for each joint: {at[-1]}", location, value=given)
     return [float(x) for x in given]
 
 
 def _seconds(source: Source, at: Any, given: Any) -> float:
     parts = ("sec", "nanosec") if isinstance(given, dict) and "sec" in given else ("secs", "nsecs")
     if not isinstance(given, dict) or set(given) - set(parts):
-        place = at if given is not None else at[:-1]
-        raise source.error("must hold sec and nanosec: time_from_start", place, value=given)
+        location = at if given is not None else at[:-1]
+        raise source.error("must hold sec and nanosec: time_from_start", location, value=given)
     values = [given.get(part, 0) for part in parts]
     for part, value in zip(parts, values, strict=True):
         if isinstance(value, bool) or not isinstance(value, int) or value < 0:

@@ -102,17 +102,17 @@ class _DrivesFile:
         fitting = {kind: self._fits(default, kind) for kind in (True, False)}
         if default and not any(fitting.values()):
             self._drive(default, dict.fromkeys(default, ("default",)), True)  # says what does not fit
-        found = {}
+        drives = {}
         for name, kind in self.turning.items():
             if name in own and own[name] is None:
                 continue
             entry = self.source.mapping((self.key, name), KEYS) if name in own else {}
             taken = default if fitting[kind] else {}
-            places = dict.fromkeys(taken, ("default",)) | dict.fromkeys(entry, (self.key, name))
+            locations = dict.fromkeys(taken, ("default",)) | dict.fromkeys(entry, (self.key, name))
             values = {key: raw for key, raw in {**taken, **entry}.items() if raw is not None}
             if values:
-                found[name] = self._drive(values, places, kind)
-        return found
+                drives[name] = self._drive(values, locations, kind)
+        return drives
 
     def _fits(self, default: Mapping[str, Any], turning: bool) -> bool:
         """Whether the units of a default are those of what turns, or of what slides."""
@@ -125,17 +125,17 @@ class _DrivesFile:
                 return False
         return True
 
-    def _drive(self, values: Mapping[str, Any], places: Mapping[str, Location], turning: bool) -> Drive:
+    def _drive(self, values: Mapping[str, Any], locations: Mapping[str, Location], turning: bool) -> Drive:
         motor = turning or values.get("lead") is not None
         if turning and values.get("lead") is not None:
             message = "is for joints and drivers that slide; this one turns, give a gear_ratio"
-            raise self.source.error(message, (*places["lead"], "lead"), value=values["lead"])
-        numbers = {key: self._number(raw, key, (*places[key], key), turning, motor) for key, raw in values.items()}
+            raise self.source.error(message, (*locations["lead"], "lead"), value=values["lead"])
+        numbers = {key: self._number(raw, key, (*locations[key], key), turning, motor) for key, raw in values.items()}
         try:
             return Drive(**numbers)
         except RobotError as error:
             key = str(error.name)
-            raise self.source.error(error.message, (*places[key], key), value=values[key]) from None
+            raise self.source.error(error.message, (*locations[key], key), value=values[key]) from None
 
     def _number(self, raw: Any, key: str, at: Location, turning: bool, motor: bool) -> float:
         number, dimension = self._parsed(raw, at)
@@ -151,9 +151,9 @@ class _DrivesFile:
         return number * 2 * math.pi if key == "lead" and dimension == PER_ANGLE else number
 
     def _parsed(self, raw: Any, at: Location) -> tuple[float, Dimension | None]:
-        found = self.source.value(at, raw)
-        assert isinstance(found.value, float)  # no names are allowed, so that expressions are worked out
-        return found.value, found.dimension
+        parsed = self.source.value(at, raw)
+        assert isinstance(parsed.value, float)  # no names are allowed, so that expressions are worked out
+        return parsed.value, parsed.dimension
 
     def _why_not(self, name: str) -> str:
         joint = self.system.joints.get(name) if isinstance(self.system, Robot) else None

@@ -79,9 +79,9 @@ class Faults:
     def check(self, inertia: Inertia, link: str, line: int | None) -> None:
         """Note what is wrong with the inertia of a link."""
         if fault := inertia.fault:
-            place = {"path": self.path, "line": line, "name": f"links.{ascii(link)[1:-1]}.inertia"}
+            location = {"path": self.path, "line": line, "name": f"links.{ascii(link)[1:-1]}.inertia"}
             self.add(
-                HEADINGS[fault.words], link, RobotFileError(f"{fault.words}; {ADVICE}", **place, value=fault.value)
+                HEADINGS[fault.words], link, RobotFileError(f"{fault.words}; {ADVICE}", **location, value=fault.value)
             )
 
     def warning(self) -> RobotWarning | None:

@@ -13,7 +13,10 @@ NO_ROOM = "ranges of joints that leave the joint that they follow no room to mov
 
 
 def with_room(
-    joints: Sequence[Joint], faults: Faults, placed: Callable[[RobotError], RobotFileError], held: Collection[str] = ()
+    joints: Sequence[Joint],
+    faults: Faults,
+    located: Callable[[RobotError], RobotFileError],
+    fixed: Collection[str] = (),
 ) -> list[Joint]:
     """Return the joints, those that leave the joint that they follow no room without their range.
 
@@ -27,9 +30,9 @@ def with_room(
         Of the file.
     faults : Faults
         Takes the ranges that do not count.
-    placed : callable
+    located : callable
         Makes an error of the file of one of the robot, with the line of what it names.
-    held : collection of str, optional
+    fixed : collection of str, optional
         Joints that are held in one place, whatever their range.
 
     Raises
@@ -37,7 +40,7 @@ def with_room(
     RobotFileError
         If such a range is an error.
     """
-    found = {joint.name: joint for joint in joints}
+    by_name = {joint.name: joint for joint in joints}
     following: dict[str, list[Joint]] = {}
     for joint in joints:
         ranged = (joint.limits.lower, joint.limits.upper) != (None, None)
@@ -45,7 +48,7 @@ def with_room(
             following.setdefault(joint.mimic.joint, []).append(joint)
     for leader in joints:
         followers = following.get(leader.name, [])
-        if not followers or leader.name in held or has_room(leader.limits, followers):
+        if not followers or leader.name in fixed or has_room(leader.limits, followers):
             continue
         bad = {joint.name for joint in followers if not has_room(leader.limits, [joint])}
         rest = [joint for joint in followers if joint.name not in bad]
@@ -53,22 +56,22 @@ def with_room(
         for joint in followers:
             suits = joint.name not in bad
             others = [x for x in narrowing if x is not joint] if suits else []
-            beside = [x.name for x in others if not has_room(leader.limits, [joint, x])]
-            if suits and not beside:
+            conflicting = [x.name for x in others if not has_room(leader.limits, [joint, x])]
+            if suits and not conflicting:
                 continue
             own, (low, high) = ranges_at_leader(leader.limits, [joint])
-            against = f" beside {', '.join(beside)}" if beside else ""
+            against = f" beside {', '.join(conflicting)}" if conflicting else ""
             message = (
                 f"its range leaves {leader.name}, which it follows, {low:.6g} to {high:.6g} of "
                 f"{own[0]:.6g} to {own[1]:.6g}{against}: no room to move; correct the limits or the multiplier, "
                 "or read the file without strict"
             )
             error = RobotError(message, name=f"joints.{joint.name}.limit")
-            faults.leave_out(NO_ROOM, f"{joint.name}, which follows {leader.name}", placed(error))
-            found[joint.name] = dataclasses.replace(
+            faults.leave_out(NO_ROOM, f"{joint.name}, which follows {leader.name}", located(error))
+            by_name[joint.name] = dataclasses.replace(
                 joint, limits=dataclasses.replace(joint.limits, lower=None, upper=None)
             )
-    return list(found.values())
+    return list(by_name.values())
 
 
 def _narrowing(leader: Joint, followers: Sequence[Joint]) -> list[Joint]:
@@ -77,6 +80,6 @@ def _narrowing(leader: Joint, followers: Sequence[Joint]) -> list[Joint]:
     If a joint has no room beside another follower, it has none beside one of these.
     """
     ranges = [ranges_at_leader(leader.limits, [joint])[1] for joint in followers]
-    places = range(len(followers))
-    ends = (sorted(places, key=lambda k: -ranges[k][0])[:2], sorted(places, key=lambda k: ranges[k][1])[:2])
+    indices = range(len(followers))
+    ends = (sorted(indices, key=lambda k: -ranges[k][0])[:2], sorted(indices, key=lambda k: ranges[k][1])[:2])
     return [followers[k] for k in sorted({*ends[0], *ends[1]})]

@@ -71,11 +71,11 @@ def load_limits(path: str | PathLike[str], robot: Robot) -> dict[str, Limits]:
     >>> limits["panda_joint2"].jerk
     3750.0
     """
-    found = _LimitsFile(read_source(path, kind="limits", error_type=RobotError), robot)
-    limits = found.limits()
-    if found.jounce or found.varying or found.points():
+    limits_file = _LimitsFile(read_source(path, kind="limits", error_type=RobotError), robot)
+    limits = limits_file.limits()
+    if limits_file.jounce or limits_file.varying or limits_file.points():
         message = "has limits of jounce, of points, or that depend on the position; read it with load_motion_limits"
-        raise found.source.error(message)
+        raise limits_file.source.error(message)
     return limits
 
 
@@ -113,9 +113,9 @@ def load_motion_limits(path: str | PathLike[str], robot: Robot) -> MotionLimits:
     >>> limits.points[0].link, limits.points[0].speed
     ('panda_hand', 1.0)
     """
-    found = _LimitsFile(read_source(path, kind="limits", error_type=RobotError), robot)
-    joints = found.limits()
-    return MotionLimits(joints, found.jounce, found.varying, found.points())
+    limits_file = _LimitsFile(read_source(path, kind="limits", error_type=RobotError), robot)
+    joints = limits_file.limits()
+    return MotionLimits(joints, limits_file.jounce, limits_file.varying, limits_file.points())
 
 
 class _LimitsFile:
@@ -139,9 +139,9 @@ class _LimitsFile:
             self.source.mapping(("joints", name), KEYS)
         for key in default:
             self._check_default(key)
-        found = {name: self._of(name, default, joints.get(name, {})) for name in self.robot.joint_names}
+        limits = {name: self._of(name, default, joints.get(name, {})) for name in self.robot.joint_names}
         try:
-            return self.robot.limits_with(found)
+            return self.robot.limits_with(limits)
         except RobotError as error:
             at: Location = ("joints", error.name) if error.name in joints else ("default",)
             raise self.source.error(error.message, at, value=error.value) from None
@@ -149,20 +149,20 @@ class _LimitsFile:
     def _of(self, name: str, default: Mapping[str, Any], own: Mapping[str, Any]) -> Limits:
         joint = self.robot.joints[name]
         values = dataclasses.asdict(joint.limits) | {"jounce": None}
-        places: dict[str, Location] = {}
+        locations: dict[str, Location] = {}
         for key, raw in default.items():
             if self._fits(raw, key, joint):
-                places[key] = ("default", key)
-                values[key] = self._value(raw, key, places[key], joint)
+                locations[key] = ("default", key)
+                values[key] = self._value(raw, key, locations[key], joint)
         for key, raw in own.items():
-            places[key] = ("joints", name, key)
-            if key in VARYING and (law := self._law(raw, key, places[key], joint)):
+            locations[key] = ("joints", name, key)
+            if key in VARYING and (law := self._law(raw, key, locations[key], joint)):
                 self.varying.setdefault(name, {})[key] = law
                 continue
-            values[key] = self._value(raw, key, places[key], joint)
+            values[key] = self._value(raw, key, locations[key], joint)
         lower, upper = values["lower"], values["upper"]
         if lower is not None and upper is not None and lower > upper:
-            at = places.get("lower") or places["upper"]
+            at = locations.get("lower") or locations["upper"]
             message = f"the lower limit of {name}, {lower:g}, must not exceed the upper one, {upper:g}"
             raise self.source.error(f"{message}; the one not given in this file is the robot's own", at)
         if (jounce := values.pop("jounce")) is not None:
@@ -178,8 +178,8 @@ class _LimitsFile:
                 entries = data.get(part)
                 if not isinstance(entries, list) or len(entries) < 2:
                     raise self.source.error("must be a list of two values or more", (*at, part), value=entries)
-                found = [self._value(x, kind, (*at, part, k), joint) for k, x in enumerate(entries)]
-                columns.append(np.array(found, float))
+                numbers = [self._value(x, kind, (*at, part, k), joint) for k, x in enumerate(entries)]
+                columns.append(np.array(numbers, float))
             q, values = columns
             if len(q) != len(values) or not bool((np.diff(q) > 0).all()):
                 raise self.source.error("needs positions q that increase, and as many values", at)
@@ -198,7 +198,7 @@ class _LimitsFile:
     def points(self) -> tuple[PointLimits, ...]:
         """Return the limits of points of links."""
         data = self.source.mapping(("points",)) if "points" in self.source.data else {}
-        found = []
+        points = []
         for link in data:
             at: Location = ("points", link)
             if link not in self.robot.frames:
@@ -211,14 +211,14 @@ class _LimitsFile:
             if not isinstance(point, list) or len(point) != 3:
                 raise self.source.error("must be three lengths", (*at, "point"), value=point)
             x, y, z = (self._measured(x, 0, (*at, "point", k)) for k, x in enumerate(point))
-            found.append(PointLimits(link, **values, point=(x, y, z)))
-        return tuple(found)
+            points.append(PointLimits(link, **values, point=(x, y, z)))
+        return tuple(points)
 
     def _measured(self, raw: Any, rate: int, at: Location) -> float:
         """Return a length by time to a power, greater than zero where it is a rate."""
         number, dimension = self._parsed(raw, at)
-        wanted = tuple(sorted(({"length": 1} | ({"time": -rate} if rate else {})).items()))
-        if dimension and dimension != wanted:
+        expected = tuple(sorted(({"length": 1} | ({"time": -rate} if rate else {})).items()))
+        if dimension and dimension != expected:
             raise self.source.error(f"{_wrong_unit(dimension)}; it is in {('m', 'm/s', 'm/s^2')[rate]}", at, value=raw)
         if not math.isfinite(number) or (rate and number <= 0):
             raise self.source.error("must be a finite number" + " greater than zero" * bool(rate), at, value=raw)
@@ -238,9 +238,9 @@ class _LimitsFile:
         return number
 
     def _parsed(self, raw: Any, at: Location) -> tuple[float, Dimension | None]:
-        found = self.source.value(at, raw)
-        assert isinstance(found.value, float)  # no names are allowed, so that expressions are worked out
-        return found.value, found.dimension
+        parsed = self.source.value(at, raw)
+        assert isinstance(parsed.value, float)  # no names are allowed, so that expressions are worked out
+        return parsed.value, parsed.dimension
 
     def _check_size(self, number: float, raw: Any, key: str, at: Location) -> None:
         if not math.isfinite(number):

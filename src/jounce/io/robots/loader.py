@@ -130,8 +130,8 @@ def _released(robot: Robot, sequence: str, path: str) -> Robot:
     """Return the robot on a floating base, which takes the name world."""
     joints = list(robot.joints.values())
     attached = [joint for joint in joints if joint.parent == robot.base]
-    held = {link for closure in robot.closures.values() for link in closure.links}
-    frame = robot.links[robot.base].inertia is None and robot.base not in held
+    closed_links = {link for closure in robot.closures.values() for link in closure.links}
+    frame = robot.links[robot.base].inertia is None and robot.base not in closed_links
     if len(attached) == 1 and not attached[0].moving and frame:
         links = [link for name, link in robot.links.items() if name != robot.base]
         joints = [joint for joint in joints if joint is not attached[0]]

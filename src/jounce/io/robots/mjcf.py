@@ -28,10 +28,10 @@ from jounce.robot.robot import Robot
 _Vector = Float[np.ndarray, "3"]
 _Matrix = Float[np.ndarray, "3 3"]
 DEFORMABLE = "has deformable parts (flex), which no rigid body stands for"
-PLACE = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
+POSE_KEYS = ("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler")
 NUMERIC = {  # attributes whose numbers MuJoCo takes even when they are not finite
-    **dict.fromkeys(("body", "site"), PLACE),
-    "inertial": (*PLACE, "mass", "diaginertia", "fullinertia"),
+    **dict.fromkeys(("body", "site"), POSE_KEYS),
+    "inertial": (*POSE_KEYS, "mass", "diaginertia", "fullinertia"),
     "joint": ("pos", "axis", "range", "ref", "armature", "damping", "frictionloss", "polycoef"),
     "freejoint": ("armature", "damping", "frictionloss"),
     "option": ("gravity",),
@@ -138,16 +138,16 @@ def _strip(spec: Any, mujoco: Any, tied: Container[str]) -> None:
         unused += list(parts)
     unused += [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_TENDON and not e.active]
     always = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-    kept = []
+    remaining = []
     for body in spec.bodies:
         moves = body.name != "world" and (always or not body.explicitinertial)
         for shape in body.geoms:
-            (kept if moves and _weighs(shape, spec.compiler) else unused).append(shape)
-    for shown in (*kept, *spec.sites):
+            (remaining if moves and _weighs(shape, spec.compiler) else unused).append(shape)
+    for shown in (*remaining, *spec.sites):
         shown.material = ""
     for material in spec.materials:  # which stay, for tendons keep their names whatever is set here
         material.textures = [""] * len(material.textures)
-    meshes, fields = ({getattr(shape, name) for shape in kept} for name in ("meshname", "hfieldname"))
+    meshes, fields = ({getattr(shape, name) for shape in remaining} for name in ("meshname", "hfieldname"))
     unused += [mesh for mesh in spec.meshes if mesh.name not in meshes]
     unused += [field for field in spec.hfields if field.name not in fields]
     unused += list(spec.textures)
@@ -200,23 +200,23 @@ class _Reader:
                 self._body(k)
             gravity = (0.0, 0.0, 0.0) if self._switched_off("GRAVITY") else model.opt.gravity
             name = self.root.attributes.get("model") or "robot"
-            joints = with_room(self.joints, self.faults, self._placed, self.ties.held)
+            joints = with_room(self.joints, self.faults, self._located, self.ties.fixed)
             robot = Robot(name, self.links, joints, gravity, self.closures)
-            return robot.locked(self.ties.held) if self.ties.held else robot
+            return robot.locked(self.ties.fixed) if self.ties.fixed else robot
         except RobotFileError:
             raise
         except RobotError as error:
-            raise self._placed(error) from None
+            raise self._located(error) from None
 
-    def _placed(self, error: RobotError) -> RobotFileError:
+    def _located(self, error: RobotError) -> RobotFileError:
         return self.error(error.message, error.name or "", value=error.value)
 
-    def tell(self, found: Iterable[LeftOut], parts: Iterable[Element]) -> None:
+    def tell(self, noted: Iterable[LeftOut], parts: Iterable[Element]) -> None:
         """Note what is left out, in tendons and actuators as found, and in what is compiled."""
         options = [element for part in parts for element in part.walk() if element.tag == "option"]
         self.lines |= {f"option.{key}": element.line for element in options for key in element.attributes}
-        more = left_out_of_model(self.model, self.mujoco, self.bodies, self.joint_names, self.ties.held)
-        for heading, shown, line, name, value in (*found, *more):
+        more = left_out_of_model(self.model, self.mujoco, self.bodies, self.joint_names, self.ties.fixed)
+        for heading, shown, line, name, value in (*noted, *more):
             if line is not None:
                 self.lines[name] = line
             self.faults.leave_out(heading, shown, self.error(left_out(heading), name, value=value))
@@ -228,18 +228,18 @@ class _Reader:
         names = _names([model.equality(k).name for k in range(model.neq)], "closure")
         for k in np.flatnonzero(model.eq_active0):
             kind, name = model.eq_type[k], model.equality(int(k)).name
-            place = {"path": self.root.path, "line": lines[k], "name": f"equality.{name}" if name else "equality"}
+            location = {"path": self.root.path, "line": lines[k], "name": f"equality.{name}" if name else "equality"}
             self.lines[f"closures.{names[k]}"] = lines[k]
             if kind in (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)):
                 self.closures.append(self._closure(k, names[k]))
                 continue
             if kind == int(kinds.mjEQ_JOINT):
-                self.ties.add_joints(k, place)
+                self.ties.add_joints(k, location)
             elif kind == int(kinds.mjEQ_TENDON):
-                self.ties.add_tendons(k, place)
+                self.ties.add_tendons(k, location)
             else:
                 word = kinds(int(kind)).name.removeprefix("mjEQ_").lower()
-                raise RobotFileError(f"an active equality of type {word} {NO_CLOSURE}", **place)
+                raise RobotFileError(f"an active equality of type {word} {NO_CLOSURE}", **location)
         self.mimics = leaders(self.ties.mimics)
 
     def _closure(self, k: Any, name: str) -> Closure:
@@ -354,14 +354,14 @@ class _Reader:
                     message = f"{field} of an actuator of a ball or free joint has no counterpart in slides and turns"
                     value = np.ravel(values).tolist()
                     raise self.error(f"{message}; set it to zero", f"joints.{name}.{field}", value=value)
-        place = {"position": position, "rotation": rotation}
+        pose = {"position": position, "rotation": rotation}
         for made in joints:  # each with a name of its own: base_x may be that of another joint in the file
             end = child if made is joints[-1] else self._unused(made.child)
             if end != child:
                 self.links.append(Link(end))
             own = {"name": self._unused(made.name), "parent": parent, "child": end}
-            self.joints.append(dataclasses.replace(made, **own, **place))
-            parent, place = end, {}
+            self.joints.append(dataclasses.replace(made, **own, **pose))
+            parent, pose = end, {}
 
 
 def names_of_bodies(model: Any) -> list[str]:
@@ -383,7 +383,7 @@ def _names(given: list[str], kind: str) -> list[str]:
 
 def _efforts(model: Any, mujoco: Any) -> dict[int, float]:
     """Return the largest force of each joint where its own range, or that of its only actuator, is symmetric."""
-    found: dict[int, float] = {}
+    efforts: dict[int, float] = {}
     for j in range(model.njnt):
         actuators = np.flatnonzero(model.actuator_trnid[:, 0] == j)
         ranges = [model.jnt_actfrcrange[j]] if model.jnt_actfrclimited[j] else []
@@ -398,5 +398,5 @@ def _efforts(model: Any, mujoco: Any) -> dict[int, float]:
                 ranges.append(model.actuator_ctrlrange[k] * model.actuator_gainprm[k, 0] * gear)
         symmetric = [float(abs(high)) for low, high in ranges if low == -high and high != 0]
         if symmetric:
-            found[j] = min(symmetric)
-    return found
+            efforts[j] = min(symmetric)
+    return efforts

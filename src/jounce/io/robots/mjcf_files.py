@@ -44,7 +44,7 @@ def included(root: Element, allow: Iterable[str | PathLike[str]] = ()) -> list[E
     RobotFileError
         One cannot be read, or lies where it may not.
     """
-    found: dict[str, Element] = {}
+    elements: dict[str, Element] = {}
     waiting = [root]
     while waiting:
         holder = waiting.pop()
@@ -55,11 +55,11 @@ def included(root: Element, allow: Iterable[str | PathLike[str]] = ()) -> list[E
             for folder in dict.fromkeys(Path(file).parent for file in (root.path, holder.path)):
                 path = _named(element, name, root, allow, folder)
                 if os.path.lexists(path):
-                    if path not in found:
-                        found[path] = _included(element, name, path)
-                        waiting.append(found[path])
+                    if path not in elements:
+                        elements[path] = _included(element, name, path)
+                        waiting.append(elements[path])
                     break
-    return list(found.values())
+    return list(elements.values())
 
 
 def _included(element: Element, name: str, path: str) -> Element:
@@ -112,7 +112,7 @@ class _Copies:
             element, copies = waiting.pop()
             if element.tag == "replicate":
                 copies *= max(1, int(element.number("count", "replicate", "count")))
-            total += copies * self._held(element, depth)
+            total += copies * self._body_count(element, depth)
             if total > MOST_BODIES or copies > MOST_BODIES:
                 message = f"more than {MOST_BODIES} bodies or copies with all that is repeated"
                 raise element.error(message, "replicate")
@@ -120,7 +120,7 @@ class _Copies:
         self._counts[id(root)] = total
         return total
 
-    def _held(self, element: Element, depth: int) -> int:
+    def _body_count(self, element: Element, depth: int) -> int:
         """Return how many bodies an element is or brings from other files, those of its children left out."""
         if element.tag == "attach":
             others = self._models.get(element.attributes.get("model"), [])
@@ -148,8 +148,8 @@ def _named(
 
 def line_of(text: str) -> int | None:
     """Return the line that a text of MuJoCo speaks of."""
-    found = re.search(r"[Ll]ine (?:number=)?(\d+)", text)
-    return None if found is None else int(found[1])
+    match = re.search(r"[Ll]ine (?:number=)?(\d+)", text)
+    return None if match is None else int(match[1])
 
 
 def check_assets(spec: Any, parts: Iterable[Element], allow: Iterable[str | PathLike[str]] = ()) -> None:
@@ -172,8 +172,8 @@ def check_assets(spec: Any, parts: Iterable[Element], allow: Iterable[str | Path
     roots = list(parts)
     folders = list(dict.fromkeys(Path(part.path).parent for part in roots))
     for tag, asset, file in _asset_files(spec):
-        kept = spec.texturedir if tag == "texture" else spec.meshdir
-        name = str(Path(kept) / (Path(file).name if spec.strippath else file))
+        directory = spec.texturedir if tag == "texture" else spec.meshdir
+        name = str(Path(directory) / (Path(file).name if spec.strippath else file))
         element = Element(tag, {}, roots[0].path, line_of(asset.info) or roots[0].line)
         for folder in folders:
             path = _named(element, name, roots[0], allow, folder)

@@ -41,19 +41,19 @@ def left_out_of_spec(spec: Any, mujoco: Any) -> list[LeftOut]:
     # MuJoCo itself refuses damping and armature of actuators of other kinds
     drives = [(k, x) for k, x in enumerate(spec.actuators) if x.trntype == mujoco.mjtTrn.mjTRN_TENDON]
     kinds = ((OF_TENDONS, "tendon", enumerate(spec.tendons)), (OF_DRIVES, "actuator", drives))
-    found = []
+    left = []
     for headings, kind, parts in kinds:
         for k, part in parts:
             name = part.name or f"{kind}_{k}"
             for key, heading in headings.items():
                 value = np.ravel(getattr(part, key))
                 if value.any() and works(key):
-                    found.append(LeftOut(heading, name, line_of(part.info), f"{kind}s.{name}.{key}", _plain(value)))
-    return found
+                    left.append(LeftOut(heading, name, line_of(part.info), f"{kind}s.{name}.{key}", _plain(value)))
+    return left
 
 
 def left_out_of_model(
-    model: Any, mujoco: Any, bodies: Sequence[str], joints: Sequence[str], held: Container[str]
+    model: Any, mujoco: Any, bodies: Sequence[str], joints: Sequence[str], fixed: Container[str]
 ) -> Iterator[LeftOut]:
     """Give what is left out of joints, bodies and the whole of a compiled model; lines are those of the elements.
 
@@ -63,11 +63,11 @@ def left_out_of_model(
         The compiled model, and the package.
     bodies, joints : sequence of str
         Their names, by number.
-    held : container of str
+    fixed : container of str
         Joints that an equality holds where they are, which no force moves.
     """
     works = _working(model.opt.disableflags, mujoco)
-    free = [name not in held for name in joints]
+    free = [name not in fixed for name in joints]
     for j, name in enumerate(joints):
         stiffness = np.array([model.jnt_stiffness[j], *model.jnt_stiffnesspoly[j]])
         if stiffness.any() and works("stiffness") and free[j]:

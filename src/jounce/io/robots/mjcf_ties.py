@@ -21,7 +21,7 @@ def tied_tendons(spec: Any, mujoco: Any, path: str) -> set[str]:
         One runs from site to site.
     """
     along = {t.name for t in spec.tendons if all(part.type == mujoco.mjtWrap.mjWRAP_JOINT for part in t.path)}
-    found: set[str] = set()
+    tied: set[str] = set()
     for equality in spec.equalities:
         if equality.active and equality.type == mujoco.mjtEq.mjEQ_TENDON:
             names = {name for name in (equality.name1, equality.name2) if name}
@@ -29,8 +29,8 @@ def tied_tendons(spec: Any, mujoco: Any, path: str) -> set[str]:
                 name = f"equality.{equality.name}" if equality.name else "equality"
                 message = f"an active equality of a tendon between sites {NO_CLOSURE}"
                 raise RobotFileError(message, path=path, line=line_of(equality.info), name=ascii(name)[1:-1])
-            found |= names
-    return found
+            tied |= names
+    return tied
 
 
 class Ties:
@@ -47,28 +47,28 @@ class Ties:
     def __init__(self, model: Any, mujoco: Any, names: Sequence[str]):
         self.model, self.names = model, names
         self.single = {int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)}
-        self.held: dict[str, float] = {}
+        self.fixed: dict[str, float] = {}
         self.mimics: dict[str, Mimic] = {}
 
     def reference(self, joint: int) -> float:
         """Return the coordinate of a joint of one axis in the pose of the file."""
         return float(self.model.qpos0[self.model.jnt_qposadr[joint]])
 
-    def add_joints(self, k: Any, place: Mapping[str, Any]) -> None:
+    def add_joints(self, k: Any, location: Mapping[str, Any]) -> None:
         """Take an equality of one joint, or of two: ``q_1 - ref_1 = a_0 + a_1 (q_2 - ref_2)``."""
         first, second = int(self.model.eq_obj1id[k]), int(self.model.eq_obj2id[k])
         coefficients = self.model.eq_data[k][:5]
-        self._check_free(first, (first,) if second < 0 else (first, second), place)
+        self._check_free(first, (first,) if second < 0 else (first, second), location)
         start = self.reference(first) + float(coefficients[0])
         if second < 0:
-            self.held[self.names[first]] = start
+            self.fixed[self.names[first]] = start
         elif any(coefficients[2:]):
             message = "a joint can follow another linearly only; make the last three of polycoef zero"
-            raise RobotFileError(message, **place, value=coefficients.tolist())
+            raise RobotFileError(message, **location, value=coefficients.tolist())
         else:
             self._follow(first, second, float(coefficients[1]), start)
 
-    def add_tendons(self, k: Any, place: Mapping[str, Any]) -> None:
+    def add_tendons(self, k: Any, location: Mapping[str, Any]) -> None:
         """Take an equality of one tendon, or of two, whose lengths are weighted sums of coordinates.
 
         ``L_1 - ref_1 = a_0 + a_1 (L_2 - ref_2)``: of two joints, the second follows the first unless it follows one.
@@ -78,7 +78,7 @@ class Ties:
         constant, slope, *curve = (float(number) for number in model.eq_data[k][:5])
         if second >= 0 and any(curve):
             message = "a tendon can follow another linearly only; make the last three of polycoef zero"
-            raise RobotFileError(message, **place, value=model.eq_data[k][:5].tolist())
+            raise RobotFileError(message, **location, value=model.eq_data[k][:5].tolist())
         weights: dict[int, float] = {}
         for tendon, factor in ((first, 1.0), (second, -slope)):
             start = model.tendon_adr[tendon]
@@ -88,14 +88,14 @@ class Ties:
         tied = [joint for joint, weight in weights.items() if weight]
         if len(tied) not in (1, 2):
             message = "a joint can follow one other only, and this ties another number of them"
-            raise RobotFileError(message, **place, value=[self.names[joint] for joint in tied])
+            raise RobotFileError(message, **location, value=[self.names[joint] for joint in tied])
         leader, follower = tied[0], tied[-1]
         if self.names[follower] in self.mimics:
             leader, follower = follower, leader
-        self._check_free(follower, tied, place)
+        self._check_free(follower, tied, location)
         start = self.reference(follower) + constant / weights[follower]
         if len(tied) == 1:
-            self.held[self.names[follower]] = start
+            self.fixed[self.names[follower]] = start
         else:
             self._follow(follower, leader, -weights[leader] / weights[follower], start)
 
@@ -103,8 +103,8 @@ class Ties:
         """Make a joint follow another; it is at `start` where the other is as in the pose of the file."""
         self.mimics[self.names[joint]] = Mimic(self.names[leader], slope, start - slope * self.reference(leader))
 
-    def _check_free(self, joint: int, tied: Sequence[int], place: Mapping[str, Any]) -> None:
+    def _check_free(self, joint: int, tied: Sequence[int], location: Mapping[str, Any]) -> None:
         name = self.names[joint]
-        if {int(self.model.jnt_type[j]) for j in tied} - self.single or name in self.mimics or name in self.held:
+        if {int(self.model.jnt_type[j]) for j in tied} - self.single or name in self.mimics or name in self.fixed:
             message = "ties a joint of several coordinates, or one that is tied already"
-            raise RobotFileError(message, **place, value=name)
+            raise RobotFileError(message, **location, value=name)

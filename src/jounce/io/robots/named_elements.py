@@ -24,7 +24,7 @@ class NamedElements:
         if element is not None:
             self.elements.setdefault(".".join(name), element)
 
-    def placed(self, error: RobotError) -> RobotFileError:
+    def located(self, error: RobotError) -> RobotFileError:
         """Return an error of the robot with the file and the line that it is about."""
         name = error.name or ""
         if isinstance(error.value, list) and name in ("links", "joints") and error.value:

@@ -50,7 +50,7 @@ def load_path(
     suffix = FilePath(name).suffix.lower()
     if suffix == ".csv" and not has_column(name, "time", TrajectoryError):
         columns = read_table(name, TrajectoryError)
-        return _placed(name, {joint: values.tolist() for joint, values in columns.items()})
+        return _path_in_file(name, {joint: values.tolist() for joint, values in columns.items()})
     if suffix in DATA_FILES:
         source = read_source(name, allow, kind="trajectory", error_type=TrajectoryError)
         if "path" in source.data:
@@ -63,7 +63,7 @@ def load_path(
                 else:
                     given[joint] = raw if isinstance(raw, str) else str(_number(source, raw, at))
             del data
-            return _placed(name, given)
+            return _path_in_file(name, given)
     return load_trajectory(path, degree, allow)
 
 
@@ -74,7 +74,7 @@ def _number(source: Any, raw: Any, at: tuple[Any, ...]) -> float:
     return value
 
 
-def _placed(name: str, given: dict[str, Any]) -> Path:
+def _path_in_file(name: str, given: dict[str, Any]) -> Path:
     try:
         return path_of(given)
     except JounceError as error:

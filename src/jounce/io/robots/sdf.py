@@ -20,8 +20,8 @@ from jounce.io.robots.sdf_links import gravity_of, read_inertia
 from jounce.io.robots.sdf_poses import (
     HERE,
     WORLD,
+    FramePose,
     Frames,
-    Place,
     check_known,
     flag_of,
     needed,
@@ -78,9 +78,9 @@ def read_sdf(root: Element, faults: Faults) -> Robot:
     return _Reader(*model_frames(root), world, version, faults).robot()
 
 
-def model_frames(root: Element) -> tuple[Frames, Place]:
+def model_frames(root: Element) -> tuple[Frames, FramePose]:
     """Return the links, joints and further frames of the one model of a file, and its pose in the world."""
-    model, place = _model(root)
+    model, pose = _model(root)
     check_known(model, MODEL_PARTS)
     for tag in ("include", "model"):
         for child in model.every(tag):
@@ -89,10 +89,10 @@ def model_frames(root: Element) -> tuple[Frames, Place]:
     elements = _named(model)
     if not any(element.tag == "link" for element in elements.values()):
         raise model.error("a robot needs at least one <link>")
-    return Frames(model, elements), place
+    return Frames(model, elements), pose
 
 
-def _model(root: Element) -> tuple[Element, Place]:
+def _model(root: Element) -> tuple[Element, FramePose]:
     """Return the model of a file, and its pose in the world."""
     check_known(root, (*ROOT, "actor", "light"))
     worlds = root.every("world")
@@ -126,24 +126,26 @@ def _version(root: Element) -> tuple[int, ...]:
 
 def _named(model: Element) -> dict[str, Element]:
     """Return links, joints and frames by name."""
-    found: dict[str, Element] = {}
+    elements: dict[str, Element] = {}
     for tag in ("link", "joint", "frame"):
         for element in model.every(tag):
             name = element.text("name", f"{tag}s")
-            if name in found:
-                message = f"this name is given twice, first in line {found[name].line}"
+            if name in elements:
+                message = f"this name is given twice, first in line {elements[name].line}"
                 raise element.error(message, f"{tag}s", value=name)
             if name == WORLD or (name.startswith("__") and name.endswith("__")):
                 raise element.error("SDF keeps this name for itself", f"{tag}s", value=name)
-            found[name] = element
-    return found
+            elements[name] = element
+    return elements
 
 
 class _Reader:
     """Turns the links and joints of a model into those of a tree, and closures."""
 
-    def __init__(self, frames: Frames, place: Place, world: Element | None, version: tuple[int, ...], faults: Faults):
-        self.frames, self.place, self.world, self.version, self.faults = frames, place, world, version, faults
+    def __init__(
+        self, frames: Frames, pose: FramePose, world: Element | None, version: tuple[int, ...], faults: Faults
+    ):
+        self.frames, self.pose, self.world, self.version, self.faults = frames, pose, world, version, faults
         self.model, self.elements, self.lines = frames.model, frames.elements, NamedElements(frames.model)
         self.links: list[Link] = []
         self.joints: list[Joint] = []
@@ -162,9 +164,9 @@ class _Reader:
         ]
         gears = [joint for joint in every if joint.kind == "gearbox"]
         joints = [joint for joint in every if joint.kind != "gearbox"]
-        held = any(WORLD in (joint.parent, joint.child) for joint in joints)
+        to_world = any(WORLD in (joint.parent, joint.child) for joint in joints)
         fixed = flag_of(self.model, "static", "static")
-        base = WORLD if held or fixed else self.frames.canonical_link()
+        base = WORLD if to_world or fixed else self.frames.canonical_link()
         tree, closing = self._divided(joints, base, [*inertias, *([WORLD] if base == WORLD else [])], fixed)
         self.links += [Link(WORLD)] if base == WORLD else []
         self.links += [Link(name, inertia) for name, inertia in inertias.items()]
@@ -178,17 +180,17 @@ class _Reader:
         closures = [self._closure(joint) for joint in closing]
         note_left_out(self.model, elements, tree, closing, self.faults)
         name = self.model.attributes.get("name", "robot")
-        upright = self.place.then(self._place(base)).rotation if base != WORLD else np.eye(3)
+        upright = self.pose.then(self._link_pose(base)).rotation if base != WORLD else np.eye(3)
         gravity = upright.T @ gravity_of(self.world, elements, inertias)
         try:
-            joints = with_room(self.joints, self.faults, self.lines.placed)
+            joints = with_room(self.joints, self.faults, self.lines.located)
             return Robot(name, self.links, joints, gravity, closures, strict=False)
         except RobotError as error:
-            raise self.lines.placed(error) from None
+            raise self.lines.located(error) from None
 
-    def _place(self, link: str) -> Place:
+    def _link_pose(self, link: str) -> FramePose:
         """Return where a link is in the model."""
-        return HERE.seen_from(self.place) if link == WORLD else self.frames.place(link)
+        return HERE.seen_from(self.pose) if link == WORLD else self.frames.pose(link)
 
     def _divided(
         self, joints: Sequence[SdfJoint], base: str, links: Sequence[str], fixed: bool
@@ -203,8 +205,8 @@ class _Reader:
 
         if fixed and not any(WORLD in (joint.parent, joint.child) for joint in joints):
             link = self.frames.canonical_link()
-            place = self.frames.place(link).position
-            joints = [SdfJoint(self._unused(f"{link}_{WORLD}"), "fixed", WORLD, link, place, (), self.model), *joints]
+            origin = self.frames.pose(link).position
+            joints = [SdfJoint(self._unused(f"{link}_{WORLD}"), "fixed", WORLD, link, origin, (), self.model), *joints]
         chosen = set()
         for joint in sorted(joints, key=lambda joint: TREE_FIRST.index(joint.kind)):
             first, second = head(joint.parent), head(joint.child)
@@ -237,20 +239,20 @@ class _Reader:
 
     def _add(self, joint: SdfJoint, mimics: dict[str, Mimic]) -> None:
         """Add a joint of the tree, with the massless links that it needs."""
-        parent, child = self._place(joint.parent), self._place(joint.child)
-        here = Place(joint.origin, child.rotation)  # of the joint, with the axes of the child
-        beside = joint.kind != "fixed" and bool(np.any(np.abs(joint.origin - child.position) > 1e-12))
-        held = self._unused(f"{joint.child}_{joint.name}") if beside else joint.child
-        if beside:
-            self.links.append(Link(held))
+        parent, child = self._link_pose(joint.parent), self._link_pose(joint.child)
+        here = FramePose(joint.origin, child.rotation)  # of the joint, with the axes of the child
+        offset_origin = joint.kind != "fixed" and bool(np.any(np.abs(joint.origin - child.position) > 1e-12))
+        intermediate = self._unused(f"{joint.child}_{joint.name}") if offset_origin else joint.child
+        if offset_origin:
+            self.links.append(Link(intermediate))
         first = (child if joint.kind == "fixed" else here).seen_from(parent)
-        for part in self._parts(joint, held, child.rotation, mimics):
+        for part in self._parts(joint, intermediate, child.rotation, mimics):
             self.joints.append(dataclasses.replace(part, position=first.position, rotation=first.rotation))
             self.lines.add(joint.element, "joints", part.name)
             first = HERE
-        if beside:
+        if offset_origin:
             offset = child.seen_from(here).position
-            self.joints.append(Joint(self._unused(f"{joint.child}_fixed"), held, joint.child, "fixed", offset))
+            self.joints.append(Joint(self._unused(f"{joint.child}_fixed"), intermediate, joint.child, "fixed", offset))
 
     def _parts(
         self, joint: SdfJoint, child: str, rotation: Float[np.ndarray, "3 3"], mimics: dict[str, Mimic]
@@ -271,9 +273,9 @@ class _Reader:
             kind = "prismatic" if joint.kind == "prismatic" else "revolute" if bounded else "continuous"
             start = made[-1].child if made else joint.parent
             direction = rotation.T @ axis.direction
-            kept: dict[str, Any] = {"axis": direction, "limits": axis.limits, "mimic": mimics.get(name)}
-            kept |= {field: getattr(axis, field) for field in ("armature", "damping", "friction")}
-            made.append(Joint(name, start, end, kind, **kept))
+            arguments: dict[str, Any] = {"axis": direction, "limits": axis.limits, "mimic": mimics.get(name)}
+            arguments |= {field: getattr(axis, field) for field in ("armature", "damping", "friction")}
+            made.append(Joint(name, start, end, kind, **arguments))
         return made
 
     def _turns(self, joint: SdfJoint, child: str) -> list[Joint]:
@@ -297,8 +299,8 @@ class _Reader:
         if mimics:
             message = "closes a loop, and so has no coordinate that could follow another"
             raise mimics[0].error(message, "joints", joint.name, "mimic")
-        ends = self._place(joint.parent), self._place(joint.child)
-        points = [Place(joint.origin, np.eye(3)).seen_from(place).position for place in ends]
+        ends = self._link_pose(joint.parent), self._link_pose(joint.child)
+        points = [FramePose(joint.origin, np.eye(3)).seen_from(pose).position for pose in ends]
         axis = ends[0].rotation.T @ joint.axes[0].direction if joint.axes else None
         turn = None if joint.kind == "ball" else ends[1].seen_from(ends[0]).rotation
         links = (joint.parent, joint.child)
@@ -307,11 +309,11 @@ class _Reader:
                 joint.name, links, CLOSED_BY[joint.kind], points, axis, None if joint.kind == "ball" else turn
             )
         except RobotError as error:
-            raise self.lines.placed(error) from None
+            raise self.lines.located(error) from None
 
     def _mimics(self, tree: Sequence[SdfJoint], gears: Sequence[SdfJoint]) -> dict[str, Mimic]:
         """Return what joints follow: by ``<mimic>``, and by gearboxes."""
-        found: dict[str, Mimic] = {}
+        mimics: dict[str, Mimic] = {}
         for joint, tag in ((follower, axis.tag) for follower in tree for axis in follower.axes):
             name = self.coordinates.get((joint.name, tag), joint.name)
             mimic = only(needed(joint.element, tag), "mimic", "joints", joint.name)
@@ -322,29 +324,29 @@ class _Reader:
                     number_of(mimic, key, *where, default=float(key == "multiplier"))
                     for key in ("multiplier", "offset", "reference")
                 )
-                found[name] = Mimic(leader, factor, offset - factor * reference)
+                mimics[name] = Mimic(leader, factor, offset - factor * reference)
                 self.lines.add(mimic, *where)
         for joint in tree:
             if (given := only(joint.element, DRAKE_MIMIC, "joints", joint.name)) is not None:
-                self._drake_mimic(joint, given, found)
+                self._drake_mimic(joint, given, mimics)
         for gear in gears:
             name, mimic = self._gearing(gear, tree)
-            if name in found:
-                message = f"{name} follows {found[name].joint} already"
+            if name in mimics:
+                message = f"{name} follows {mimics[name].joint} already"
                 raise gear.element.error(message, "joints", gear.name)
-            found[name] = mimic
-        return leaders(found)
+            mimics[name] = mimic
+        return leaders(mimics)
 
-    def _drake_mimic(self, joint: SdfJoint, mimic: Element, found: dict[str, Mimic]) -> None:
+    def _drake_mimic(self, joint: SdfJoint, mimic: Element, mimics: dict[str, Mimic]) -> None:
         """Add what Drake writes as attributes of an element of the joint."""
         where = ("joints", joint.name, DRAKE_MIMIC)
-        if len(joint.axes) != 1 or joint.name in found:
+        if len(joint.axes) != 1 or joint.name in mimics:
             message = "is for a joint of one axis, and one that follows no other already"
             raise mimic.error(message, *where, value=joint.kind)
         factor, offset = (
             mimic.number(key, *where, default=float(key == "multiplier")) for key in ("multiplier", "offset")
         )
-        found[joint.name] = Mimic(mimic.text("joint", *where), factor, offset)
+        mimics[joint.name] = Mimic(mimic.text("joint", *where), factor, offset)
         self.lines.add(mimic, "joints", joint.name, "mimic")
 
     def _leader(self, mimic: Element, *where: str) -> str:
@@ -357,8 +359,8 @@ class _Reader:
     def _gearing(self, gear: SdfJoint, tree: Sequence[SdfJoint]) -> tuple[str, Mimic]:
         """Return which joint a gearbox makes follow, and how: theta_2 = -ratio theta_1 about its own axes."""
         where = ("joints", gear.name)
-        place = needed(gear.element, "gearbox_reference_body", *where)
-        reference = self.frames.link(text_of(gear.element, "gearbox_reference_body", *where), place, *where)
+        body = needed(gear.element, "gearbox_reference_body", *where)
+        reference = self.frames.link(text_of(gear.element, "gearbox_reference_body", *where), body, *where)
         needed(gear.element, "gearbox_ratio", *where)
         ratio = number_of(gear.element, "gearbox_ratio", *where, default=1.0)
         turned = []
@@ -372,5 +374,5 @@ class _Reader:
                 message = f"the axis of a gearbox must be that of {joint.name}"
                 raise gear.element.error(message, *where, value=axis.direction.tolist())
             turned.append((joint.name, math.copysign(1.0, along)))
-        (first, sense_1), (second, sense_2) = turned
-        return second, Mimic(first, -ratio * sense_1 * sense_2)
+        (first, sign_1), (second, sign_2) = turned
+        return second, Mimic(first, -ratio * sign_1 * sign_2)

@@ -11,8 +11,8 @@ from jaxtyping import Float
 from jounce.errors import RobotError, no_such
 from jounce.io.robots.sdf_poses import (
     MODEL,
+    FramePose,
     Frames,
-    Place,
     check_known,
     flag_of,
     needed,
@@ -82,7 +82,7 @@ def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, 
         ends.append(frames.link(text_of(element, role, *where), part, *where, role))
     if ends[0] == ends[1]:
         raise element.error("must join two different links", *where, value=ends[0])
-    origin = frames.place(name)
+    origin = frames.pose(name)
     tags = AXIS_TAGS[: 2 if kind == "gearbox" else AXES[kind]]
     armature = rotor_of(element, *where) if len(tags) == 1 else 0.0
     axes = tuple(_axis(needed(element, tag, *where), origin, frames, version, armature, *where, tag) for tag in tags)
@@ -104,7 +104,7 @@ def rotor_of(element: Element, *where: str) -> float:
 
 
 def _axis(
-    axis: Element, place: Place, frames: Frames, version: tuple[int, ...], armature: float, *where: str
+    axis: Element, pose: FramePose, frames: Frames, version: tuple[int, ...], armature: float, *where: str
 ) -> SdfAxis:
     check_known(axis, AXIS, *where)
     xyz = only(axis, "xyz", *where)
@@ -116,7 +116,7 @@ def _axis(
     old = version < (1, 7)
     if old and flag_of(axis, "use_parent_model_frame", *where, default=version < (1, 5)):
         frame = MODEL
-    rotation = frames.place(frame).rotation if frame else place.rotation
+    rotation = frames.pose(frame).rotation if frame else pose.rotation
     limit, dynamics = only(axis, "limit", *where), only(axis, "dynamics", *where)
     for part, known in ((limit, LIMIT), (dynamics, DYNAMICS)):
         if part is not None:

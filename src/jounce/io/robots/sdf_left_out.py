@@ -82,10 +82,10 @@ def follower(plugin: Element) -> str:
 
 def _note_numbers(holder: Element | None, shown: str, headings: Mapping[str, str], faults: Faults, *where: str) -> None:
     """Note the numbers within an element that are not zero, once for each heading."""
-    told = set()
+    noted = set()
     for key, heading in headings.items():
         value = number_of(holder, key, *where, default=0.0)
-        if holder is not None and value and heading not in told:
-            told.add(heading)
+        if holder is not None and value and heading not in noted:
+            noted.add(heading)
             error = needed(holder, key).error(left_out(heading), *where, key, value=value)
             faults.leave_out(heading, shown, error)

@@ -99,6 +99,6 @@ def gravity_of(
         return np.zeros(3)
     holders = [] if world is None else [world, *world.every("physics")]  # up to SDF 1.5 it was a matter of the physics
     for holder in holders:
-        if (found := only(holder, "gravity", "world")) is not None:
-            return np.array(found.content_numbers(3, "world", "gravity"))
+        if (element := only(holder, "gravity", "world")) is not None:
+            return np.array(element.content_numbers(3, "world", "gravity"))
     return np.array(GRAVITY)

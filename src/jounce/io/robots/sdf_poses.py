@@ -17,22 +17,22 @@ WORLD = "world"
 MAX_CHAIN = 1000  # frames, each attached to the next
 
 
-class Place(NamedTuple):
+class FramePose(NamedTuple):
     """Where a frame is in another one: its origin, and its axes as columns."""
 
     position: Float[np.ndarray, "3"]
     rotation: Float[np.ndarray, "3 3"]
 
-    def then(self, inner: Place) -> Place:
+    def then(self, inner: FramePose) -> FramePose:
         """Return where a frame is that this one holds at a place."""
-        return Place(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
+        return FramePose(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
 
-    def seen_from(self, outer: Place) -> Place:
+    def seen_from(self, outer: FramePose) -> FramePose:
         """Return where the frame is in another one; both places are in one frame."""
-        return Place(outer.rotation.T @ (self.position - outer.position), outer.rotation.T @ self.rotation)
+        return FramePose(outer.rotation.T @ (self.position - outer.position), outer.rotation.T @ self.rotation)
 
 
-HERE = Place(np.zeros(3), np.eye(3))
+HERE = FramePose(np.zeros(3), np.eye(3))
 
 
 class Frames:
@@ -48,18 +48,18 @@ class Frames:
 
     def __init__(self, model: Element, elements: dict[str, Element]):
         self.model, self.elements = model, elements
-        self._found: dict[str, Place] = {MODEL: HERE}
+        self._resolved: dict[str, FramePose] = {MODEL: HERE}
 
-    def place(self, name: str) -> Place:
+    def pose(self, name: str) -> FramePose:
         """Return where a frame is in the model."""
         chain = [name]
-        while chain[-1] not in self._found:
+        while chain[-1] not in self._resolved:
             element = self.elements[chain[-1]]
             self._extend(chain, self._reference(element), element)
         for name in reversed(chain[:-1]):
             element = self.elements[name]
-            self._found[name] = self._found[self._reference(element)].then(pose_of(element, name))
-        return self._found[name]
+            self._resolved[name] = self._resolved[self._reference(element)].then(pose_of(element, name))
+        return self._resolved[name]
 
     def link(self, name: str, element: Element, *where: str) -> str:
         """Return the link that a frame is fixed to, or ``world``; `element` names the frame."""
@@ -69,11 +69,11 @@ class Frames:
             if name == WORLD:
                 return name
             self._check(name, element, *where)
-            found = self.elements[name]
-            if found.tag == "link":
+            target = self.elements[name]
+            if target.tag == "link":
                 return name
-            following = text_of(found, "child", "joints", name) if found.tag == "joint" else _attachment(found)
-            self._extend(chain, self.canonical_link() if following == MODEL else following, found)
+            following = text_of(target, "child", "joints", name) if target.tag == "joint" else _attachment(target)
+            self._extend(chain, self.canonical_link() if following == MODEL else following, target)
 
     def canonical_link(self) -> str:
         """Return the link that stands for the model: the first one, unless it names another."""
@@ -110,7 +110,7 @@ def _attachment(frame: Element) -> str:
     return frame.attributes.get("attached_to") or MODEL
 
 
-def pose_of(element: Element, *name: str) -> Place:
+def pose_of(element: Element, *name: str) -> FramePose:
     """Return the pose of an element in the frame that it is relative to: turns about fixed axes, or a quaternion."""
     from scipy.spatial.transform import Rotation
 
@@ -122,28 +122,28 @@ def pose_of(element: Element, *name: str) -> Place:
         *position, x, y, z, w = pose.content_numbers(7, *name, "pose")
         if math.hypot(x, y, z, w) < 1e-9:
             raise pose.error("the quaternion must not be zero", *name, "pose", value=[x, y, z, w])
-        return Place(np.array(position), Rotation.from_quat([x, y, z, w]).as_matrix())
+        return FramePose(np.array(position), Rotation.from_quat([x, y, z, w]).as_matrix())
     if form != "euler_rpy":
         raise pose.error("rotation_format must be euler_rpy or quat_xyzw", *name, "pose", value=form)
     *position, roll, pitch, yaw = pose.content_numbers(6, *name, "pose")
     degrees = pose.attributes.get("degrees", "false").strip() in ("true", "1")
-    return Place(np.array(position), Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=degrees).as_matrix())
+    return FramePose(np.array(position), Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=degrees).as_matrix())
 
 
 def only(element: Element, tag: str, *name: str) -> Element | None:
     """Return the one child of a tag, None if there is none."""
-    found = element.every(tag)
-    if len(found) > 1:
-        raise found[1].error(f"<{tag}> is given twice, first in line {found[0].line}", *name)
-    return found[0] if found else None
+    elements = element.every(tag)
+    if len(elements) > 1:
+        raise elements[1].error(f"<{tag}> is given twice, first in line {elements[0].line}", *name)
+    return elements[0] if elements else None
 
 
 def needed(element: Element, tag: str, *name: str) -> Element:
     """Return the one child of a tag, which must be there."""
-    found = only(element, tag, *name)
-    if found is None:
+    single = only(element, tag, *name)
+    if single is None:
         raise element.error(f"<{element.tag}> has no <{tag}>", *name)
-    return found
+    return single
 
 
 def text_of(element: Element, tag: str, *name: str) -> str:

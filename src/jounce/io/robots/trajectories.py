@@ -100,8 +100,8 @@ def load_trajectory(
         message = "the kind of a trajectory file is given by its extension"
         raise TrajectoryError(f"{message}; valid: {', '.join(('.csv', *DATA_FILES))}", path=name)
     if suffix == ".csv":
-        found = read_table(name, joints)
-        return _read_csv(name, degree, joints) if found is None else found
+        trajectory = read_table(name, joints)
+        return _read_csv(name, degree, joints) if trajectory is None else trajectory
     source = read_source(name, allow, kind="trajectory", error_type=TrajectoryError)
     if is_message(source.at(())):
         return read_message(source, joints)
@@ -120,10 +120,10 @@ def _read_csv(path: str, degree: int, joints: object) -> JointTrajectory:
     times, columns, units = read_columns(path, TrajectoryError)
     bare = {name: _DERIVATIVE.sub("", name) for name in columns}  # of what a column is a derivative
     names = [name for name in columns if bare[name] == name or bare[name] not in columns]
-    measures = {name: found for name in names if (found := _measured(units.get(name)))}
+    measures = {name: measure for name in names if (measure := _measured(units.get(name)))}
     try:
-        found = JointTrajectory.from_samples(times, np.stack([columns[n] for n in names], axis=1), names, degree)
-        return JointTrajectory(found.laws, found.start, found.stop, found.times, measures)
+        measure = JointTrajectory.from_samples(times, np.stack([columns[n] for n in names], axis=1), names, degree)
+        return JointTrajectory(measure.laws, measure.start, measure.stop, measure.times, measures)
     except TrajectoryError as error:
         raise error.located(path=path) from None
 
@@ -156,7 +156,7 @@ class _LawFile:
 
     def _add_parameter(self, name: str, raw: Any) -> None:
         at = ("parameters", name)
-        check_parameter_name(name, self.source.error_type, **self.source.place(at))
+        check_parameter_name(name, self.source.error_type, **self.source.error_fields(at))
         value = self.source.value(at, raw, "any", self.parameters, self.dimensions)
         if value.dimension is not None:
             self.dimensions[name] = value.dimension
@@ -201,30 +201,30 @@ class _LawFile:
         return self._on_grid(laws, self._times() if "time" in self.data else times)
 
     def _on_grid(self, laws: Mapping[str, Any], times: np.ndarray) -> JointTrajectory:
-        return self._placed(("time",), lambda: JointTrajectory(laws, times[0], times[-1], times, self.measures))
+        return self._with_location(("time",), lambda: JointTrajectory(laws, times[0], times[-1], times, self.measures))
 
     def _samples(self, at: Location, read: Callable[[str], Any]) -> Any:
         """Return what is read from the file of samples that an entry names."""
-        place = (*at, "samples")
-        if self.source.at(place) is None:
-            raise self.source.error("is missing; give the name of a CSV file", place)
-        return self.source.read_named(self._text(self.source.at(place), place), place, read)
+        location = (*at, "samples")
+        if self.source.at(location) is None:
+            raise self.source.error("is missing; give the name of a CSV file", location)
+        return self.source.read_named(self._text(self.source.at(location), location), location, read)
 
     def _spline(
-        self, at: Location, data: Mapping[str, Any], times: ArrayLike, values: ArrayLike, place: Location, joint: Any
+        self, at: Location, data: Mapping[str, Any], times: ArrayLike, values: ArrayLike, location: Location, joint: Any
     ) -> SplineMotion:
         """Return the spline through samples of a coordinate, or the integral of one through those of a derivative."""
         degree, derivative = (self._whole(data.get(key, usual), (*at, key)) for key, usual in _ORDERS)
-        initial = [] if self.source.at(place) is None else self.source.at(place)
+        initial = [] if self.source.at(location) is None else self.source.at(location)
         if not isinstance(initial, list):
-            raise self.source.error("must be a list: the coordinate, its velocity and so on", place, value=initial)
+            raise self.source.error("must be a list: the coordinate, its velocity and so on", location, value=initial)
         if len(initial) > derivative:
             message = f"must have at most {derivative} values: the coordinate and what is below the measured derivative"
-            raise self.source.error(message, place, value=initial)
-        known = [self._number(raw, "any", (*place, k), k, joint) for k, raw in enumerate(initial)]
+            raise self.source.error(message, location, value=initial)
+        known = [self._number(raw, "any", (*location, k), k, joint) for k, raw in enumerate(initial)]
         if derivative:
-            return self._placed(at, lambda: MeasuredMotion(times, values, derivative, known, degree))
-        return self._placed(at, lambda: SplineMotion(times, values, degree))
+            return self._with_location(at, lambda: MeasuredMotion(times, values, derivative, known, degree))
+        return self._with_location(at, lambda: SplineMotion(times, values, degree))
 
     def _whole(self, raw: Any, at: Location) -> int:
         if isinstance(raw, bool) or not isinstance(raw, int) or raw < 0:
@@ -251,7 +251,7 @@ class _LawFile:
         times = {key: self._number(data[key], "time", (*at, key)) for key in ("duration", "start_time") if key in data}
         profile = self._text(data.get("profile", "minimum_jerk"), (*at, "profile"))
         limits = self._limits((*at, "limits")) if "limits" in data else None
-        motion = self._placed(
+        motion = self._with_location(
             at, lambda: JointTrajectory.point_to_point(list(first), start, end, profile, limits=limits, **times)
         )
         return self._on_grid(motion.laws, self._times() if "time" in self.data else motion.times)
@@ -274,7 +274,7 @@ class _LawFile:
         self._check_given(("time",), ("stop",))
         kinds = {"count": "ratio"}
         values = {key: self._number(raw, kinds.get(key, "time"), ("time", key)) for key, raw in data.items()}
-        times = self._placed(("time",), lambda: time_grid(TimeGrid(**{"start": 0.0, **values}), {}))
+        times = self._with_location(("time",), lambda: time_grid(TimeGrid(**{"start": 0.0, **values}), {}))
         if len(times) < 2:
             message = "a trajectory needs at least two instants; choose a later stop"
             raise self.source.error(message, ("time",))
@@ -285,7 +285,9 @@ class _LawFile:
         return self._finite(self._value(raw, kind, at, (), per_time, joint), raw, at)
 
     def _finite(self, value: float | Expression, raw: Any, at: Location) -> float:
-        number = self._placed(at, lambda: value.evaluate(self.parameters)) if isinstance(value, Expression) else value
+        number = (
+            self._with_location(at, lambda: value.evaluate(self.parameters)) if isinstance(value, Expression) else value
+        )
         if fault := fault_of_number(number):
             raise self.source.error(fault, at, value=raw)
         return float(number)
@@ -309,14 +311,14 @@ class _LawFile:
             message = f"the units of {show_value(joint)} are those of an angle here and of a length there"
             raise self.source.error(message, at)
 
-    def _placed(self, at: Location, make: Callable[[], Any]) -> Any:
+    def _with_location(self, at: Location, make: Callable[[], Any]) -> Any:
         """Return what is made; an error from within gets the place in the file."""
         try:
             return make()
         except JounceError as error:
             name = error.name or ""
-            found, last = self.source.at(at), name.rpartition(".")[2]
-            inside = isinstance(found, dict) and last in found
+            entry, last = self.source.at(at), name.rpartition(".")[2]
+            inside = isinstance(entry, dict) and last in entry
             known = inside or not name or name.split(".")[0] in at
             message = error.message if known else f"{name}: {error.message}"
             raise self.source.error(message, (*at, last) if inside else at, value=error.value) from None

@@ -87,7 +87,7 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
             for part in expanded:
                 lines.add(element, "joints", part.name)
         ordered(_distinct("links", made, root), _distinct("joints", parts, root))
-        parts = with_room(parts, faults, lines.placed)
+        parts = with_room(parts, faults, lines.located)
         robot = Robot(root.attributes.get("name", "robot"), made, parts, strict=False)
         _check_masses(robot, joints, links, faults, massless)
         note_left_out(root, robot, named, faults)
@@ -95,7 +95,7 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     except RobotFileError:
         raise
     except RobotError as error:
-        raise lines.placed(error) from None
+        raise lines.located(error) from None
 
 
 def _add_joint(lines: NamedElements, element: Element, name: str) -> None:
@@ -108,23 +108,23 @@ def _add_joint(lines: NamedElements, element: Element, name: str) -> None:
 
 def _named(root: Element, tag: str) -> dict[str, Element]:
     """Return the links or joints by name."""
-    found: dict[str, Element] = {}
+    elements: dict[str, Element] = {}
     for element in root.every(tag):
         name = element.text("name", f"{tag}s")
-        if name in found:
-            raise element.error(f"this name is given twice, first in line {found[name].line}", f"{tag}s", value=name)
-        found[name] = element
-    return found
+        if name in elements:
+            raise element.error(f"this name is given twice, first in line {elements[name].line}", f"{tag}s", value=name)
+        elements[name] = element
+    return elements
 
 
 def _distinct(kind: str, parts: list[Any], root: Element) -> dict[str, Any]:
     """Return links or joints by name; two of one name come from a joint that was expanded."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for part in parts:
-        if part.name in found:
+        if part.name in values:
             raise root.error("a joint that is expanded needs this name; rename the other", kind, value=part.name)
-        found[part.name] = part
-    return found
+        values[part.name] = part
+    return values
 
 
 def _link(name: str, element: Element, faults: Faults) -> Link:
@@ -219,8 +219,10 @@ def _joints(
         return [], [Joint(name, parent, child, kind, position, rotation)]
     for key, value in (("damping", damping), ("friction", friction), ("armature", armature)):
         if kind in EXPANDED and value:
-            heading, place = OF_SEVERAL[key], element if dynamics is None or key == "armature" else dynamics
-            faults.leave_out(heading, name, place.error(left_out(heading), *where, "dynamics", key, value=value))
+            heading, dynamics_element = OF_SEVERAL[key], element if dynamics is None or key == "armature" else dynamics
+            faults.leave_out(
+                heading, name, dynamics_element.error(left_out(heading), *where, "dynamics", key, value=value)
+            )
     if kind == "floating":
         links, parts = floating_joints(child, prefix=name)
         first = dataclasses.replace(parts[0], parent=parent, position=position, rotation=rotation)
@@ -229,16 +231,16 @@ def _joints(
         raise (axis or element).error("must have a direction", *where, "axis", value=direction)
     if kind == "planar":
         return _planar(name, (parent, child), (position, rotation), np.array(direction))
-    kept: dict[str, Any] = {"limits": _limits(name, limit, kind, bounds, faults), "mimic": mimics.get(name)}
-    kept |= {"axis": np.array(direction), "armature": armature, "damping": damping, "friction": friction}
-    return [], [Joint(name, parent, child, kind, position, rotation, **kept)]
+    arguments: dict[str, Any] = {"limits": _limits(name, limit, kind, bounds, faults), "mimic": mimics.get(name)}
+    arguments |= {"axis": np.array(direction), "armature": armature, "damping": damping, "friction": friction}
+    return [], [Joint(name, parent, child, kind, position, rotation, **arguments)]
 
 
 def _mimics(joints: dict[str, Element], faults: Faults) -> dict[str, Mimic]:
     """Return what joints follow; one that follows a joint which is not there is free, as in Pinocchio."""
     moving = {name: x for name, x in joints.items() if x.attributes["type"] not in ("fixed", *EXPANDED)}
     leading = [name for name, element in moving.items() if element.first("mimic") is None]
-    found = {}
+    mimics = {}
     for name, joint in moving.items():
         mimic = joint.first("mimic")
         if mimic is None:
@@ -246,11 +248,11 @@ def _mimics(joints: dict[str, Element], faults: Faults) -> dict[str, Mimic]:
         followed = mimic.attributes["joint"]
         if followed in joints:
             multiplier, offset = mimic.number("multiplier", default=1.0), mimic.number("offset", default=0.0)
-            found[name] = Mimic(followed, multiplier, offset)
+            mimics[name] = Mimic(followed, multiplier, offset)
             continue
         message = f"must follow a moving joint that follows no other; {did_you_mean(followed, leading)}"
         faults.add(FOLLOWS_NONE, name, mimic.error(message, "joints", name, "mimic", value=followed))
-    return leaders(found)
+    return leaders(mimics)
 
 
 def _planar(
@@ -269,11 +271,11 @@ def _planar(
 
 def _bound(limit: Element, key: str, name: str) -> float:
     """Return a bound of a joint, zero where none is given; an infinite one bounds nothing."""
-    place = ("joints", name, "limit", key)
+    location = ("joints", name, "limit", key)
     key = key if key in limit.attributes else f"drake:{key}"
-    given = limit.numbers(key, 1, *place, infinite=True)
+    given = limit.numbers(key, 1, *location, infinite=True)
     if given not in (None, [-math.inf if key == "lower" else math.inf]):
-        limit.numbers(key, 1, *place)
+        limit.numbers(key, 1, *location)
     return given[0] if given else 0.0
 
 

@@ -60,11 +60,11 @@ def check_version(root: Element, faults: Faults) -> None:
         The version is none of those that there are, or something is left out and that is an error.
     """
     text = root.attributes.get("version", "1.0")
-    found = re.fullmatch(r"(\d+)\.(\d+)", text.strip(), re.ASCII)
-    if found is None or tuple(map(int, found.groups())) not in VERSIONS:
+    match = re.fullmatch(r"(\d+)\.(\d+)", text.strip(), re.ASCII)
+    if match is None or tuple(map(int, match.groups())) not in VERSIONS:
         valid = ", ".join(f"{major}.{minor}" for major, minor in VERSIONS)
         raise root.error(f"there is no such version of URDF; valid: {valid}", "version", value=text)
-    if tuple(map(int, found.groups())) > (1, 0):
+    if tuple(map(int, match.groups())) > (1, 0):
         return
     for element in root.children:
         holders = [element] if element.tag == "joint" else element.every("inertial") if element.tag == "link" else []
@@ -86,7 +86,7 @@ def rotors(root: Element, faults: Faults) -> dict[str, float]:
     As Drake reads them: the ratio is 1 unless given, and ``mechanicalReduction`` has no part in it. A transmission of
     several joints or actuators is left out.
     """
-    found: dict[str, float] = {}
+    inertias: dict[str, float] = {}
     known = dict.fromkeys(element.attributes.get("name", "") for element in root.every("joint"))
     for transmission in root.every("transmission"):
         actuators, joints = transmission.every("actuator"), transmission.every("joint")
@@ -108,8 +108,8 @@ def rotors(root: Element, faults: Faults) -> dict[str, float]:
             joint = joints[0].text("name", *where, "joint")
             if joint not in known:
                 raise joints[0].error(no_such("joint", joint, known), *where, "joint", value=joint)
-            found[joint] = found.get(joint, 0.0) + inertia * ratio**2
-    return found
+            inertias[joint] = inertias.get(joint, 0.0) + inertia * ratio**2
+    return inertias
 
 
 def note_left_out(root: Element, robot: Robot, names: Mapping[str, list[Joint]], faults: Faults) -> None:
@@ -186,16 +186,16 @@ def _of_gazebo(
     about = gazebo.attributes.get("reference", "").strip()
     moves = any(joint.moving for joint in names.get(about, ()))
     frame, link = robot.frames.get(about), robot.links.get(about)
-    carried = frame is not None and frame.body >= 0
-    heavy = carried and link is not None and link.inertia is not None and link.inertia.mass > 0
+    on_moving = frame is not None and frame.body >= 0
+    heavy = on_moving and link is not None and link.inertia is not None and link.inertia.mass > 0
     table: dict[str, tuple[str, bool, Callable[[Element], bool]]] = {
         **dict.fromkeys(SPRINGS, (JOINT_SPRINGS, moves, _counts)),
         "gravity": (WEIGHTLESS, heavy, lambda x: x.content.strip() in NO),
         "turnGravityOff": (WEIGHTLESS, heavy, lambda x: x.content.strip() in YES),
-        "kinematic": (KINEMATIC, carried, lambda x: x.content.strip() in YES),
+        "kinematic": (KINEMATIC, on_moving, lambda x: x.content.strip() in YES),
         "static": (STATIC, moving and not about, lambda x: x.content.strip() in YES),
-        "dampingFactor": (DECAY, carried, _counts),
-        "velocity_decay": (DECAY, carried, lambda x: any(map(_counts, x.children))),
+        "dampingFactor": (DECAY, on_moving, _counts),
+        "velocity_decay": (DECAY, on_moving, lambda x: any(map(_counts, x.children))),
         "joint": (IN_GAZEBO, not about, lambda _: True),
         "link": (IN_GAZEBO, not about, lambda _: True),
         "plugin": (PLUGINS, True, lambda x: _followed(x, joints)),

@@ -64,8 +64,8 @@ class Element:
         """Return the finite number in an attribute, which must be there unless there is a default."""
         if default is None:
             self.text(key, *name)
-        found = self.numbers(key, 1, *name)
-        return found[0] if found else float(default or 0.0)
+        numbers = self.numbers(key, 1, *name)
+        return numbers[0] if numbers else float(default or 0.0)
 
     def numbers(self, key: str, count: int, *name: str, infinite: bool = False) -> list[float] | None:
         """Return the finite numbers in an attribute, None if it is not there."""

@@ -130,9 +130,9 @@ def at_rest(accelerations: Samples, angle: float | None) -> Samples:
     """
     shapes = [np.ones(len(KNOTS)), KNOTS] if angle is not None else [np.ones(len(KNOTS))]
     known = slice(None) if angle is not None else slice(1, 2)
-    wanted = np.array([angle or 0.0, 0.0])[known]
+    target = np.array([angle or 0.0, 0.0])[known]
     effect = np.stack([end_of(law(shape))[known] for shape in shapes], axis=1)
-    amounts = np.linalg.solve(effect, wanted - end_of(law(accelerations))[known])
+    amounts = np.linalg.solve(effect, target - end_of(law(accelerations))[known])
     return accelerations + amounts @ np.stack(shapes)
 
 

@@ -85,10 +85,10 @@ def _differences(name: str, history: History) -> Iterator[tuple[str, ...]]:
 def jumps(history: History) -> Float[np.ndarray, "6"]:
     """Return the largest jumps at the knots of the angle and its derivatives to the fifth."""
     law = history.case.motion
-    found = []
+    rows = []
     for k in range(6):
         pieces = [np.polynomial.Polynomial(c).deriv(k) for c in law.coefficients.T]
         ends = [piece(step) for piece, step in zip(pieces, np.diff(law.knots), strict=True)]
         steps = [abs(end - piece(0.0)) for end, piece in zip(ends[:-1], pieces[1:], strict=True)]
-        found.append(max(steps, default=0.0))  # one segment has none
-    return np.array(found)
+        rows.append(max(steps, default=0.0))  # one segment has none
+    return np.array(rows)

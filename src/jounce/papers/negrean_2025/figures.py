@@ -94,8 +94,8 @@ def energies(histories: Mapping[str, History]) -> Figure:
     figure, grid = _panels(3, len(histories), (7.2, 6.0), title, stand_in_note(_any_case(histories)))
     for column, history in enumerate(histories.values()):
         for p, panel in enumerate(grid[:, column], 1):
-            found, closed = history.energies[:, p - 1], history.closed_energies[:, p - 1]
-            panel.plot(history.time, found, color=ENERGY_COLOURS[p - 1], label="library")
+            computed, closed = history.energies[:, p - 1], history.closed_energies[:, p - 1]
+            panel.plot(history.time, computed, color=ENERGY_COLOURS[p - 1], label="library")
             every = slice(None, None, STEPS)  # the knots
             panel.plot(
                 history.time[every], closed[every], color=GREY, marker="x", linestyle="", label="closed form", zorder=3

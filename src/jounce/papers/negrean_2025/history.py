@@ -86,7 +86,7 @@ def history(case: Case) -> History:
 
 
 def difference(
-    found: Float[np.ndarray, "time column"], right: Float[np.ndarray, "time column"]
+    computed: Float[np.ndarray, "time column"], right: Float[np.ndarray, "time column"]
 ) -> Float[np.ndarray, " column"]:
     """Return the largest differences over time, divided by the largest values, one for each column."""
-    return np.max(np.abs(found - right), axis=0) / np.max(np.abs(right), axis=0)
+    return np.max(np.abs(computed - right), axis=0) / np.max(np.abs(right), axis=0)

@@ -39,15 +39,15 @@ def given_cases(samples: Path | None, masses: Path | None) -> dict[str, Case]:
     for name in units:
         if any(base == "length" for base, _ in units[name]):
             raise MechanismFileError("the unit must be that of an angular acceleration", path=samples, name=name)
-    found = {}
+    cases = {}
     for name, values in columns.items():
         accelerations = np.array(values)
         try:
             law(accelerations, np.array(times))
         except JounceError as error:
             raise error.located(path=samples, name=name) from None
-        found[name] = Case(name, name, lambda a=accelerations: a, None, link, np.array(times), measured=True)
-    return found
+        cases[name] = Case(name, name, lambda a=accelerations: a, None, link, np.array(times), measured=True)
+    return cases
 
 
 def read_link(path: Path) -> Link:
@@ -74,7 +74,7 @@ def read_link(path: Path) -> Link:
     return link
 
 
-def told(cases: dict[str, Case], samples: Path | None, masses: Path | None) -> str:
+def summary(cases: dict[str, Case], samples: Path | None, masses: Path | None) -> str:
     """Return what the page says of data that are not the stand-ins of all of it."""
     case = next(iter(cases.values()))
     through = "The law is made of quintic segments through them, as they are"

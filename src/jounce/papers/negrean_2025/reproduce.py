@@ -9,7 +9,7 @@ import numpy as np
 from jounce.papers.negrean_2025.case import CASES
 from jounce.papers.negrean_2025.comparison import comparison
 from jounce.papers.negrean_2025.history import History, history
-from jounce.papers.negrean_2025.measured_data import given_cases, told
+from jounce.papers.negrean_2025.measured_data import given_cases, summary
 from jounce.papers.output import Progress, counter, csv_table, writable, write_figures, write_texts
 
 
@@ -54,7 +54,7 @@ def reproduce(
     """
     files = [None if path is None else Path(path) for path in (samples, masses)]
     cases = CASES if files == [None, None] else given_cases(*files)
-    data = None if cases is CASES else told(cases, *files)
+    data = None if cases is CASES else summary(cases, *files)
     directory = writable(Path(out_directory))
     from jounce.papers.negrean_2025 import figures  # imports matplotlib
 

@@ -63,14 +63,14 @@ def check() -> list[Check]:
     >>> worst.order, worst.power, str(worst.residual)
     (1, 4, '0.004')
     """
-    found = []
+    rows = []
     for order in range(1, len(POLYNOMIALS)):
         before, printed = POLYNOMIALS[order - 1], POLYNOMIALS[order]
         for power, coefficient in zip(range(len(printed) - 1, -1, -1), printed, strict=True):
             factor = power + 1
             derived = factor * Decimal(before[len(before) - 1 - factor])
-            found.append(Check(order, power, Decimal(coefficient), derived, (factor + 1) * HALF_UNIT))
-    return found
+            rows.append(Check(order, power, Decimal(coefficient), derived, (factor + 1) * HALF_UNIT))
+    return rows
 
 
 def evaluated(time: Float[np.ndarray, " time"]) -> Float[np.ndarray, "5 time"]:

@@ -120,14 +120,14 @@ class Cycle:
         return normalised_rmse(self.simulated, self.explicit)[1:]
 
 
-def rmse(found: Table, right: Table) -> Columns:
+def rmse(computed: Table, right: Table) -> Columns:
     """Return the root-mean-square error over time, the first axis."""
-    return np.sqrt(np.mean((found - right) ** 2, axis=0))
+    return np.sqrt(np.mean((computed - right) ** 2, axis=0))
 
 
-def normalised_rmse(found: Table, right: Table) -> Columns:
+def normalised_rmse(computed: Table, right: Table) -> Columns:
     """Return the root-mean-square error over time divided by the largest absolute value (Sommer 2024, section 4)."""
-    return rmse(found, right) / np.max(np.abs(right), axis=0)
+    return rmse(computed, right) / np.max(np.abs(right), axis=0)
 
 
 def nominal_time() -> Times:
@@ -145,8 +145,8 @@ def nominal_cycle(case: ValidationCase, mechanism: Mechanism) -> Cycle:
 def tolerance_error(case: ValidationCase, mechanism: Mechanism, tolerance: float) -> Float[np.ndarray, "4"]:
     """Return the normalised RMSE of velocity to jounce, with positions no better than an assembly tolerance."""
     time = nominal_time()
-    found = case.simulated(mechanism, time, tolerance=tolerance, refine=False)
-    return normalised_rmse(found, case.explicit(mechanism, time))[1:]
+    computed = case.simulated(mechanism, time, tolerance=tolerance, refine=False)
+    return normalised_rmse(computed, case.explicit(mechanism, time))[1:]
 
 
 def step_errors(case: ValidationCase, mechanism: Mechanism, step: float) -> dict[str, Float[np.ndarray, "2"]]:
@@ -155,12 +155,12 @@ def step_errors(case: ValidationCase, mechanism: Mechanism, step: float) -> dict
     All three stand at the same instants, one whole cycle of them.
     """
     time, centres = stencil_instants(step)
-    found = case.simulated(mechanism, time)
+    computed = case.simulated(mechanism, time)
     right = case.explicit(mechanism, time[centres])[:, 3:]
-    errors = {"simulation": normalised_rmse(found[centres, 3:], right)}
+    errors = {"simulation": normalised_rmse(computed[centres, 3:], right)}
     for name, accuracy in (("second order", 2), ("fourth order", 4)):
         estimates = [
-            central_difference(found[:, 2], step, derivative=derivative, accuracy=accuracy, at=centres)
+            central_difference(computed[:, 2], step, derivative=derivative, accuracy=accuracy, at=centres)
             for derivative in (1, 2)
         ]
         errors[name] = normalised_rmse(np.stack(estimates, axis=1), right)

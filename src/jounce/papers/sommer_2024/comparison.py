@@ -65,18 +65,18 @@ def _verdicts(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
             judge = (
                 _history if figure in cases.HISTORIES else _tolerances if figure in cases.TOLERANCE_SWEEPS else _steps
             )
-            found, holds, but = judge([results[name] for name in names], figure)
+            result, confirmed, but = judge([results[name] for name in names], figure)
             chosen = {STANDS_IN[name] for name in names} - {""}
-            verdict = ("reproduced" if holds else "NOT reproduced") + but
+            verdict = ("reproduced" if confirmed else "NOT reproduced") + but
             verdict += f"; {', '.join(sorted(chosen))}: stand-in" if chosen else ""
-            yield str(figure), found, verdict
+            yield str(figure), result, verdict
 
 
 def _history(results: Sequence[Results], figure: int) -> tuple[str, bool, str]:
     """Judge figures 2 and 3: the error of the four-bar's jerk or jounce is no larger than the printed one."""
     quantity = cases.HISTORIES[figure]
-    found, printed = results[0].cycle.rmse[cases.QUANTITIES.index(quantity)], PRINTED["four_bar", quantity]
-    return f"RMSE of {quantity} {found:.2g}, printed {printed:.3g}", bool(found <= printed), ", error smaller"
+    computed, printed = results[0].cycle.rmse[cases.QUANTITIES.index(quantity)], PRINTED["four_bar", quantity]
+    return f"RMSE of {quantity} {computed:.2g}, printed {printed:.3g}", bool(computed <= printed), ", error smaller"
 
 
 def _tolerances(results: Sequence[Results], _: int) -> tuple[str, bool, str]:
@@ -113,8 +113,8 @@ def _errors(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
         columns = zip(cases.QUANTITIES, UNITS, cycle.peak, cycle.rmse, cycle.normalised_rmse, strict=True)
         for quantity, unit, peak, error, normalised in columns:
             printed = PRINTED.get((name, quantity))
-            beside = "" if printed is None else f"{printed:.3g}"
-            sizes = f"{peak:.4g}", f"{error:.2e}", beside, f"{normalised:.1e}"
+            printed_text = "" if printed is None else f"{printed:.3g}"
+            sizes = f"{peak:.4g}", f"{error:.2e}", printed_text, f"{normalised:.1e}"
             yield name, STANDS_IN[name], quantity, unit, *sizes
 
 

@@ -100,7 +100,7 @@ def _panel(axes: Any, drawn: Drawn, view: View) -> SketchFigure:
     mechanism = VALIDATION_CASES[drawn.simulation].load()
     values, drawing = mechanism.parameter_values, drawing_of(mechanism, view=view)
     drawing.labels.clear()
-    places = {
+    positions = {
         letter: drawing.at(body, np.array([float(values.get(c, c)) for c in local]))[0]
         for letter, (body, local) in drawn.points.items()
     }
@@ -108,25 +108,25 @@ def _panel(axes: Any, drawn: Drawn, view: View) -> SketchFigure:
     def line(points: Any, **look: Any) -> None:
         drawing.curve(drawing.flat(np.asarray(points))[None], stroke=PALE_GREY, layer=2, owner="", **look)
 
-    def name(text: str, place: np.ndarray, colour: str, owner: str) -> None:
+    def name(text: str, point: np.ndarray, colour: str, owner: str) -> None:
         drawing.owner = owner
-        drawing.name(text, drawing.flat(place[None]), colour)
+        drawing.name(text, drawing.flat(point[None]), colour)
 
     for pair in drawn.fixed:
-        line([places[letter] for letter in pair], width=0.9, dashes=(5.0, 4.0))
-    for letter, place in places.items():
-        name(letter, place, "black", f"bodies.{letter}")
+        line([positions[letter] for letter in pair], width=0.9, dashes=(5.0, 4.0))
+    for letter, point in positions.items():
+        name(letter, point, "black", f"bodies.{letter}")
     for symbol, (vertex, start, quarter, arm) in drawn.angles.items():
-        reach = places[arm] - places[vertex]
+        reach = positions[arm] - positions[vertex]
         angle, radius = np.arctan2(reach @ quarter, reach @ start), ARC * drawing.unit
         turns = np.linspace(0.0, angle, 31)[:, None]
-        arc = places[vertex] + radius * (np.cos(turns) * start + np.sin(turns) * quarter)
+        arc = positions[vertex] + radius * (np.cos(turns) * start + np.sin(turns) * quarter)
         line(arc, width=0.9)
-        line([places[vertex], places[vertex] + 1.5 * radius * start], width=0.7)
+        line([positions[vertex], positions[vertex] + 1.5 * radius * start], width=0.7)
         name(symbol, arc[len(arc) // 2], "black", f"joints.{symbol}")
     for pair in drawn.lengths:
         text = f"{pair} = {100 * values[pair]:.2f} cm" if pair in values else f"d = {pair}, driven"
-        name(text, (places[pair[0]] + places[pair[1]]) / 2, GREY, f"joints.{pair}")
+        name(text, (positions[pair[0]] + positions[pair[1]]) / 2, GREY, f"joints.{pair}")
     seen_from = None if drawing.planar else view
     figure = SketchFigure(Scene.of(drawing), None, "", seen_from, axes)
     left, right = axes.get_xlim()

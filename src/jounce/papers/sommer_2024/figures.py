@@ -47,13 +47,13 @@ def time_history(results: Mapping[str, Results], *, name: str, quantity: str, nu
     """Draw a derivative of the output over one cycle, and below it the error of its simulation (figures 2 and 3)."""
     cycle, unit = results[name].cycle, RATE_UNITS[quantity]
     derivative = 1 + cases.QUANTITIES.index(quantity)
-    found, right = cycle.simulated[:, derivative], cycle.explicit[:, derivative]
+    computed, right = cycle.simulated[:, derivative], cycle.explicit[:, derivative]
     title = f"{cases.VALIDATION_CASES[name].title}: {quantity} of the output angle (figure {number} of Sommer 2024)"
     figure, axes = panels(2, 1, (6.0, 4.8), title, sharex=True)
     above, below = axes[:, 0]
-    above.plot(cycle.time, found, color=BLUE)
+    above.plot(cycle.time, computed, color=BLUE)
     above.set_ylabel(f"{quantity} / ({unit})")
-    below.plot(cycle.time, found - right, color=VERMILION, linewidth=0.9)
+    below.plot(cycle.time, computed - right, color=VERMILION, linewidth=0.9)
     index = derivative - 1
     below.set_ylabel(f"error / ({unit})")
     below.set_title(

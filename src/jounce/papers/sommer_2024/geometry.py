@@ -126,8 +126,8 @@ def evaluate(
     whole = np.pad(time, (0, -len(time) % LANES), mode="edge").reshape(-1, LANES)
     values = {name: float(value) for name, value in parameters.items()}
     parts = [np.asarray(_derivatives(form, part, values, order)) for part in whole]
-    found = np.concatenate(parts, axis=1)[:, : len(time)].T
-    return np.concatenate([np.unwrap(found[:, :1], axis=0), found[:, 1:]], axis=1)
+    rows = np.concatenate(parts, axis=1)[:, : len(time)].T
+    return np.concatenate([np.unwrap(rows[:, :1], axis=0), rows[:, 1:]], axis=1)
 
 
 @partial(jax.jit, static_argnames=("form", "order"))

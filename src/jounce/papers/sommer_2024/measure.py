@@ -57,11 +57,11 @@ def measure(case: ValidationCase, advanced: Callable[[], None] = lambda: None) -
     mechanism = case.load()
 
     def each(run: Callable[..., Any], settings: Iterable[float]) -> list[Any]:
-        found = []
+        results = []
         for value in settings:
-            found.append(run(case, mechanism, value))
+            results.append(run(case, mechanism, value))
             advanced()
-        return found
+        return results
 
     cycle = nominal_cycle(case, mechanism)
     advanced()

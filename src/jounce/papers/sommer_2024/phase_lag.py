@@ -51,15 +51,15 @@ class Lag:
         """How late the differences must be, s: h / 2 for the jerk, h for the jounce."""
         return self.step * (0.5 if self.quantity == "jerk" else 1.0)
 
-    def late(self, found: Series) -> float:
+    def late(self, computed: Series) -> float:
         """Return how late a quantity is, s, in the harmonic of the cycle in which the explicit one is largest."""
         right = np.fft.rfft(self.explicit)
         n = 1 + int(np.argmax(np.abs(right[1:])))
-        return -float(np.angle(np.fft.rfft(found)[n] / right[n])) * CYCLE / (2 * np.pi * n)
+        return -float(np.angle(np.fft.rfft(computed)[n] / right[n])) * CYCLE / (2 * np.pi * n)
 
-    def measured_error(self, found: Series) -> float:
+    def measured_error(self, computed: Series) -> float:
         """Return the normalised RMSE of a quantity."""
-        return float(normalised_rmse(found[:, None], self.explicit[:, None])[0])
+        return float(normalised_rmse(computed[:, None], self.explicit[:, None])[0])
 
 
 def lags(case: ValidationCase, mechanism: Mechanism, step: float) -> list[Lag]:
@@ -76,7 +76,7 @@ def lags(case: ValidationCase, mechanism: Mechanism, step: float) -> list[Lag]:
     """
     count = round(CYCLE / step)
     time = step * np.arange(count + 2)  # two samples before the first difference
-    found, right = case.simulated(mechanism, time), case.explicit(mechanism, time)
+    computed, right = case.simulated(mechanism, time), case.explicit(mechanism, time)
     fine = case.explicit(mechanism, CYCLE / FINE * np.arange(FINE))
     frequency = 2 * np.pi / CYCLE * np.arange(FINE // 2 + 1)
     transfer = np.sinc(frequency * step / (2 * np.pi)) * np.exp(-0.5j * frequency * step)
@@ -86,6 +86,6 @@ def lags(case: ValidationCase, mechanism: Mechanism, step: float) -> list[Lag]:
         spectrum = np.fft.rfft(fine[:, k]) / FINE
         lost = np.abs((1 - transfer**derivative) * spectrum) ** 2
         error = float(np.sqrt(lost[0] + 2 * lost[1:].sum()) / np.abs(right[2:, k]).max())
-        difference = backward_difference(found[:, 2], step, derivative=derivative)[2 - derivative :]
-        every.append(Lag(quantity, step, time[2:], right[2:, k], found[2:, k], difference, error))
+        difference = backward_difference(computed[:, 2], step, derivative=derivative)[2 - derivative :]
+        every.append(Lag(quantity, step, time[2:], right[2:, k], computed[2:, k], difference, error))
     return every

@@ -59,7 +59,7 @@ class DrivenRobot(DrivenSystem):
         self.robot, self.trajectory, self.losses = robot, trajectory, losses
         self.drives, self.arrays = drives, robot_drives(robot, drives, losses)
         self.followed = FollowedTrajectory(robot, trajectory)
-        self.title, self.held = robot.name, self.followed.held
+        self.title, self.resting_joints = robot.name, self.followed.resting_joints
         self.instants = np.unique(np.concatenate([[trajectory.start], trajectory.times, [trajectory.stop]]))
 
     def moved(self, times: Float[np.ndarray, " time"], levels: int) -> Moved:

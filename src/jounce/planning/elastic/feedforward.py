@@ -129,9 +129,9 @@ def feedforward(
         return _of_derivatives(system, motion, drives, rates, losses, tolerance)
     followed = DrivenRobot(system, motion, drives, losses)
     instants = motion.times if times is None else _checked_times(times, motion)
-    found = _along(followed, instants, rates)
+    result = _along(followed, instants, rates)
     followed.warn()
-    return found
+    return result
 
 
 def _along(system: DrivenSystem, instants: np.ndarray, rates: int) -> Feedforward:
@@ -179,12 +179,12 @@ def _of_derivatives(robot: Robot, q: object, drives: object, rates: int, losses:
 
 
 def _checked_times(times: ArrayLike, trajectory: JointTrajectory) -> np.ndarray:
-    found = np.atleast_1d(seconds("times", times, TrajectoryError))
-    if found.ndim != 1 or not len(found) or not np.isfinite(found).all() or (np.diff(found) <= 0).any():
-        raise TrajectoryError("must be finite instants that increase", name="times", value=found.tolist())
-    if found[0] < trajectory.start or found[-1] > trajectory.stop:
+    instants = np.atleast_1d(seconds("times", times, TrajectoryError))
+    if instants.ndim != 1 or not len(instants) or not np.isfinite(instants).all() or (np.diff(instants) <= 0).any():
+        raise TrajectoryError("must be finite instants that increase", name="times", value=instants.tolist())
+    if instants[0] < trajectory.start or instants[-1] > trajectory.stop:
         message = (
             f"the trajectory goes from {trajectory.start:.9g} to {trajectory.stop:.9g} s; choose instants within it"
         )
-        raise TrajectoryError(message, name="times", value=[found[0], found[-1]])
-    return found
+        raise TrajectoryError(message, name="times", value=[instants[0], instants[-1]])
+    return instants

@@ -66,15 +66,15 @@ def link_errors(feedforward: Feedforward, *, rigid: bool = True) -> LinkErrors:
     if rigid:
         laws.append(feedforward.rigid_torque_laws(friction=False))
     if isinstance(system, DrivenRobot):
-        found = [_of_robot(system, feedforward, instants, law) for law in laws]
+        errors = [_of_robot(system, feedforward, instants, law) for law in laws]
         names, turning = feedforward.names, system.arrays.turning
         units = tuple("rad" if turns else "m" for turns in turning)
     else:
         assert isinstance(system, DrivenMechanism)
-        found = [_of_mechanism(system, feedforward, instants, law) for law in laws]
+        errors = [_of_mechanism(system, feedforward, instants, law) for law in laws]
         names = tuple(system.mechanism.bodies)
         units = ("m",) * len(names)
-    return LinkErrors(names, units, instants, found[0], found[1] if rigid else None)
+    return LinkErrors(names, units, instants, errors[0], errors[1] if rigid else None)
 
 
 def _of_robot(system: DrivenRobot, feedforward: Feedforward, instants: np.ndarray, laws: Any) -> np.ndarray:
@@ -86,11 +86,11 @@ def _of_robot(system: DrivenRobot, feedforward: Feedforward, instants: np.ndarra
 
 def _of_mechanism(system: DrivenMechanism, feedforward: Feedforward, instants: np.ndarray, laws: Any) -> np.ndarray:
     run = simulate_elastic(system.mechanism, system.drives, instants, laws, feedforward.start, order=1, strict=False)
-    told = solve(system.mechanism, instants, order=1)
+    ideal = solve(system.mechanism, instants, order=1)
     size = 2 if system.mechanism.space == "planar" else 3
     points = np.concatenate([np.zeros((1, size)), np.eye(size)]).tolist()
-    found = np.zeros((len(instants), len(system.mechanism.bodies)))
+    deviations = np.zeros((len(instants), len(system.mechanism.bodies)))
     for column, body in enumerate(system.mechanism.bodies):
-        apart = [run.point(body, point).values[:, 0] - told.point(body, point).values[:, 0] for point in points]
-        found[:, column] = np.linalg.norm(np.stack(apart), axis=-1).max(axis=0)
-    return found
+        differences = [run.point(body, point).values[:, 0] - ideal.point(body, point).values[:, 0] for point in points]
+        deviations[:, column] = np.linalg.norm(np.stack(differences), axis=-1).max(axis=0)
+    return deviations

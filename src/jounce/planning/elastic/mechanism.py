@@ -40,8 +40,8 @@ class _DriveSpring(AbstractForce):
     prescribed: ClassVar[Callable[..., Any]]  # what the driver prescribes, from the first two bodies
 
     def displacement(self, body_i: Any, body_j: Any, rotor: Any, time: Any) -> Any:
-        place = sum(rotor.position[k] * self.across[k] for k in range(len(self.across)))
-        return type(self).prescribed(self, body_i, body_j) - place
+        coordinate = sum(rotor.position[k] * self.across[k] for k in range(len(self.across)))
+        return type(self).prescribed(self, body_i, body_j) - coordinate
 
     def force(self, displacement: Any, velocity: Any, time: Any) -> Any:
         return -self.stiffness * displacement - self.damping * velocity
@@ -111,22 +111,22 @@ def _start(mechanism: Mechanism, arrays: DriveArrays, state: object, instant: fl
         motion = solve(mechanism, [instant], order=1)
         own = np.stack([motion.driver(name).values[0] for name in arrays.names], axis=-1)
         return np.stack([own, own])
-    found = real_numbers("state", state, MechanismError)
-    if found.shape != (2, 2, n) or not np.isfinite(found).all():
+    given_state = real_numbers("state", state, MechanismError)
+    if given_state.shape != (2, 2, n) or not np.isfinite(given_state).all():
         message = f"must hold finite coordinates and rates of drivers and of motors, the shape (2, 2, {n})"
-        raise MechanismError(message, name="state", value=found.tolist())
-    return found
+        raise MechanismError(message, name="state", value=given_state.tolist())
+    return given_state
 
 
 def _elastic(
     mechanism: Mechanism, arrays: DriveArrays, torques: list[Any], state: np.ndarray, instant: float
 ) -> Mechanism:
     bodies, joints, forces = dict(mechanism.bodies), dict(mechanism.joints), dict(mechanism.forces)
-    kept, initial = dict(mechanism.drivers), dict(mechanism.initial)
+    remaining, initial = dict(mechanism.drivers), dict(mechanism.initial)
     across, normal = _across(mechanism)
     for k in np.flatnonzero(arrays.elastic):
         name, spring = arrays.names[k], arrays.stiffness[k]
-        driver, rotor = kept.pop(name), arrays.names[k] + MOTOR
+        driver, rotor = remaining.pop(name), arrays.names[k] + MOTOR
         kind = SPRINGS.get(type(driver))
         if kind is None:
             message = f"a driver of type {driver.type_name or type(driver).__name__} cannot be simulated with a spring"
@@ -142,8 +142,8 @@ def _elastic(
             values["ratio"] = 1.0
         given = {"stiffness": spring, "damping": spring * arrays.time_constant[k], "across": across, **values}
         forces[f"{name}_spring"] = kind(bodies=(*driver.bodies, rotor), **given)
-        zero, place = [0.0] * len(across), [float(c * state[1, 0, k]) for c in across]
-        bodies[rotor] = Body(place, mass=float(arrays.inertia[k]), inertia=1.0 if len(across) == 2 else [1.0] * 3)
+        zero, coordinate = [0.0] * len(across), [float(c * state[1, 0, k]) for c in across]
+        bodies[rotor] = Body(coordinate, mass=float(arrays.inertia[k]), inertia=1.0 if len(across) == 2 else [1.0] * 3)
         directions = (across, across) if len(across) == 2 else (across, across, normal, normal)
         slider = planar.Prismatic if len(across) == 2 else spatial.Prismatic
         joints[f"{rotor}_guide"] = slider(("ground", rotor), zero, zero, *directions)
@@ -153,20 +153,20 @@ def _elastic(
         slide = drivers.SlideDriver if len(across) == 2 else drivers.SpatialSlideDriver
         initial[name] = dataclasses.replace(driver, motion=_uniform(state[0, :, k], instant))
         initial[rotor] = slide(("ground", rotor), zero, zero, across, _uniform(state[1, :, k], instant))
-    changed = {"bodies": bodies, "joints": joints, "forces": forces, "drivers": kept, "initial": initial}
-    outputs = {name: x for name, x in mechanism.outputs.items() if not _of_driver(x, kept, arrays.names)}
+    changed = {"bodies": bodies, "joints": joints, "forces": forces, "drivers": remaining, "initial": initial}
+    outputs = {name: x for name, x in mechanism.outputs.items() if not _of_driver(x, remaining, arrays.names)}
     return dataclasses.replace(mechanism, **changed, outputs=outputs)
 
 
-def _of_driver(output: Any, kept: Mapping[str, Any], names: tuple[str, ...]) -> bool:
+def _of_driver(output: Any, drivers: Mapping[str, Any], names: tuple[str, ...]) -> bool:
     """Tell whether an output is of a driver that a spring has taken the place of."""
-    told = {getattr(output, field, None) for field in ("driver", "joint")}
-    return any(name in names and name not in kept for name in told)
+    owners = {getattr(output, field, None) for field in ("driver", "joint")}
+    return any(name in names and name not in drivers for name in owners)
 
 
 def _uniform(state: np.ndarray, instant: float) -> str:
-    place, rate = (float(x) for x in state)
-    return f"{place!r} + ({rate!r})*(t - ({instant!r}))"
+    coordinate, rate = (float(x) for x in state)
+    return f"{coordinate!r} + ({rate!r})*(t - ({instant!r}))"
 
 
 def _across(mechanism: Mechanism) -> tuple[list[float], list[float]]:

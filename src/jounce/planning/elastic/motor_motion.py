@@ -118,16 +118,16 @@ class Feedforward(MotorMotion):
         self.system, self._arrays = system, system.arrays
         self._levels, self._springs, self._rest = levels, springs, 0.0
         if rest is None and system.arrays.friction.any():
-            rest = REST * np.abs(self._found(system.instants).position[:, 1]).max(axis=0)
+            rest = REST * np.abs(self._motion_at(system.instants).position[:, 1]).max(axis=0)
         self._rest = 0.0 if rest is None else rest
-        found = self._found(time)
-        super().__init__(*(getattr(found, field.name) for field in dataclasses.fields(found)))
+        motion = self._motion_at(time)
+        super().__init__(*(getattr(motion, field.name) for field in dataclasses.fields(motion)))
 
     def __repr__(self) -> str:
         elastic = int(self._arrays.elastic.sum())
         return f"<Feedforward of {self.title}: {len(self.names)} drives, {elastic} elastic, {len(self.time)} instants>"
 
-    def _found(self, times: np.ndarray, *, friction: bool = True) -> MotorMotion:
+    def _motion_at(self, times: np.ndarray, *, friction: bool = True) -> MotorMotion:
         q, forces = self.system.moved(times, self._levels)
         deflection = np.zeros_like(q)
         if self._springs is not None:
@@ -154,17 +154,17 @@ class Feedforward(MotorMotion):
 
         Row 0 is ``tau / K``, row 1 has the damping too. Zero for joints without damping.
         """
-        found = np.zeros((self._levels, len(self.names)))
+        errors = np.zeros((self._levels, len(self.names)))
         if self._springs is not None:
             damped = self._arrays.time_constant[self._arrays.elastic] > 0
-            found[:, self._arrays.elastic] = np.where(damped, self._springs.expansion_errors(), 0.0)
-        return found
+            errors[:, self._arrays.elastic] = np.where(damped, self._springs.expansion_errors(), 0.0)
+        return errors
 
     @property
     def start(self) -> Float[np.ndarray, "2 2 joint"]:
         """Coordinates and rates of the links, and of the motors, at the start: the state for `simulate_elastic`."""
-        found = self._found(self.system.instants[:1])
-        return np.stack([found.q[0, :2], found.position[0, :2]])
+        motion = self._motion_at(self.system.instants[:1])
+        return np.stack([motion.q[0, :2], motion.position[0, :2]])
 
     @cached_property
     def report(self) -> DriveReport:
@@ -174,24 +174,24 @@ class Feedforward(MotorMotion):
         between = grid[:-1, None] + np.diff(grid)[:, None] * (np.arange(steps) / steps)
         grid = np.append(between.reshape(-1), grid[-1])
         rigid = [QUANTITIES.index("deflection")] if not self._arrays.elastic.all() else []
-        wanted = [
+        limited = [
             (quantity, joint)
             for joint in range(len(self.names))
             for quantity in range(len(QUANTITIES))
             if quantity not in rigid or self._arrays.elastic[joint]
         ]
         bounds = _Bounds(self._arrays.limits)
-        times, values, _ = worst_instants(self._curves, bounds, grid, self._curves(grid), np.array(wanted))
+        times, values, _ = worst_instants(self._curves, bounds, grid, self._curves(grid), np.array(limited))
         return DriveReport(
             tuple(
                 self._row(quantity, joint, float(at), float(value))
-                for (quantity, joint), at, value in zip(wanted, times, values, strict=True)
+                for (quantity, joint), at, value in zip(limited, times, values, strict=True)
             )
         )
 
     def _curves(self, times: np.ndarray) -> Float[np.ndarray, "time 3 joint"]:
-        found = self._found(times)
-        return np.stack([found.deflection[:, 0], found.motor_position[:, 1], found.motor_torque[:, 0]], axis=1)
+        motion = self._motion_at(times)
+        return np.stack([motion.deflection[:, 0], motion.motor_position[:, 1], motion.motor_torque[:, 0]], axis=1)
 
     def _row(self, quantity: int, joint: int, time: float, value: float) -> LimitRow:
         limit = float(self._arrays.limits[quantity, joint])
@@ -212,14 +212,14 @@ class Feedforward(MotorMotion):
         friction : bool, default True
             Whether they overcome Coulomb friction, and so jump where a motor turns back.
         """
-        return self._laws(lambda times: self._found(times, friction=friction).torque[:, 0])
+        return self._laws(lambda times: self._motion_at(times, friction=friction).torque[:, 0])
 
     def rigid_torque_laws(self, *, friction: bool = True) -> dict[str, AbstractMotion]:
         """Return what the motor torques are without the acceleration of the springs: ``tau + B q''``, as laws."""
 
         def torques(times: np.ndarray) -> np.ndarray:
-            found = self._found(times, friction=friction)
-            return found.torque[:, 0] - self._arrays.inertia * found.deflection[:, 2]
+            motion = self._motion_at(times, friction=friction)
+            return motion.torque[:, 0] - self._arrays.inertia * motion.deflection[:, 2]
 
         return self._laws(torques)
 
@@ -243,21 +243,21 @@ class Feedforward(MotorMotion):
         axes = time_axes(self.time, count)
         variables: dict[str, Any] = {}
         for k, name in enumerate(self.names):
-            place, force = (("m", "N"), ("rad", "N*m"))[self._arrays.turning[k]]
+            length_unit, force = (("m", "N"), ("rad", "N*m"))[self._arrays.turning[k]]
             own, effort = (("m", "N"), ("rad", "N*m"))[self._arrays.motor_turning[k]]
             table = {
                 "motor": (self.motor_position, own),
                 "motor_velocity": (self.motor_position[:, 1:], f"{own}/s"),
                 "motor_acceleration": (self.motor_position[:, 2:], f"{own}/s**2"),
                 "motor_torque": (self.motor_torque, effort),
-                "theta": (self.position, place),
+                "theta": (self.position, length_unit),
                 "torque": (self.torque, force),
-                "deflection": (self.deflection, place),
+                "deflection": (self.deflection, length_unit),
                 "spring_torque": (self.spring_torque, force),
             }
             for word, (values, unit) in table.items():
-                told = {"units": unit, "long_name": derivatives_of(f"{name}_{word}")}
-                variables[f"{name}_{word}"] = (("time", "derivative"), values[:, :count, k], told)
+                attributes = {"units": unit, "long_name": derivatives_of(f"{name}_{word}")}
+                variables[f"{name}_{word}"] = (("time", "derivative"), values[:, :count, k], attributes)
         return xarray.Dataset(variables, coords=axes, attrs={"title": self.title, "source": "jounce"})
 
 

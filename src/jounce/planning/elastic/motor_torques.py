@@ -31,13 +31,13 @@ def torques_of(
     laws = []
     for name, law in torque.items():
         check_name("drive", str(name), arrays.names, RobotError, name="torque")
-        place = arrays.names.index(name)
+        index = arrays.names.index(name)
         if isinstance(law, str):
             law = ExpressionMotion(law)
         if isinstance(law, AbstractMotion):
-            laws.append((place, read_laws(law)))
+            laws.append((index, read_laws(law)))
         elif isinstance(law, int | float) and np.isfinite(law):
-            constant[place] = law
+            constant[index] = law
         else:
             message = "must be a law of time: a motion law, an expression of t, or a finite number"
             raise RobotError(message, name=f"torque.{name}", value=law)

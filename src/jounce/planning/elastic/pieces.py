@@ -11,8 +11,8 @@ from jounce.errors import TrajectoryError
 from jounce.trajectory.motion import SplineMotion
 
 POINTS = 10  # of Gauss, on each piece
-PLACES, WEIGHTS = legendre.leggauss(POINTS)
-ANALYSIS = legendre.legvander(PLACES, POINTS - 1).T * WEIGHTS * (np.arange(POINTS)[:, None] + 0.5)
+NODES, WEIGHTS = legendre.leggauss(POINTS)
+ANALYSIS = legendre.legvander(NODES, POINTS - 1).T * WEIGHTS * (np.arange(POINTS)[:, None] + 0.5)
 """Takes values at the points to the coefficients of Legendre polynomials."""
 
 RESOLVED = 1e-12  # of the largest value: what the last coefficients may be
@@ -60,17 +60,17 @@ class PieceMotion(SplineMotion):
 
 def _shifted(degree: int) -> Float[np.ndarray, " powers"]:
     """Return the powers of a Legendre polynomial of a variable that goes from 0 to 1."""
-    found, line = np.zeros(1), np.array([-1.0, 2.0])
+    shifted, line = np.zeros(1), np.array([-1.0, 2.0])
     for c in legendre.leg2poly([0.0] * degree + [1.0])[::-1]:
-        found = polynomial.polyadd(polynomial.polymul(found, line), [c])
-    return np.pad(found, (0, POINTS))[:POINTS]
+        shifted = polynomial.polyadd(polynomial.polymul(shifted, line), [c])
+    return np.pad(shifted, (0, POINTS))[:POINTS]
 
 
 def points_of(
     start: Float[np.ndarray, " pieces"], stop: Float[np.ndarray, " pieces"]
 ) -> Float[np.ndarray, "pieces points"]:
     """Return the instants of the points of Gauss on pieces."""
-    return start[:, None] + 0.5 * (stop - start)[:, None] * (1.0 + PLACES)
+    return start[:, None] + 0.5 * (stop - start)[:, None] * (1.0 + NODES)
 
 
 def resolved(
@@ -93,7 +93,7 @@ def resolved(
         If that takes more pieces than there may be.
     """
     start, stop = nodes[:-1], nodes[1:]
-    span, kept, total = nodes[-1] - nodes[0], [], 0
+    duration, accepted, total = nodes[-1] - nodes[0], [], 0
     largest, before = np.zeros(1), np.full(len(start), np.inf)
     while len(start):
         total += len(start)
@@ -105,11 +105,11 @@ def resolved(
         last = np.abs(np.einsum("kg,pgc->pkc", ANALYSIS[-2:], values)).max(axis=1)
         share = (np.maximum(last - floor, 0.0) / np.where(largest > 0, largest, 1.0)).max(axis=1)
         noise = (share < NOISE) & (share > 0.25 * before)
-        good = (share <= RESOLVED) | noise | (stop - start <= SHORTEST * span)
-        kept.append((start[good], stop[good], values[good]))
+        good = (share <= RESOLVED) | noise | (stop - start <= SHORTEST * duration)
+        accepted.append((start[good], stop[good], values[good]))
         middle = 0.5 * (start + stop)[~good]
         start, stop = (np.stack(pair, axis=1).reshape(-1) for pair in ((start[~good], middle), (middle, stop[~good])))
         before = np.repeat(share[~good], 2)
-    begins, ends, found = (np.concatenate(parts) for parts in zip(*kept, strict=True))
+    begins, ends, coefficients = (np.concatenate(parts) for parts in zip(*accepted, strict=True))
     order = np.argsort(begins)
-    return Pieces(np.append(begins[order], ends[order][-1]), found[order])
+    return Pieces(np.append(begins[order], ends[order][-1]), coefficients[order])

@@ -94,7 +94,7 @@ class _ElasticForces(AbstractJointLaws):
     laws: tuple[AbstractMotion, ...]
     stiffness: Any
     damping: Any
-    places: tuple[int, ...] = eqx.field(static=True)  # of the laws among the robot's own joints
+    indices: tuple[int, ...] = eqx.field(static=True)  # of the laws among the robot's own joints
     links: tuple[int, ...] = eqx.field(static=True)  # columns of the robot's own joints
     motors: tuple[int, ...] = eqx.field(static=True)  # of what moves each: its rotor, or itself
     feedback: OfSample | None
@@ -108,8 +108,8 @@ class _ElasticForces(AbstractJointLaws):
         own = jnp.broadcast_to(jnp.asarray(self.torque)[:, None], (len(links), q.shape[-1]))
         if self.laws:
             zero = jnp.zeros_like(time[0])
-            found = {k: law(Jet([time[0]])).coefficients[0] for k, law in zip(self.places, self.laws, strict=True)}
-            own = own + jnp.stack([found.get(k, zero) for k in range(len(links))])
+            values = {k: law(Jet([time[0]])).coefficients[0] for k, law in zip(self.indices, self.laws, strict=True)}
+            own = own + jnp.stack([values.get(k, zero) for k in range(len(links))])
         if self.feedback is not None:
             parts = time[0], q[links], rate[links], q[motors], rate[motors]
             own = own + self.feedback(*parts)
@@ -142,9 +142,9 @@ def simulate_elastic_robot(
     sample = jnp.zeros(()), *[jnp.zeros(len(arrays.names))] * 4
     feedback = None if function is None else OfSample.of(function, *sample)
     stiffness = np.where(arrays.elastic, arrays.stiffness, 0.0)
-    places, functions = tuple(k for k, _ in laws), tuple(law for _, law in laws)
+    indices, functions = tuple(k for k, _ in laws), tuple(law for _, law in laws)
     damping = stiffness * arrays.time_constant
-    forces = _ElasticForces(constant, functions, stiffness, damping, places, links, motors, feedback)
+    forces = _ElasticForces(constant, functions, stiffness, damping, indices, links, motors, feedback)
     started = _start(arrays, state, len(names), links, motors)
     return simulate(whole, time, order, state=started, torque=forces, drives=True, **options)
 
@@ -159,7 +159,7 @@ def _start(
         message = f"must hold finite q and q' of the links, the shape (2, {n}), or of links and motors, (2, 2, {n})"
         raise RobotError(message, name="state", value=given.tolist())
     both = given if given.ndim == 3 else np.stack([given, given])
-    found = np.zeros((2, count))
-    found[:, list(motors)] = both[1]
-    found[:, list(links)] = both[0]
-    return found
+    state_values = np.zeros((2, count))
+    state_values[:, list(motors)] = both[1]
+    state_values[:, list(links)] = both[0]
+    return state_values

@@ -94,9 +94,9 @@ class SpringDeflection:
         """Return deflections at the nodes, a linear recurrence for all joints at once."""
         from scipy.linalg import solve_banded  # here, since importing SciPy takes half a second
 
-        found = self.at_nodes / self.stiffness
+        deflection = self.at_nodes / self.stiffness
         if not len(self.damped):
-            return found
+            return deflection
         constant, stiffness = self.time_constant[self.damped], self.stiffness[self.damped]
         steps = np.diff(self.pieces.nodes)[:, None] / constant
         count, joints = steps.shape
@@ -107,8 +107,8 @@ class SpringDeflection:
         below[:, :-1] = -np.exp(-steps).T
         bands = np.stack([np.ones(joints * (count + 1)), below.reshape(-1)])
         solved = solve_banded((1, 0), bands, right).reshape(joints, count + 1, self.levels)
-        found[..., self.damped] = np.moveaxis(solved, 0, -1)
-        return found
+        deflection[..., self.damped] = np.moveaxis(solved, 0, -1)
+        return deflection
 
     def _first(self) -> Float[np.ndarray, "joint level"]:
         """Return the deflections with which damped joints begin: the regular expansion, cut where its terms rise."""
@@ -117,26 +117,26 @@ class SpringDeflection:
         sizes = np.abs(self.at_nodes[..., self.damped]).max(axis=0) * constant ** np.arange(self.levels)[:, None]
         rising = np.concatenate([sizes[1:] >= sizes[:-1], np.ones((1, len(constant)), bool)])
         last = np.argmax(rising, axis=0)  # the last term before the first that is larger
-        found = np.zeros_like(torque)
+        deflection = np.zeros_like(torque)
         for level in range(self.levels):  # each from those below
             terms = np.arange(self.levels - level)[:, None]
             within = terms <= last - level
             expanded = np.sum(np.where(within, (-constant) ** terms * torque[level:], 0.0), axis=0) / stiffness
-            beyond = 0.0 if level == 0 else (torque[level - 1] / stiffness - found[level - 1]) / constant
-            found[level] = np.where(level <= last, expanded, beyond)
-        return found.T
+            beyond = 0.0 if level == 0 else (torque[level - 1] / stiffness - deflection[level - 1]) / constant
+            deflection[level] = np.where(level <= last, expanded, beyond)
+        return deflection.T
 
     def at(self, times: Float[np.ndarray, " time"]) -> Float[np.ndarray, "time level joint"]:
         """Return deflections and their derivatives at instants of the trajectory."""
         nodes = self.pieces.nodes
         if not len(self.damped):
             return self.torques(times) / self.stiffness
-        place = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, len(nodes) - 1)
-        found = self.solution[place]
-        between = np.flatnonzero(times > nodes[place])
+        cell = np.clip(np.searchsorted(nodes, times, side="right") - 1, 0, len(nodes) - 1)
+        deflection = self.solution[cell]
+        between = np.flatnonzero(times > nodes[cell])
         if not len(between):
-            return found
-        start, stop = nodes[place[between]], times[between]
+            return deflection
+        start, stop = nodes[cell[between]], times[between]
         constant, stiffness = self.time_constant[self.damped], self.stiffness[self.damped]
         instants = np.concatenate([points_of(start, stop).reshape(-1), stop])
         torques = self.torques(instants)
@@ -144,9 +144,9 @@ class SpringDeflection:
         steps = (stop - start)[:, None] / constant
         gained = np.einsum("pjg,pglj->plj", mean_weights(steps), values[..., self.damped]) / stiffness
         moved = there / self.stiffness
-        moved[..., self.damped] = np.exp(-steps)[:, None] * found[between][..., self.damped] + gained
-        found[between] = moved
-        return found
+        moved[..., self.damped] = np.exp(-steps)[:, None] * deflection[between][..., self.damped] + gained
+        deflection[between] = moved
+        return deflection
 
     def expansion_errors(self) -> Float[np.ndarray, "order joint"]:
         """Return what the regular expansion misses of the deflection, cut after each order, by its peak; 0 undamped."""
@@ -175,7 +175,7 @@ def mean_weights(steps: Float[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shap
     j = np.arange(POINTS)
     with np.errstate(over="ignore"):
         share = 1.0 / (2.0 * np.maximum(a, LARGE))
-    ways = np.where(j <= degrees[:, None], factorial(degrees[:, None] + j) / factorial(j), 0.0)
-    ways = ways / factorial(np.maximum(degrees[:, None] - j, 0))
-    large = np.sum(ways * (-share[..., None]) ** j, axis=-1)
+    factors = np.where(j <= degrees[:, None], factorial(degrees[:, None] + j) / factorial(j), 0.0)
+    factors = factors / factorial(np.maximum(degrees[:, None] - j, 0))
+    large = np.sum(factors * (-share[..., None]) ** j, axis=-1)
     return np.where(a < LARGE, small, large) @ ANALYSIS

@@ -76,25 +76,25 @@ class Search:
             basis,
             conditions,
         )
-        self.kept_level, self.margin = level, 0.0
-        self.points, self.held = np.zeros(0), np.zeros(0, bool)
+        self.limit_level, self.margin = level, 0.0
+        self.points, self.enforced = np.zeros(0), np.zeros(0, bool)
         self.prices = np.zeros((0, len(labels.every)))
         grid = ((np.arange(basis.cells)[:, None] + OFFSETS) / basis.cells).reshape(-1)
         ends = np.linspace(0.0, END_CELLS / basis.cells, END_POINTS)[1:]  # where it rests, limits change fast
-        held = np.isin(np.arange(len(grid)) % len(OFFSETS), FIRST)
-        self.extend(np.concatenate([grid, ends, 1 - ends]), np.append(held, np.ones(2 * len(ends), bool)))
+        enforced = np.isin(np.arange(len(grid)) % len(OFFSETS), FIRST)
+        self.extend(np.concatenate([grid, ends, 1 - ends]), np.append(enforced, np.ones(2 * len(ends), bool)))
         self.nodes, self.weights = quadrature(basis.cells, 2)
         self.node_matrix = basis.matrices(self.nodes, 0)[0]
 
-    def extend(self, points: _Points, held: Bool[np.ndarray, " point"]) -> None:
-        """Look at more values of u; where `held`, all limits that are near hold from the beginning."""
+    def extend(self, points: _Points, enforced: Bool[np.ndarray, " point"]) -> None:
+        """Look at more values of u; where `enforced`, all limits that are near hold from the beginning."""
         before, joined = self.points, np.concatenate([self.points, points])
         self.points, first = np.unique(joined, return_index=True)
-        self.held = np.concatenate([self.held, held])[first]
+        self.enforced = np.concatenate([self.enforced, enforced])[first]
         self.shape = self.parameter.derivatives(self.points, 4)
         quantities = self.source(self.shape[0])
         left_out = {"rates": 3, "fourth_bounds": 4}
-        free = {x: np.full_like(getattr(quantities, x), np.inf) for x, k in left_out.items() if k > self.kept_level}
+        free = {x: np.full_like(getattr(quantities, x), np.inf) for x, k in left_out.items() if k > self.limit_level}
         quantities = dataclasses.replace(quantities, **free)
         self.curves = Curves(quantities, self.shape)
         self.matrices = self.basis.matrices(self.points)
@@ -102,11 +102,11 @@ class Search:
         self.prices[np.searchsorted(self.points, before)] = known
 
     @property
-    def highest(self) -> float:
+    def largest_z(self) -> float:
         """Largest z."""
-        if self.conditions.highest is None:
+        if self.conditions.max_rate is None:
             return np.inf
-        return float((self.conditions.highest / self.shape[1].max()) ** 2)
+        return float((self.conditions.max_rate / self.shape[1].max()) ** 2)
 
     def law_of(self, coefficients: _Points) -> RateLaw:
         """Return the law of coefficients."""
@@ -118,14 +118,14 @@ class Search:
 
     def level(self) -> float:
         """Return the largest even z that breaks no limit of velocity, acceleration or torque, within a twentieth."""
-        z, one = min(1.0, self.highest), np.ones(self.basis.count)
+        z, one = min(1.0, self.largest_z), np.ones(self.basis.count)
 
         def worst(z: float) -> float:
             return float(np.max(self.curves.ratios(self.at(z * one))))
 
         while worst(z) > 1 and z > 1e-12:
             z /= 4
-        while z * 1.2 <= min(self.highest, MOST) and worst(z * 1.2) <= 1:
+        while z * 1.2 <= min(self.largest_z, MOST) and worst(z * 1.2) <= 1:
             z *= 1.2
         return z
 
@@ -139,7 +139,7 @@ class Search:
         """
         x, duration = start, self._duration(start) if settled else np.inf
         ratios = self.curves.ratios(self.at(x))
-        chosen = self.held[:, None] & (
+        chosen = self.enforced[:, None] & (
             ratios > (0 if len(self.nodes) == 2 * COARSE else SETTLED_NEAR if settled else NEAR)
         )
         chosen |= _peaks(ratios) & (ratios > 1)
@@ -199,35 +199,35 @@ class Search:
         """Return where the highest peaks are between the points, and the ratios there, the largest among them."""
         ratios = self.curves.ratios(law.at(self.points))
         at, curve = np.nonzero(_peaks(ratios) & (ratios > min(float(ratios.max()), 1.0) - CLOSE))
-        best, places = ratios[at, curve], self.points[at]
+        best, positions = ratios[at, curve], self.points[at]
         last = len(self.points) - 1
         low, high = self.points[np.maximum(at - 1, 0)], self.points[np.minimum(at + 1, last)]
         share, every = np.linspace(0.0, 1.0, ZOOM)[:, None], np.arange(len(at))
         for _ in range(zooms):
             u = low + share * (high - low)
-            found = self.ratios_at(u.reshape(-1), law).reshape(*u.shape, -1)[:, every, curve]
-            top = np.argmax(found, axis=0)
-            better = found[top, every] > best
-            best, places = np.where(better, found[top, every], best), np.where(better, u[top, every], places)
+            refined = self.ratios_at(u.reshape(-1), law).reshape(*u.shape, -1)[:, every, curve]
+            top = np.argmax(refined, axis=0)
+            better = refined[top, every] > best
+            best, positions = np.where(better, refined[top, every], best), np.where(better, u[top, every], positions)
             low, high = u[np.maximum(top - 1, 0), every], u[np.minimum(top + 1, ZOOM - 1), every]
-        return places, best
+        return positions, best
 
-    def found(self, start: _Points) -> RateLaw:
+    def fastest_law(self, start: _Points) -> RateLaw:
         """Return the fastest law that keeps its limits between the points too.
 
         Where a limit is exceeded between them, it is held there, and the search goes on.
         """
         law = self.run(start)
         for _ in range(EXCHANGES):
-            places, ratios = self.peaks(law, 2)
+            positions, ratios = self.peaks(law, 2)
             over = ratios > 1 + EXCEEDED
             if not over.any():
                 break
-            self.extend(places[over], np.ones(int(over.sum()), bool))
+            self.extend(positions[over], np.ones(int(over.sum()), bool))
             law = self.run(law.coefficients, settled=True)
-        return self.kept(law)
+        return self.slowed_to_limits(law)
 
-    def kept(self, law: RateLaw) -> RateLaw:
+    def slowed_to_limits(self, law: RateLaw) -> RateLaw:
         """Return a law slowed as a whole by what it exceeds limits between the points.
 
         Raises
@@ -268,12 +268,12 @@ class Search:
         rows = sparse.vstack([rows, -sparse.identity(self.basis.count)])
         squared = np.where(curve[row] < len(self.labels.first), 2.0, 1.0)
         right = np.append(right[at, row] - self.margin * squared, np.full(self.basis.count, -FLOOR))
-        if self.labels.fourth and self.kept_level == 4:  # their programs are near the truth only about the last law
+        if self.labels.fourth and self.limit_level == 4:  # their programs are near the truth only about the last law
             rows = sparse.vstack([rows, sparse.identity(self.basis.count), -sparse.identity(self.basis.count)])
             right = np.concatenate([right, TRUST * np.abs(x) / scale, -x / TRUST / scale])
-        if self.conditions.highest is not None:
+        if self.conditions.max_rate is not None:
             rows = sparse.vstack([rows, sparse.identity(self.basis.count)])
-            right = np.append(right, np.full(self.basis.count, self.highest / scale))
+            right = np.append(right, np.full(self.basis.count, self.largest_z / scale))
         vectors = self.curves.vector
         bounds = self.curves.quantities.vector_bounds
         first = sum(len(x) for x in (self.labels.first, self.labels.second, self.labels.rates))
@@ -284,7 +284,7 @@ class Search:
             sparse.diags((part[points, which] / size[:, None] * factor * scale).reshape(-1)) @ matrix[repeated]
             for part, factor, matrix in zip(vectors, (0.5, 1.0), self.matrices[1::-1], strict=True)
         )
-        equal, equal_right = self._held(scale)
+        equal, equal_right = self._end_equations(scale)
         program = Program(
             self.weights,
             self.node_matrix,
@@ -297,7 +297,7 @@ class Search:
         )
         return program, curve[row], at
 
-    def _held(self, scale: float) -> tuple[object, _Points]:
+    def _end_equations(self, scale: float) -> tuple[object, _Points]:
         """Return the equations for rates that are given at the ends."""
         from scipy import sparse
 
@@ -348,7 +348,7 @@ def fastest(
         (share, s), duration = progress(law), law.duration
     parameter = Parametrisation(share, s, conditions.rests)
     search = Search(source, labels, parameter, basis, conditions)
-    return search.found(np.full(basis.count, 1 / duration**2)), search
+    return search.fastest_law(np.full(basis.count, 1 / duration**2)), search
 
 
 def slowed_only(
@@ -358,7 +358,7 @@ def slowed_only(
     check_possible(source, labels, start, stop, bounded=True)
     parameter = Parametrisation([0.0, 1.0], [start, stop], (1, 1))
     search = Search(source, labels, parameter, RateBasis(cells, max(conditions.order + 1, 2)), conditions)
-    as_it_was = search.law_of(np.full(search.basis.count, search.highest))
+    as_it_was = search.law_of(np.full(search.basis.count, search.largest_z))
     if search.peaks(as_it_was)[1].max() <= 1:
         return as_it_was, search
-    return search.found(np.full(search.basis.count, search.level())), search
+    return search.fastest_law(np.full(search.basis.count, search.level())), search

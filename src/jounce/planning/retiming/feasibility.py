@@ -6,22 +6,22 @@ from jaxtyping import Float
 from jounce.errors import TrajectoryError
 from jounce.planning.retiming.quantities import G, Labels, PathQuantities, Source
 
-PLACES = 1001  # places on the path
+POINTS = 1001  # places on the path
 STATIC = 1e-6  # of a limit, which what stands still must leave
 IDLE = 1e-9  # of its largest value: what moves by less does not move
 
 
 def check_possible(source: Source, labels: Labels, start: float, stop: float, *, bounded: bool = False) -> None:
     """Raise TrajectoryError where standing still breaks a limit, or nothing that has one moves."""
-    s = np.linspace(start, stop, PLACES)
-    found = source(s)
-    still = found.second[:, :, G]
-    spare = np.minimum(_spare(found.upper, still), _spare(-found.lower, -still))
+    s = np.linspace(start, stop, POINTS)
+    quantities = source(s)
+    at_rest = quantities.second[:, :, G]
+    spare = np.minimum(_spare(quantities.upper, at_rest), _spare(-quantities.lower, -at_rest))
     if spare.size and spare.min() <= STATIC:
         at, column = np.unravel_index(np.argmin(spare), spare.shape)
-        label, value = labels.second[column], float(still[at, column])
-        limit = float((found.upper if value > 0 else found.lower)[at, column])
-        where = source.place(float(s[at]))
+        label, value = labels.second[column], float(at_rest[at, column])
+        limit = float((quantities.upper if value > 0 else quantities.lower)[at, column])
+        where = source.location(float(s[at]))
         message = (
             f"no time law exists that could halt everywhere: at {where} standing still needs a {label.word} of "
             f"{value:.6g} {label.unit}, and the limit is {limit:.6g} {label.unit}; motions that "
@@ -30,34 +30,34 @@ def check_possible(source: Source, labels: Labels, start: float, stop: float, *,
         raise TrajectoryError(message, name=label.owner)
     if bounded:
         return
-    moving = _moving(found, rates=True)
-    still_there = np.flatnonzero(moving < IDLE)
-    if len(still_there):
-        where = source.place(float(s[still_there[0]]))
+    moving = _moving(quantities, rates=True)
+    stops = np.flatnonzero(moving < IDLE)
+    if len(stops):
+        where = source.location(float(s[stops[0]]))
         message = f"nothing with a limit moves at {where}, so that there is no fastest law; give more limits"
         raise TrajectoryError(message, name="limits")
 
 
 @np.errstate(invalid="ignore")
-def _spare(bound: np.ndarray, still: np.ndarray) -> np.ndarray:
+def _spare(bound: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
     """Return what is left up to an upper bound, as a share of the larger of both; infinite where there is none."""
-    size = np.maximum(np.maximum(np.abs(bound), np.abs(still)), np.finfo(float).tiny)
-    return np.where(np.isfinite(bound), (bound - still) / size, np.inf)
+    size = np.maximum(np.maximum(np.abs(bound), np.abs(at_rest)), np.finfo(float).tiny)
+    return np.where(np.isfinite(bound), (bound - at_rest) / size, np.inf)
 
 
 def bounded_everywhere(source: Source, start: float, stop: float) -> bool:
     """Tell whether on the whole path something moves whose velocity, acceleration or force has a limit."""
-    return bool((_moving(source(np.linspace(start, stop, PLACES)), rates=False) >= IDLE).all())
+    return bool((_moving(source(np.linspace(start, stop, POINTS)), rates=False) >= IDLE).all())
 
 
-def _moving(found: PathQuantities, *, rates: bool) -> Float[np.ndarray, " point"]:
+def _moving(quantities: PathQuantities, *, rates: bool) -> Float[np.ndarray, " point"]:
     """Return how much moves of what has a limit, as a share of its largest value."""
-    limited = np.isfinite(found.upper) | np.isfinite(found.lower) | (rates & np.isfinite(found.rates))
+    limited = np.isfinite(quantities.upper) | np.isfinite(quantities.lower) | (rates & np.isfinite(quantities.rates))
     parts = [
-        np.abs(found.first) * np.isfinite(found.first_bounds),
-        np.abs(found.second[:, :, :G]).max(axis=-1, initial=0.0) * limited,
-        np.abs(found.vectors).max(axis=(-1, -2), initial=0.0),
-        np.abs(found.fourth).max(axis=-1, initial=0.0) * rates,
+        np.abs(quantities.first) * np.isfinite(quantities.first_bounds),
+        np.abs(quantities.second[:, :, :G]).max(axis=-1, initial=0.0) * limited,
+        np.abs(quantities.vectors).max(axis=(-1, -2), initial=0.0),
+        np.abs(quantities.fourth).max(axis=-1, initial=0.0) * rates,
     ]
     shares = np.concatenate([x / np.maximum(x.max(axis=0, initial=0.0), 1e-300) for x in parts], axis=1)
     return shares.max(axis=1, initial=0.0)

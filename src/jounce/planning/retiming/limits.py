@@ -118,9 +118,9 @@ def limits_of(robot: Robot, limits: GivenLimits | None) -> MotionLimits:
     for point in given.points:
         check_name("link", point.link, robot.frames, RobotError, name="limits")
     own = {name: given.joints.get(name, robot.joints[name].limits) for name in robot.joint_names}
-    alone = {name: dataclasses.replace(x, **_nothing(given.varying.get(name, {}))) for name, x in own.items()}
-    joints = robot.limits_with(alone)  # in whose place there is a law: then those of the joints that follow
-    varying = {name: _with_followers(laws, alone[name], joints[name]) for name, laws in given.varying.items()}
+    constant = {name: dataclasses.replace(x, **_nothing(given.varying.get(name, {}))) for name, x in own.items()}
+    joints = robot.limits_with(constant)  # in whose place there is a law: then those of the joints that follow
+    varying = {name: _with_followers(laws, constant[name], joints[name]) for name, laws in given.varying.items()}
     return dataclasses.replace(given, joints=joints, varying=varying)
 
 

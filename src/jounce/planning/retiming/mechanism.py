@@ -47,40 +47,40 @@ def retime_mechanism(
         law, search = fastest(source, source.labels, source.path.start, source.path.stop, conditions, cells)
         if abs(law.duration - duration) < STEADY * duration:
             break
-    told = ""
+    note = ""
     for _ in range(SLOWINGS):
-        found, report = _checked(source, mechanism, law)
+        laws, report = _checked(source, mechanism, law)
         over = 0.0 if report.worst is None else (report.worst.ratio or 0.0) - 1
         if over <= 1e-9:
             return RetimedTrajectory(
-                found.laws,
-                found.stop,
+                laws.laws,
+                laws.stop,
                 source.path,
-                found.progress,
+                laws.progress,
                 report,
                 active_limits(search, law, rate_motion(law)),
             )
         if report.worst is not None:
-            told = f" of the {report.worst.quantity} of {report.worst.joint} by {over:.2g} of it"
+            note = f" of the {report.worst.quantity} of {report.worst.joint} by {over:.2g} of it"
         if any(rates):
             break
         law = law.slowed(1 + 2 * over + 1e-7)
-    message = f"the law found breaks the limit{told}; try more cells, or smaller rates at the ends"
+    message = f"the law found breaks the limit{note}; try more cells, or smaller rates at the ends"
     raise SolveError(message, name="cells", value=cells)
 
 
 @dataclasses.dataclass(frozen=True)
-class _Found:
+class _MechanismLaws:
     laws: Any
     stop: float
     progress: Any
 
 
-def _checked(source: MechanismQuantities, mechanism: Mechanism, law: RateLaw) -> tuple[_Found, LimitReport]:
+def _checked(source: MechanismQuantities, mechanism: Mechanism, law: RateLaw) -> tuple[_MechanismLaws, LimitReport]:
     """Return the motion of a law, and its comparison with the limits by a solve of the mechanism in that motion."""
     motion = rate_motion(law)
     progress = FollowingMotion(law.parameter, motion)
-    found = _Found(
+    laws = _MechanismLaws(
         {name: FollowingMotion(own, progress) for name, own in source.laws.items()}, motion.duration, progress
     )
     times = np.linspace(0.0, motion.duration, INSTANTS)
@@ -108,4 +108,4 @@ def _checked(source: MechanismQuantities, mechanism: Mechanism, law: RateLaw) ->
     names = tuple(dict.fromkeys(label.owner for label in source.labels.every))
     nothing = np.zeros((len(times), 6, 0))
     report = LimitReport(mechanism.title or "mechanism", names, rows, {}, times, nothing, nothing)
-    return found, report
+    return laws, report

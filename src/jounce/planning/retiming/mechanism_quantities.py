@@ -96,22 +96,22 @@ class MechanismQuantities:
         if not self.loaded:
             return
         if law is None:
-            span = self.path.stop - self.path.start
+            length = self.path.stop - self.path.start
             progress: AbstractMotion = ExpressionMotion("start + t*1", {"start": self.path.start})
-            duration = span
+            duration = length
         else:
             motion = rate_motion(law, exact=False)  # of as many pieces each time, so that one program serves all
             progress, duration = FollowingMotion(law.parameter, motion), motion.duration
         times = np.linspace(0.0, duration, SAMPLES)
         s, s1, s2 = np.asarray(progress(Jet.variable(jnp.asarray(times), 2)).dense().derivatives())
-        found = [self._forces(_Scaled(progress, k), times / k, self.mechanism) for k in SPEEDS]
+        forces = [self._forces(_Scaled(progress, k), times / k, self.mechanism) for k in SPEEDS]
         m, c, m1, c1 = np.moveaxis(self.inertia(np.clip(s, self.path.start, self.path.stop)), 1, 0)
         k = SPEEDS[:, None, None]
         s1, s2 = s1[:, None], s2[:, None]
-        rest = np.stack([x[0] for x in found]) - k**2 * (m * s2 + c * s1**2)
+        rest = np.stack([x[0] for x in forces]) - k**2 * (m * s2 + c * s1**2)
         inertial = k**3 * ((m1 + 2 * c) * s1 * s2 + c1 * s1**3)
         third = np.asarray(progress(Jet.variable(jnp.asarray(times), 3)).dense().derivatives())[3][:, None]
-        rates = np.stack([x[1] for x in found]) - inertial - k**3 * m * third
+        rates = np.stack([x[1] for x in forces]) - inertial - k**3 * m * third
         g, d, c_rest = np.einsum("ij,jpn->ipn", np.linalg.inv(np.vander(SPEEDS, increasing=True)), rest)
         slow = s1 < SLOW * s1.mean()
         safe = np.where(slow, 1.0, s1)
@@ -150,11 +150,11 @@ class MechanismQuantities:
             first, speeds, second, -upper, upper, rates, vector, accelerations, np.zeros((len(s), 0, 4)), none
         )
 
-    def place(self, s: float) -> str:
+    def location(self, s: float) -> str:
         """Say where on the path a value of s is."""
         values = self.motions(np.array([s]))[0, 0, : len(self.drivers)]
-        told = ", ".join(f"{name} = {x:.5g}" for name, x in zip(self.drivers, values, strict=True))
-        return f"t = {s:.6g} s of the mechanism ({told})"
+        listed = ", ".join(f"{name} = {x:.5g}" for name, x in zip(self.drivers, values, strict=True))
+        return f"t = {s:.6g} s of the mechanism ({listed})"
 
     def ratios_of(self, progress: AbstractMotion, times: _Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return values, bounds and ratios of all quantities of the mechanism in a motion, without any expansion."""
@@ -178,17 +178,19 @@ class MechanismQuantities:
             ],
             axis=1,
         )
-        found = self(s)
-        bounds = np.concatenate([found.first_bounds, found.upper, found.rates, found.vector_bounds], axis=1)
+        quantities = self(s)
+        bounds = np.concatenate(
+            [quantities.first_bounds, quantities.upper, quantities.rates, quantities.vector_bounds], axis=1
+        )
         return values, bounds, np.abs(values) / bounds
 
     def _inertial(self, grid: _Points) -> "_Table":
         """Return the table of m, c and their derivatives along the path, of what the drivers do to masses only."""
         empty = dataclasses.replace(self.mechanism, forces={}, gravity=None, outputs={})
-        start, span = self.path.start, self.path.stop - self.path.start
+        start, length = self.path.start, self.path.stop - self.path.start
         even = ExpressionMotion("start + t*1", {"start": start})
         c, c1 = self._forces(even, grid - start, empty)
-        slope = 1 / span  # the rate of s grows from 1/2, its square evenly
+        slope = 1 / length  # the rate of s grows from 1/2, its square evenly
         grown = ExpressionMotion("start + t/2 + slope*t**2/2", {"start": start, "slope": slope})
         square = (0.25 + 2 * slope * (grid - start))[:, None]
         times = (np.sqrt(square[:, 0]) - 0.5) / slope
@@ -202,8 +204,8 @@ class MechanismQuantities:
         """Return the forces of the loaded drivers and their rates."""
         bare = dataclasses.replace(mechanism, outputs={})
         motion: Motion = solve(_following(bare, self.laws, progress), times, ORDER)
-        found = [np.asarray(driver_force(motion, name).values) for name in self.loaded]
-        return np.stack([x[:, 0] for x in found], axis=1), np.stack([x[:, 1] for x in found], axis=1)
+        forces = [np.asarray(driver_force(motion, name).values) for name in self.loaded]
+        return np.stack([x[:, 0] for x in forces], axis=1), np.stack([x[:, 1] for x in forces], axis=1)
 
     def _has(self, name: str, *fields: str) -> bool:
         return name in self.limits and any(getattr(self.limits[name], field) is not None for field in fields)
@@ -221,8 +223,8 @@ class MechanismQuantities:
         def label(name: str, word: str) -> Quantity:
             force = word in ("force", "force rate")
             turning = turns(name)
-            told = word.replace("force", "torque") if force and turning else word
-            return Quantity(name, told, (TURN if turning else SLIDE)[told])
+            quantity = word.replace("force", "torque") if force and turning else word
+            return Quantity(name, quantity, (TURN if turning else SLIDE)[quantity])
 
         first = [*(label(x, "velocity") for x in self.numbers), *(Quantity(x, "speed", "m/s") for x in self.vector)]
         second = [*(label(x, "acceleration") for x in self.numbers), *(label(x, "force") for x in self.loaded)]

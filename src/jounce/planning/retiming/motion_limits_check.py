@@ -59,20 +59,20 @@ def check_motion(
     constant = {name: _without(entry, given.varying.get(name, {})) for name, entry in given.joints.items()}
     report = check_limits(robot, trajectory, constant, drives=drives, hand_over=hand_over)
     infinite = {(row.joint, row.quantity): row.time for row in report.rows if row.infinite}
-    alone = {name: Limits() for name in robot.joint_names}
+    unlimited = {name: Limits() for name in robot.joint_names}
     partner = {  # an acceleration and its deceleration are judged together
-        name: dataclasses.replace(alone[name], **_partners(given.joints[name], laws))
+        name: dataclasses.replace(unlimited[name], **_partners(given.joints[name], laws))
         for name, laws in given.varying.items()
     }
-    others = dataclasses.replace(given, joints=alone | partner)
+    others = dataclasses.replace(given, joints=unlimited | partner)
     if not (others.jounce or others.varying or others.points):
         return report
     source = RobotQuantities(
         robot, Path(dict(trajectory.laws), trajectory.start, trajectory.stop), others, drives=drives
     )
     extra = _rows(source, trajectory, infinite)
-    told = {(row.joint, row.quantity) for row in extra}
-    rows = tuple(row for row in report.rows if (row.joint, row.quantity) not in told)
+    listed = {(row.joint, row.quantity) for row in extra}
+    rows = tuple(row for row in report.rows if (row.joint, row.quantity) not in listed)
     return dataclasses.replace(report, rows=(*rows, *extra), ends=_ends(source, trajectory, report.ends, drives=drives))
 
 
@@ -86,7 +86,7 @@ def _ends(
     if np.array_equal(jumps.before, jumps.after):
         return ends
     signs = infinite_quantities(followed, jumps, drives).signs
-    found = []
+    selected = []
     for k, end in enumerate(ends):
         more = [
             (name, word_of(robot, quantity, joint)[0])
@@ -101,8 +101,8 @@ def _ends(
             for p in points
             if p.acceleration and source.point(state, p)[:, 1].any()
         ]
-        found.append(dataclasses.replace(end, breaks=(*end.breaks, *more, *fourth, *forced)))
-    return tuple(found)
+        selected.append(dataclasses.replace(end, breaks=(*end.breaks, *more, *fourth, *forced)))
+    return tuple(selected)
 
 
 def _without(limits: Limits, varying: Any) -> Limits:
@@ -129,12 +129,12 @@ def _rows(source: RobotQuantities, trajectory: JointTrajectory, infinite: _Infin
     grid = with_sides(np.unique(np.concatenate([trajectory.times, np.linspace(*ends, 2001)])), breaks)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)
-        found = ratios(grid)
-        used = found.max(axis=0) > 0
-        best, times = found.max(axis=0), grid[np.argmax(found, axis=0)]
-        for at in local_maxima(found):
+        peak_ratios = ratios(grid)
+        used = peak_ratios.max(axis=0) > 0
+        best, times = peak_ratios.max(axis=0), grid[np.argmax(peak_ratios, axis=0)]
+        for at in local_maxima(peak_ratios):
             low, high = grid[np.maximum(at - 1, 0)], grid[np.minimum(at + 1, len(grid) - 1)]
-            every = np.arange(found.shape[1])
+            every = np.arange(peak_ratios.shape[1])
             for _ in range(ZOOMS):
                 around = low + np.linspace(0, 1, ZOOM)[:, None] * (high - low)
                 here = ratios(around.reshape(-1)).reshape(*around.shape, -1)[:, every, every]
@@ -182,8 +182,8 @@ def _jumps(source: RobotQuantities, trajectory: JointTrajectory) -> np.ndarray:
     fast = [x[:, 0] for x, p in zip(moved, points, strict=True) if p.speed is not None]
     forced = [x.any(axis=1) for x, p in zip(moved, points, strict=True) if p.acceleration is not None]
     fourth = [x != 0 for x in jumps.above(4)[:, source.with_jounce].T]
-    for found, last in ((fast, len(labels.first)), (fourth, len(labels.every))):
-        when[last - len(found) : last] = [_first(jumps.times, x) for x in found]
+    for quantity_index, last in ((fast, len(labels.first)), (fourth, len(labels.every))):
+        when[last - len(quantity_index) : last] = [_first(jumps.times, x) for x in quantity_index]
     last = len(labels.every) - len(labels.fourth)
     when[last - len(forced) : last] = [_first(jumps.times, x) for x in forced]
     return when

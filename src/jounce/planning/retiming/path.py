@@ -81,10 +81,10 @@ class Path:
         """Names of the joints."""
         return tuple(self.laws)
 
-    def place(self, s: float) -> str:
+    def location(self, s: float) -> str:
         """Say where on the path a value of s is, by the time of the samples too where it was made of some."""
-        told = "" if self.instants is None else f" (t = {np.interp(s, *self.instants):.6g} s of the samples)"
-        return f"s = {s:.6g}{told}"
+        note = "" if self.instants is None else f" (t = {np.interp(s, *self.instants):.6g} s of the samples)"
+        return f"s = {s:.6g}{note}"
 
     def derivatives(self, s: Float[np.ndarray, " point"], order: int) -> Float[np.ndarray, "point derivative joint"]:
         """Return positions and derivatives by s."""

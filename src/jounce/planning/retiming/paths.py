@@ -24,8 +24,8 @@ from jounce.trajectory.splines import HIGHEST_DEGREE
 DEGREE = 5  # of the splines through waypoints
 KINK_CELLS = 2000  # cells in which kinks are looked for
 CELLS = (160, 320, 640, 1280)  # of the spline of a time law
-PLACES_IN_CELL = 4
-FINEST = 4 * PLACES_IN_CELL * CELLS[-1]  # places at which a path is looked at
+POINTS_IN_CELL = 4
+FINEST = 4 * POINTS_IN_CELL * CELLS[-1]  # places at which a path is looked at
 RESOLVED = 0.05  # of the range of a derivative: what straight lines between looks may miss
 SLIGHT = 1e-3  # of what the length of the path makes of it: a derivative this small does not matter
 LOOKS = 16  # between two waypoints
@@ -136,8 +136,8 @@ def path_of(
         path = np.stack(lists, axis=-1)
     points = _numbers(path)
     if names is None or points.shape[1] != len(names):
-        wanted = "" if names is None else f" with {len(names)} joints: {', '.join(names)}"
-        message = f"waypoints have the shape (points, joints){wanted}; or give a mapping from names to positions"
+        expected = "" if names is None else f" with {len(names)} joints: {', '.join(names)}"
+        message = f"waypoints have the shape (points, joints){expected}; or give a mapping from names to positions"
         raise TrajectoryError(message, name="path", value=f"shape {points.shape}")
     return _between(Lines(_lengths(points, between.parameter), points, tuple(names), "waypoints"), order, between)
 
@@ -149,11 +149,11 @@ def _lengths(points: Float[np.ndarray, "point joint"], parameter: ArrayLike | No
     if not total > 0:
         raise TrajectoryError("the path does not move: all its points are the same", name="path")
     if parameter is not None:
-        found = finite_row("parameter", parameter)
-        if len(found) != len(points) or not (np.diff(found) > 0).all():
+        values = finite_row("parameter", parameter)
+        if len(values) != len(points) or not (np.diff(values) > 0).all():
             message = f"must be {len(points)} numbers that increase, one for each waypoint"
-            raise TrajectoryError(message, name="parameter", value=found.tolist())
-        return found
+            raise TrajectoryError(message, name="parameter", value=values.tolist())
+        return values
     same = np.flatnonzero(chords <= REPEATED * total)
     if len(same):
         message = f"waypoint {same[0] + 2} is the same as the one before; leave it out"
@@ -170,11 +170,11 @@ def _between(lines: Lines, order: int, between: Between) -> Path:
         between.check_without_points()
         return dataclasses.replace(rounded(lines, between.deviation), points=lines)
     smooth = 4 if order > 2 else 3
-    wanted = (DEGREE, smooth) if between.degree is None else (between.degree,)
-    degree = next(d for d in (*wanted, 3, 2, 1) if len(lines.at) > d and d <= wanted[0])
+    degrees = (DEGREE, smooth) if between.degree is None else (between.degree,)
+    degree = next(d for d in (*degrees, 3, 2, 1) if len(lines.at) > d and d <= degrees[0])
     laws = {name: SplineMotion(lines.at, x, degree) for name, x in zip(lines.names, lines.points.T, strict=True)}
-    places = (lines.at[:-1, None] + np.diff(lines.at)[:, None] * np.arange(1, LOOKS) / LOOKS).reshape(-1)
-    away = lines.distances(places, np.stack([polynomials_at(law, places) for law in laws.values()], axis=1))
+    points = (lines.at[:-1, None] + np.diff(lines.at)[:, None] * np.arange(1, LOOKS) / LOOKS).reshape(-1)
+    away = lines.distances(points, np.stack([polynomials_at(law, points) for law in laws.values()], axis=1))
     words = f"splines of degree {degree} through {len(lines.at)} waypoints"
     start, stop = float(lines.at[0]), float(lines.at[-1])
     return Path(dict(laws), start, stop, float(away.max()), words=words, points=lines)
@@ -191,23 +191,25 @@ def checked(path: Path, order: int = 1) -> Path:
     for name, law in path.laws.items():
         for instant, jumped in _jumps(law, order):
             if path.start < instant < path.stop and np.any(jumped):
-                raise _kink(path.place(instant), int(np.argmax(jumped != 0)), name)
+                raise _kink(path.location(instant), int(np.argmax(jumped != 0)), name)
     s = np.linspace(path.start, path.stop, KINK_CELLS + 1)
     values = path.derivatives(s, order + 1)
     bad = np.argwhere(~np.isfinite(values))
     if len(bad):
         at, level, joint = bad[0]
-        message = f"derivative {level} of the path is not finite at {path.place(float(s[at]))}"
+        message = f"derivative {level} of the path is not finite at {path.location(float(s[at]))}"
         raise TrajectoryError(message, name=path.names[joint])
     if not np.abs(values[:, 1]).max() > 0:
         raise TrajectoryError("the path does not move: all its points are the same", name="path")
     sizes = level_sizes(np.abs(values).max(axis=2, keepdims=True), path.stop - path.start)
-    found = unexplained(s, values, sizes)
-    found[:, :, [isinstance(law, SplineMotion) and law.joined >= order for law in path.laws.values()]] = False
+    unexplained_jumps = unexplained(s, values, sizes)
+    unexplained_jumps[:, :, [isinstance(law, SplineMotion) and law.joined >= order for law in path.laws.values()]] = (
+        False
+    )
     for level in range(order + 1):
-        jumps = np.argwhere(found[:, level])
+        jumps = np.argwhere(unexplained_jumps[:, level])
         if len(jumps):
-            raise _kink(path.place(float(s[jumps[0][0]] + (s[1] - s[0]) / 2)), level, path.names[jumps[0][1]])
+            raise _kink(path.location(float(s[jumps[0][0]] + (s[1] - s[0]) / 2)), level, path.names[jumps[0][1]])
     return path
 
 
@@ -224,22 +226,22 @@ def cells_needed(path: Path, order: int) -> int:
     """
     s = np.linspace(path.start, path.stop, FINEST + 1)
     values = path.derivatives(s, order + 1)  # as `checked` has them, so that nothing else is compiled
-    span = path.stop - path.start
+    length = path.stop - path.start
     inside = slice(int(ENDS * FINEST), int((1 - ENDS) * FINEST))
-    curves, scale = values[:, order], np.abs(values[:, 1]).max() / span ** (order - 1)
+    curves, scale = values[:, order], np.abs(values[:, 1]).max() / length ** (order - 1)
     size = np.ptp(curves[inside], axis=0).max() + SLIGHT * scale
     at, joint, step = 0, 0, 1
     for cells in CELLS:
-        step = FINEST // (cells * PLACES_IN_CELL)
+        step = FINEST // (cells * POINTS_IN_CELL)
         ends = curves[::step]
         off = np.abs(curves[step // 2 :: step] - (ends[1:] + ends[:-1]) / 2) / size
         off[: int(ENDS * len(off))] = off[int((1 - ENDS) * len(off)) :] = 0.0  # cells are narrow at the ends
         at, joint = divmod(int(np.argmax(off)), off.shape[1])
         if off[at, joint] <= RESOLVED:
             return cells
-    place = path.place(float(s[step // 2 + at * step]))
+    location = path.location(float(s[step // 2 + at * step]))
     message = (
-        f"the path waves or bends too finely at {place} for a time law that keeps limits: "
+        f"the path waves or bends too finely at {location} for a time law that keeps limits: "
         f"{CELLS[-1]} cells do not resolve it; allow a larger deviation, smooth it, or retime shorter parts of it"
     )
     raise TrajectoryError(message, name=path.names[joint])
@@ -255,14 +257,14 @@ def _jumps(law: AbstractMotion, order: int) -> Any:
     return zip(instants.tolist(), sizes.T, strict=True)
 
 
-def _kink(place: str, order: int, name: str) -> TrajectoryError:
+def _kink(location: str, order: int, name: str) -> TrajectoryError:
     what = {
         0: "jumps",
         1: "has a kink (its direction jumps, or turns too sharply to be resolved)",
         2: "has a jump of curvature",
     }.get(order, "is not smooth")
     limits = "" if order < 2 else ", where what is limited would be infinite"
-    message = f"the path {what} at {place}{limits}; round it by a deviation, or stop there and retime both parts"
+    message = f"the path {what} at {location}{limits}; round it by a deviation, or stop there and retime both parts"
     return TrajectoryError(message, name=name)
 
 

@@ -94,9 +94,9 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
         kinds += [clarabel.NonnegativeConeT(len(floor))]
     if len(program.radii):
         cone = program.cones.tocoo()
-        place = cone.row + cone.row // 3 + 1  # of four rows each, the first is the radius
+        row = cone.row + cone.row // 3 + 1  # of four rows each, the first is the radius
         shape = (4 * len(program.radii), count + extra)
-        blocks.append(sparse.coo_matrix((-cone.data, (place, cone.col)), shape=shape))
+        blocks.append(sparse.coo_matrix((-cone.data, (row, cone.col)), shape=shape))
         sides.append(np.column_stack([program.radii, np.zeros((len(program.radii), 3))]).reshape(-1))
         kinds += [clarabel.SecondOrderConeT(4)] * len(program.radii)
     if not elastic:
@@ -110,8 +110,8 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
             (one * 6 + 3, count + one, half), (one * 6 + 3, count + nodes + one, half),
             (one * 6 + 4, count + one, half), (one * 6 + 4, count + nodes + one, -half),
         )  # fmt: skip
-        place, column, data = (np.concatenate(x) for x in zip(*parts, strict=True))
-        blocks.append(sparse.coo_matrix((-data, (place, column)), shape=(6 * nodes, count + extra)))
+        row, column, data = (np.concatenate(x) for x in zip(*parts, strict=True))
+        blocks.append(sparse.coo_matrix((-data, (row, column)), shape=(6 * nodes, count + extra)))
         sides.append(np.tile([0.5, -0.5, 0.0, 0.0, 0.0, 1.0], nodes))
         kinds += [clarabel.SecondOrderConeT(3)] * (2 * nodes)
     settings = clarabel.DefaultSettings()
@@ -120,9 +120,9 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
     matrix = wide(sparse.vstack(blocks, format="csc"))
     size = count + extra
     solver = clarabel.DefaultSolver(wide((size, size)), objective, matrix, np.concatenate(sides), kinds, settings)
-    found = solver.solve()
+    solution = solver.solve()
     begin = len(program.equal_right)
-    prices = np.array(found.z)[begin : begin + len(program.right)]
-    usable = str(found.status) in ("Solved", "AlmostSolved")
-    x = np.array(found.x)
+    prices = np.array(solution.z)[begin : begin + len(program.right)]
+    usable = str(solution.status) in ("Solved", "AlmostSolved")
+    x = np.array(solution.x)
     return Solution(x[:count] if usable else None, prices, float(x[-1]) if elastic else 0.0)

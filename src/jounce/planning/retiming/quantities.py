@@ -244,6 +244,6 @@ class Source(Protocol):
         """Return the quantities."""
         ...
 
-    def place(self, s: float) -> str:
+    def location(self, s: float) -> str:
         """Say where on the path a value of s is."""
         ...

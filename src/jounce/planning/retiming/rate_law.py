@@ -53,13 +53,13 @@ class Conditions:
         Highest derivative by time that is continuous, also where the motion comes from rest.
     rates : tuple of float or None
         Rates of s at the ends, 1/s; zero is rest, and None is free.
-    highest : float or None
+    max_rate : float or None
         Rate of s that is not to be exceeded, 1/s; for a parametrisation by s itself.
     """
 
     order: int
     rates: tuple[float | None, float | None] = (0.0, 0.0)
-    highest: float | None = None
+    max_rate: float | None = None
 
     @property
     def rests(self) -> tuple[int, int]:

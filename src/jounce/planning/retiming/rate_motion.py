@@ -103,8 +103,8 @@ def _series(instants: Any, begins: Any, pieces: Any, at: Any, order: int) -> tup
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
 
     def step(_: int, v: Any) -> Any:
-        places = v[None] * jnp.reshape((nodes + 1) / 2, (NODES, *(1,) * v.ndim))
-        time = v / 2 * jnp.tensordot(weights, 1 / jnp.sqrt(_value(c[:, None], places)), axes=1)
+        points = v[None] * jnp.reshape((nodes + 1) / 2, (NODES, *(1,) * v.ndim))
+        time = v / 2 * jnp.tensordot(weights, 1 / jnp.sqrt(_value(c[:, None], points)), axes=1)
         return jnp.clip(v + (elapsed - time) * jnp.sqrt(_value(c, v)), 0.0, length)
 
     v = jax.lax.fori_loop(0, NEWTON, step, length * elapsed / (instants[piece + 1] - instants[piece]))
@@ -135,11 +135,11 @@ def _value(coefficients: Any, v: Any) -> Any:
 
 def _shifted(coefficients: Any, v: Any) -> list[Any]:
     """Return the coefficients of a polynomial in powers of what its argument exceeds v by (Horner, again and again)."""
-    found = list(coefficients)
-    for k in range(len(found) - 1):
-        for j in range(len(found) - 2, k - 1, -1):
-            found[j] = found[j] + v * found[j + 1]
-    return found
+    shifted = list(coefficients)
+    for k in range(len(shifted) - 1):
+        for j in range(len(shifted) - 2, k - 1, -1):
+            shifted[j] = shifted[j] + v * shifted[j + 1]
+    return shifted
 
 
 def _times(
@@ -147,8 +147,8 @@ def _times(
 ) -> Float[np.ndarray, " piece"]:
     """Return the time over each piece."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    places = (np.arange(parts)[:, None] + (nodes + 1) / 2).reshape(-1, 1) / parts * lengths
-    z = _value(pieces, places)
+    points = (np.arange(parts)[:, None] + (nodes + 1) / 2).reshape(-1, 1) / parts * lengths
+    z = _value(pieces, points)
     if not (z > 0).all():
         raise TrajectoryError("the square of a rate must be positive", value=float(z.min()))
     return np.tile(weights, parts) @ (1 / np.sqrt(z)) * lengths / 2 / parts

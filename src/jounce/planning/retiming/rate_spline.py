@@ -12,7 +12,7 @@ from jounce.trajectory import SplineMotion
 from jounce.trajectory.splines import local_powers
 
 SMOOTHNESS = 9  # degree of the parametrisation
-SPANS = 24  # of the parametrisation
+KNOT_INTERVALS = 24  # of the parametrisation
 
 _Points = Float[np.ndarray, " _"]  # of any length
 
@@ -35,15 +35,15 @@ class Parametrisation(SplineMotion):
         from scipy.interpolate import BSpline
 
         u, s = np.asarray(u, float), np.asarray(s, float)
-        knots = clamped(SPANS, SMOOTHNESS)
+        knots = clamped(KNOT_INTERVALS, SMOOTHNESS)
         count = len(knots) - SMOOTHNESS - 1
         greville = np.array([knots[k + 1 : k + 1 + SMOOTHNESS].mean() for k in range(count)])
         # a spline with increasing coefficients increases; as many as are alike at an end, so many derivatives vanish
         values = np.interp(greville, u, s)
-        for end, held in zip((slice(None), slice(None, None, -1)), rests, strict=True):
-            values[end][: max(held, 1)] = s[end][0]
+        for end, resting in zip((slice(None), slice(None, None, -1)), rests, strict=True):
+            values[end][: max(resting, 1)] = s[end][0]
         spline = BSpline(knots, values, SMOOTHNESS)
-        pieces = np.linspace(0.0, 1.0, SPANS + 1)
+        pieces = np.linspace(0.0, 1.0, KNOT_INTERVALS + 1)
         self._set(pieces[:-1], local_powers(spline, pieces[:-1], SMOOTHNESS), 1.0, "continue")
 
     def derivatives(self, u: _Points, order: int) -> Float[np.ndarray, "derivative point"]:
@@ -60,9 +60,9 @@ def _derived(powers: np.ndarray, times: int) -> np.ndarray:
     return np.polynomial.polynomial.polyder(powers, times) if times else powers
 
 
-def clamped(spans: int, degree: int) -> _Points:
+def clamped(intervals: int, degree: int) -> _Points:
     """Return evenly spaced knots from 0 to 1, those at the ends repeated."""
-    return np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, spans + 1), np.ones(degree)])
+    return np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, intervals + 1), np.ones(degree)])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,16 +95,16 @@ class RateBasis:
         from scipy import sparse
         from scipy.interpolate import BSpline
 
-        found, change = [], sparse.identity(self.count, format="csr")
+        matrices, change = [], sparse.identity(self.count, format="csr")
         knots, u = self.knots, np.clip(u, 0.0, 1.0)
         for level in range(order + 1):
             degree = self.degree - level
             if degree < 0:
-                found.append(sparse.csr_matrix((len(u), self.count)))
+                matrices.append(sparse.csr_matrix((len(u), self.count)))
                 continue
             own = knots[level : len(knots) - level]
             design: Any = BSpline.design_matrix(u, own, degree)
-            found.append((design @ change).tocsr())
+            matrices.append((design @ change).tocsr())
             if degree:
                 widths = own[degree + 1 : -1] - own[1 : len(own) - degree - 1]
                 rows = len(widths)
@@ -113,7 +113,7 @@ class RateBasis:
                 )
                 step: Any = down + up
                 change = step @ change
-        return found
+        return matrices
 
     def pieces(self, coefficients: _Points) -> Float[np.ndarray, "powers cell"]:
         """Return the polynomials on the cells, as coefficients of powers of u less the beginning, lowest first."""

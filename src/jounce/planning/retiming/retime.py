@@ -29,8 +29,8 @@ from jounce.trajectory import FollowingMotion, JointTrajectory
 
 CELLS = 160
 ATTEMPTS = 4  # to keep limits as the derivatives in time tell them
-KEPT = 1e-9  # of a limit, which rounding may take
-HIGHEST_ORDER = 6
+LIMIT_TOLERANCE = 1e-9  # of a limit, which rounding may take
+MAX_ORDER = 6
 SPEEDS = 1e-9  # of the largest: what is slower at an end of a trajectory is at rest
 
 
@@ -147,16 +147,16 @@ def retime(
     if repair:
         return _repaired(robot, path, limits, order, cells, drives, between, hand_over=hand_over)
     chosen = _order(order, limits_of(robot, limits), robot)
-    found = path_of(path, names if names is not None else robot.joint_names, chosen, between)
+    chosen_path = path_of(path, names if names is not None else robot.joint_names, chosen, between)
     if not isinstance(path, JointTrajectory):
-        warn_of_degrees(robot, JointTrajectory(dict(found.laws), found.start, found.stop))
-    source = RobotQuantities(robot, found, limits, drives=drives)
-    checked(found, chosen)
+        warn_of_degrees(robot, JointTrajectory(dict(chosen_path.laws), chosen_path.start, chosen_path.stop))
+    source = RobotQuantities(robot, chosen_path, limits, drives=drives)
+    checked(chosen_path, chosen)
     source.check_range()
-    cells = cells or cells_needed(found, chosen)
+    cells = cells or cells_needed(chosen_path, chosen)
     conditions = Conditions(chosen, _rates(rates))
-    law, search = fastest(source, source.labels, found.start, found.stop, conditions, cells)
-    return _certified(robot, found, law, search, source, drives, hand_over=any(conditions.rates))
+    law, search = fastest(source, source.labels, chosen_path.start, chosen_path.stop, conditions, cells)
+    return _certified(robot, chosen_path, law, search, source, drives, hand_over=any(conditions.rates))
 
 
 def _repaired(
@@ -181,15 +181,15 @@ def _repaired(
     ends = _ends(robot, given, source, drives, hand_over)
     cells = cells or cells_needed(path, chosen)
     speeds = np.abs(path.derivatives(np.linspace(path.start, path.stop, 501), 1)[:, 1]).max(axis=1)
-    keeps = keeps_limits(source, np.array([path.start, path.stop])) & (speeds[[0, -1]] > SPEEDS * speeds.max())
-    first, last = (1.0 if as_it_was else None for as_it_was in keeps.tolist())
-    conditions = Conditions(chosen, (first, last), highest=1.0)
+    within = within_limits(source, np.array([path.start, path.stop])) & (speeds[[0, -1]] > SPEEDS * speeds.max())
+    first, last = (1.0 if as_it_was else None for as_it_was in within.tolist())
+    conditions = Conditions(chosen, (first, last), max_rate=1.0)
     law, search = slowed_only(source, source.labels, path.start, path.stop, conditions, cells)
-    found = _certified(robot, path, law, search, source, drives, hand_over=True)
+    retimed = _certified(robot, path, law, search, source, drives, hand_over=True)
     # what samples make of rest is known of the given laws only, not of those that follow the slowed time
-    told = ends if all(end.at_rest for end in ends) else found.report.ends
-    found.report = dataclasses.replace(found.report, ends=told, hand_over=hand_over)
-    return found
+    known_ends = ends if all(end.at_rest for end in ends) else retimed.report.ends
+    retimed.report = dataclasses.replace(retimed.report, ends=known_ends, hand_over=hand_over)
+    return retimed
 
 
 def _ends(robot: Robot, given: JointTrajectory, source: RobotQuantities, drives: bool, hand_over: bool) -> Any:
@@ -213,7 +213,7 @@ def _ends(robot: Robot, given: JointTrajectory, source: RobotQuantities, drives:
     return ends
 
 
-def keeps_limits(source: RobotQuantities, s: np.ndarray) -> np.ndarray:
+def within_limits(source: RobotQuantities, s: np.ndarray) -> np.ndarray:
     """Tell where a motion whose parameter is the time keeps its limits."""
     shape, law = np.zeros((5, len(s))), np.zeros((4, len(s)))
     shape[0], shape[1], law[0] = s, 1.0, 1.0
@@ -238,11 +238,11 @@ def _certified(
         bare = JointTrajectory(laws, 0.0, motion.duration, np.linspace(0.0, motion.duration, law.basis.cells + 1))
         report = check_motion(robot, bare, source.limits, drives=drives, hand_over=hand_over)
         over = (report.worst.ratio or 0.0) - 1 if report.worst else 0.0
-        if over <= KEPT:
+        if over <= LIMIT_TOLERANCE:
             return RetimedTrajectory(laws, bare.stop, path, progress, report, active_limits(search, law, motion))
         if attempt == ATTEMPTS - 1 or not np.isfinite(over):
-            told = "" if report.worst is None else f" of the {report.worst.quantity} of {report.worst.joint}"
-            message = f"the time law found breaks the limit{told}; try more cells"
+            note = "" if report.worst is None else f" of the {report.worst.quantity} of {report.worst.joint}"
+            message = f"the time law found breaks the limit{note}; try more cells"
             raise SolveError(message, name="cells", value=law.basis.cells)
         law = search.tightened(law, over)
     raise AssertionError
@@ -265,7 +265,7 @@ def _order(order: int | None, limits: MotionLimits, robot: Robot) -> int:
         least = 3
     if order is None:
         return least
-    asked = whole_number("order", order, 1, HIGHEST_ORDER, error=TrajectoryError)
+    asked = whole_number("order", order, 1, MAX_ORDER, error=TrajectoryError)
     if asked < least:
         message = f"the limits are kept by motions whose derivatives are continuous to {least} at least"
         raise TrajectoryError(message, name="order", value=order)

@@ -50,9 +50,9 @@ class RobotQuantities:
         self.robot, self.path, self.drives = robot, path, drives
         self.limits = limits_of(robot, limits)
         followed = FollowedTrajectory(robot, JointTrajectory(dict(path.laws), path.start, path.stop), given=False)
-        self.columns, self.held = followed.columns, followed.held
+        self.columns, self.resting_joints = followed.columns, followed.resting_joints
         names = robot.joint_names
-        self.moved = [k for k, name in enumerate(names) if name not in self.held]
+        self.moved = [k for k, name in enumerate(names) if name not in self.resting_joints]
         self.with_velocity = self._limited("velocity")
         self.with_acceleration = self._limited("acceleration", "deceleration", "jerk")
         self.with_jounce = [k for k in self.moved if self._has(names[k], "jounce")]
@@ -73,12 +73,12 @@ class RobotQuantities:
     def coordinates(self, s: _Points) -> Float[np.ndarray, "point 5 joint"]:
         """Return the positions of all joints and their derivatives by s."""
         q = np.zeros((len(s), ORDER + 1, len(self.robot.joint_names)))
-        for name, value in self.held.items():
+        for name, value in self.resting_joints.items():
             q[:, 0, self.robot.joint_names.index(name)] = value
         q[:, :, self.columns] = self.path.derivatives(s, ORDER)
         return q
 
-    def place(self, s: float) -> str:
+    def location(self, s: float) -> str:
         """Say where on the path a value of s is."""
         q = self.path.derivatives(np.array([s]), 0)[0, 0]
         return f"s = {s:.6g} (q = {', '.join(f'{x:.4g}' for x in q)})"
@@ -118,9 +118,9 @@ class RobotQuantities:
         _, q1, q2, q3, _ = np.moveaxis(q, 1, 0)
         at = np.broadcast_to(q[:, 0], (len(CASES), *q[:, 0].shape))
         moving = (at, q1 * first, q1 * second + q2 * first**2, 3 * q2 * first * second + q3 * first**3)
-        found = np.asarray(inverse_dynamics(self.robot, np.stack(moving, axis=2), drives=self.drives))
+        torques = np.asarray(inverse_dynamics(self.robot, np.stack(moving, axis=2), drives=self.drives))
         speeds = CASES[:3, 0]
-        values, rates = np.moveaxis(found, 2, 0)  # of cases, points, joints
+        values, rates = np.moveaxis(torques, 2, 0)  # of cases, points, joints
         g, d, c = np.einsum("ij,jpn->ipn", np.linalg.inv(np.vander(speeds, increasing=True)), values[:3])
         g1, d1, c1 = np.einsum("ij,jpn->ipn", np.linalg.inv(speeds[:, None] ** [1, 2, 3]), rates[:3])
         m = values[3] - values[0]
@@ -149,17 +149,17 @@ class RobotQuantities:
 
     def _bounds(self, field: str, chosen: list[int], q: np.ndarray) -> _Table:
         """Return the limits of some joints at points, infinite where there is none."""
-        found = np.full((len(q), len(chosen)), np.inf)
+        bounds = np.full((len(q), len(chosen)), np.inf)
         for column, k in enumerate(chosen):
             name = self.robot.joint_names[k]
             law = self.limits.varying.get(name, {}).get(field)
             if law is not None:
-                found[:, column] = self._law_values(name, field, law, q[:, 0, k])
+                bounds[:, column] = self._law_values(name, field, law, q[:, 0, k])
                 continue
             constant = self.limits.jounce.get(name) if field == "jounce" else getattr(self.limits.joints[name], field)
             if constant is not None:
-                found[:, column] = constant
-        return found
+                bounds[:, column] = constant
+        return bounds
 
     def _law_values(self, name: str, field: str, law: object, positions: _Points) -> _Points:
         values = np.broadcast_to(np.asarray(law(positions), float), positions.shape)  # type: ignore[operator]

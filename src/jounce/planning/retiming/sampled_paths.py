@@ -19,8 +19,8 @@ from jounce.trajectory import AbstractMotion, HermiteMotion, JointTrajectory, Sp
 DEVIATION = 1e-3  # rad or m, from the straight lines between samples, unless given
 SHARE = 1e-3  # of the size of the path, if that is less
 LOOKS, MANY = 8, 100_000  # between two samples, and at once
-STILL = 1e-7  # of the size of the path: how far a joint may move while its samples do not
-PLACES = 4000  # at which a path is looked at that does not come from samples
+REST_DISTANCE = 1e-7  # of the size of the path: how far a joint may move while its samples do not
+SAMPLES = 4000  # at which a path is looked at that does not come from samples
 
 
 def samples_of(law: AbstractMotion) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, " sample"]] | None:
@@ -37,22 +37,22 @@ def samples_of(law: AbstractMotion) -> tuple[Float[np.ndarray, " sample"], Float
 
 def lines_of(trajectory: JointTrajectory) -> Lines | None:
     """Return the straight lines between the samples of a trajectory; None if no joint of it has any."""
-    found = {name: samples_of(law) for name, law in trajectory.laws.items()}
-    times = [own[0] for own in found.values() if own is not None]
+    samples = {name: samples_of(law) for name, law in trajectory.laws.items()}
+    times = [own[0] for own in samples.values() if own is not None]
     if not times:
         return None
     every = [trajectory.start, trajectory.stop, *times]
-    if any(own is None for own in found.values()):
-        every.append(np.linspace(trajectory.start, trajectory.stop, PLACES + 1))
+    if any(own is None for own in samples.values()):
+        every.append(np.linspace(trajectory.start, trajectory.stop, SAMPLES + 1))
     at = np.unique(np.hstack(every))
     at = at[(at >= trajectory.start) & (at <= trajectory.stop)]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)
-        exact = None if all(found.values()) else Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
+        exact = None if all(samples.values()) else Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
         columns = None if exact is None else exact.derivatives(at, 0)[:, 0]
     points = [
         np.interp(at, *own) if own is not None else columns[:, k]  # type: ignore[index]
-        for k, own in enumerate(found.values())
+        for k, own in enumerate(samples.values())
     ]
     return Lines(at, np.stack(points, axis=1), trajectory.names, "samples")
 
@@ -60,13 +60,13 @@ def lines_of(trajectory: JointTrajectory) -> Lines | None:
 def lines_along(path: Path) -> Lines:
     """Return straight lines between many places of a path that does not come from samples."""
     knots = [np.asarray(law.breakpoints) for law in path.laws.values() if isinstance(law, SplineMotion)]
-    at = np.unique(np.concatenate([np.linspace(path.start, path.stop, PLACES + 1), *knots]))
+    at = np.unique(np.concatenate([np.linspace(path.start, path.stop, SAMPLES + 1), *knots]))
     at = at[(at >= path.start) & (at <= path.stop)]
-    found = Lines(at, path.derivatives(at, 0)[:, 0], path.names, "places")
-    if not np.isfinite(found.points).all():
-        return found
+    lines = Lines(at, path.derivatives(at, 0)[:, 0], path.names, "places")
+    if not np.isfinite(lines.points).all():
+        return lines
     between = (at[:-1, None] + np.diff(at)[:, None] * np.array([0.25, 0.5, 0.75])).reshape(-1)
-    return dataclasses.replace(found, own=float(found.distances(between, path.derivatives(between, 0)[:, 0]).max()))
+    return dataclasses.replace(lines, own=float(lines.distances(between, path.derivatives(between, 0)[:, 0]).max()))
 
 
 def deviation_of(lines: Lines, given: float | None) -> float:
@@ -103,11 +103,11 @@ def path_of_samples(
     allowed = deviation_of(lines, deviation)
     away = _swing(trajectory, own, lines, order)
     if away <= allowed:
-        found = own if timed else path_of_trajectory(trajectory, order)
-        if found.deviation + away <= allowed:
+        path = own if timed else path_of_trajectory(trajectory, order)
+        if path.deviation + away <= allowed:
             degrees = sorted({law.degree for law in trajectory.laws.values() if type(law) is SplineMotion})
             words = f"splines of degree {' and '.join(map(str, degrees))} through {len(lines.at)} samples"
-            return dataclasses.replace(found, deviation=found.deviation + away, allowed=allowed, words=words)
+            return dataclasses.replace(path, deviation=path.deviation + away, allowed=allowed, words=words)
     return rounded(lines, allowed, timed=timed)
 
 
@@ -126,9 +126,9 @@ def _swing(trajectory: JointTrajectory, own: Path, lines: Lines, order: int) -> 
     for first in range(0, len(same), count):
         some = slice(first, first + count)
         at = lines.at[:-1][some, None] + np.diff(lines.at)[some, None] * share
-        places = own.derivatives(at.reshape(-1), 0)[:, 0]
-        moved = np.abs(places.reshape(*at.shape, -1) - lines.points[:-1][some, None]).max(axis=1)
-        if np.any(moved[dwells[some]] > STILL * lines.size):
+        positions = own.derivatives(at.reshape(-1), 0)[:, 0]
+        moved = np.abs(positions.reshape(*at.shape, -1) - lines.points[:-1][some, None]).max(axis=1)
+        if np.any(moved[dwells[some]] > REST_DISTANCE * lines.size):
             return np.inf
-        farthest = max(farthest, float(lines.distances(at.reshape(-1), places).max()))
+        farthest = max(farthest, float(lines.distances(at.reshape(-1), positions).max()))
     return farthest

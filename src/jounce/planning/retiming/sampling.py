@@ -62,27 +62,27 @@ def fit_to_samples(
     if trajectory.stop < LEAST * period:
         raise TrajectoryError(f"gives fewer than {LEAST} samples in {trajectory.stop:g} s; choose more", value=rate)
     slowed = 1.0
-    told = ""
+    note = ""
     for _ in range(ATTEMPTS):
         periods = np.ceil(slowed * trajectory.stop / period - WHOLE)
-        found = trajectory.slower(periods * period / trajectory.stop)
-        times = np.linspace(0.0, found.stop, int(periods) + 1)
-        found.times = times
-        positions = found.derivatives(times, 0)[:, 0]
+        slower = trajectory.slower(periods * period / trajectory.stop)
+        times = np.linspace(0.0, slower.stop, int(periods) + 1)
+        slower.times = times
+        positions = slower.derivatives(times, 0)[:, 0]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SampleWarning)
-            read = JointTrajectory.from_samples(times, positions, found.names, degree)
+            read = JointTrajectory.from_samples(times, positions, slower.names, degree)
             report = worst = check_motion(robot, read, limits, drives=drives, hand_over=hand_over)
         if report.kept:
-            worst = check_motion(robot, found, limits, drives=drives, hand_over=True)
+            worst = check_motion(robot, slower, limits, drives=drives, hand_over=True)
             if worst.kept:
-                found.report = dataclasses.replace(worst, ends=trajectory.report.ends, hand_over=hand_over)
-                return found, report
+                slower.report = dataclasses.replace(worst, ends=trajectory.report.ends, hand_over=hand_over)
+                return slower, report
         over = max((worst.worst.ratio or 1.0) if worst.worst else 1.0, 1.0) - 1
-        told = "" if worst.worst is None else f" of the {worst.worst.quantity} of {worst.worst.joint}"
+        note = "" if worst.worst is None else f" of the {worst.worst.quantity} of {worst.worst.joint}"
         slowed = max(slowed, float(periods) * period / trajectory.stop) * (1 + min(over / 2, 0.05)) + period / 10
     message = (
-        f"splines of degree {degree} through samples at this rate break the limit{told}; "
+        f"splines of degree {degree} through samples at this rate break the limit{note}; "
         f"choose a higher rate, or a smoother motion (order)"
     )
     raise TrajectoryError(message, value=rate)

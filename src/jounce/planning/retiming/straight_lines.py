@@ -24,7 +24,7 @@ LEAST, MOST = 32, 8192  # pieces
 LOOKS = 8  # in each piece
 GRADED = 2.5  # ratio of the lengths of pieces beside each other, at most
 TOGETHER = 0.25  # of the deviation: how far lines may be from the many that they take the place of
-BESIDE = 2  # lines before and after one, among which the nearest is sought
+ADJACENT = 2  # lines before and after one, among which the nearest is sought
 
 _Points = Float[np.ndarray, "point joint"]
 
@@ -58,26 +58,26 @@ class Lines:
         """The diagonal of the box that holds all points."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
-    def distances(self, at: Float[np.ndarray, " place"], places: Float[np.ndarray, "place joint"]) -> np.ndarray:
-        """Return how far places are from the lines about where they should be."""
+    def distances(self, at: Float[np.ndarray, " point"], points: Float[np.ndarray, "point joint"]) -> np.ndarray:
+        """Return how far points are from the lines about where they should be."""
         own = np.clip(np.searchsorted(self.at, at, side="right") - 1, 0, len(self.at) - 2)
         nearest = np.full(len(at), np.inf)
-        for step in range(-BESIDE, BESIDE + 1):
+        for step in range(-ADJACENT, ADJACENT + 1):
             line = np.clip(own + step, 0, len(self.at) - 2)
-            nearest = np.minimum(nearest, _away(places, self.points[line], self.points[line + 1]))
+            nearest = np.minimum(nearest, _away(points, self.points[line], self.points[line + 1]))
         return nearest
 
 
-def polynomials_at(law: SplineMotion, at: Float[np.ndarray, " place"]) -> Float[np.ndarray, " place"]:
+def polynomials_at(law: SplineMotion, at: Float[np.ndarray, " point"]) -> Float[np.ndarray, " point"]:
     """Return the values of the polynomials of a spline, without a program of its own."""
     begins, powers = np.asarray(law.breakpoints, float), np.asarray(law.coefficients, float)
     piece = np.clip(np.searchsorted(begins, at, side="right") - 1, 0, len(begins) - 1)
     return np.polynomial.polynomial.polyval(at - begins[piece], powers[:, piece], tensor=False)
 
 
-def _away(places: np.ndarray, begins: np.ndarray, ends: np.ndarray) -> Float[np.ndarray, " place"]:
+def _away(points: np.ndarray, begins: np.ndarray, ends: np.ndarray) -> Float[np.ndarray, " point"]:
     """Return distances from lines between two points each."""
-    along, since = ends - begins, places - begins
+    along, since = ends - begins, points - begins
     lengths = (along**2).sum(axis=-1)
     share = np.clip((along * since).sum(axis=-1) / np.where(lengths > 0, lengths, 1.0), 0.0, 1.0)
     return np.linalg.norm(since - share[..., None] * along, axis=-1)
@@ -100,10 +100,10 @@ def taken_together(points: _Points, near: float) -> tuple[Int[np.ndarray, " vert
     off : float
         How far a point is from its line, at most.
     """
-    last, chosen, span, off = len(points) - 1, [0], 1, 0.0
+    last, chosen, stride, off = len(points) - 1, [0], 1, 0.0
     while chosen[-1] < last:
         first = chosen[-1]
-        good, bad, reach = first + 1, last + 1, span
+        good, bad, reach = first + 1, last + 1, stride
         while good < last and bad > last:  # twice as far, again and again, until it is too far
             beyond = min(first + 2 * reach, last)
             good, bad = (beyond, bad) if _off(points[first : beyond + 1], near) <= near else (good, beyond)
@@ -111,7 +111,7 @@ def taken_together(points: _Points, near: float) -> tuple[Int[np.ndarray, " vert
         while bad - good > 1 and bad <= last:
             middle = (good + bad) // 2
             good, bad = (middle, bad) if _off(points[first : middle + 1], near) <= near else (good, middle)
-        off, span = max(off, _off(points[first : good + 1], near)), good - first
+        off, stride = max(off, _off(points[first : good + 1], near)), good - first
         if np.any(points[good] != points[first]):
             chosen.append(good)
         elif good == last:
@@ -125,8 +125,8 @@ def _off(points: _Points, near: float) -> float:
     """Return how far points are from the line between the first and the last; infinite if they go back along it."""
     along, since = points[-1] - points[0], points - points[0]
     length = float(np.linalg.norm(along))
-    way = since @ (along / length) if length else np.zeros(len(points))
-    if np.max(np.maximum.accumulate(way) - way) > near:
+    fraction = since @ (along / length) if length else np.zeros(len(points))
+    if np.max(np.maximum.accumulate(fraction) - fraction) > near:
         return np.inf
     return float(_away(points, points[:1], points[-1:]).max())
 
@@ -164,15 +164,15 @@ def rounded(lines: Lines, deviation: float, *, timed: bool = False) -> Path:
         begins = _graded(begins)
         curve = _schoenberg(begins, knots, points)
         looks = np.unique(np.append(begins[:-1, None] + np.diff(begins)[:, None] * np.arange(LOOKS) / LOOKS, knots))
-        apart = curve(looks) - _on(looks, knots, points)
-        distances = np.linalg.norm(apart, axis=1) + off + lines.own
+        difference = curve(looks) - _on(looks, knots, points)
+        distances = np.linalg.norm(difference, axis=1) + off + lines.own
         far = np.unique(np.searchsorted(begins, looks[distances > deviation], side="right") - 1)
         far = far[far < len(begins) - 1]
         if not len(far):
-            wanted = 2 ** int(np.ceil(np.log2(len(begins) - 1)))
-            if len(begins) - 1 == wanted:
+            size = 2 ** int(np.ceil(np.log2(len(begins) - 1)))
+            if len(begins) - 1 == size:
                 break
-            far = np.argsort(-np.diff(begins), kind="stable")[: wanted - len(begins) + 1]  # few shapes are compiled
+            far = np.argsort(-np.diff(begins), kind="stable")[: size - len(begins) + 1]  # few shapes are compiled
         if len(begins) + len(far) - 1 > MOST:
             at = int(np.argmax(distances))
             where = float(np.interp(looks[at], knots, instants))
@@ -182,7 +182,7 @@ def rounded(lines: Lines, deviation: float, *, timed: bool = False) -> Path:
                 f"often or too sharply to be followed, as at {word} = {where:.6g}{' s' if word == 't' else ''}; "
                 "choose a larger deviation, or smooth them"
             )
-            raise TrajectoryError(message, name=lines.names[int(np.argmax(np.abs(apart[at])))])
+            raise TrajectoryError(message, name=lines.names[int(np.argmax(np.abs(difference[at])))])
         begins = np.sort(np.append(begins, (begins[far] + begins[far + 1]) / 2))
     powers = local_powers(curve, begins[:-1], DEGREE)
     laws = {name: SmoothPieces(begins[:-1], powers[:, :, k], float(begins[-1])) for k, name in enumerate(lines.names)}
@@ -191,7 +191,7 @@ def rounded(lines: Lines, deviation: float, *, timed: bool = False) -> Path:
     return Path(laws, float(knots[0]), float(knots[-1]), float(distances.max()), deviation, words, times)
 
 
-def _on(at: np.ndarray, knots: np.ndarray, points: _Points) -> Float[np.ndarray, "place joint"]:
+def _on(at: np.ndarray, knots: np.ndarray, points: _Points) -> Float[np.ndarray, "point joint"]:
     """Return places on straight lines."""
     return np.stack([np.interp(at, knots, column) for column in points.T], axis=1)
 
@@ -200,8 +200,8 @@ def _graded(begins: np.ndarray) -> np.ndarray:
     """Halve pieces that are much longer than one beside them."""
     while True:
         lengths = np.diff(begins)
-        beside = np.minimum(np.append(lengths[1:], np.inf), np.append(np.inf, lengths[:-1]))
-        long = np.flatnonzero(lengths > GRADED * beside)
+        adjacent = np.minimum(np.append(lengths[1:], np.inf), np.append(np.inf, lengths[:-1]))
+        long = np.flatnonzero(lengths > GRADED * adjacent)
         if not len(long):
             return begins
         begins = np.sort(np.append(begins, (begins[long] + begins[long + 1]) / 2))

@@ -18,7 +18,7 @@ from jounce.errors import SampleWarning, TrajectoryError
 from jounce.planning.retiming.path import JoinedPieces, Path
 from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory, SplineMotion
 
-STILL = 1e-3  # of the largest speed: a trajectory that is slower than this at its ends stands still there
+REST_SPEED = 1e-3  # of the largest speed: a trajectory that is slower than this at its ends stands still there
 RESTING = 1e-5  # of the largest speed: what is slower within stands still
 SLOW = 0.2  # of the largest speed: where the lowest speed is sought closely
 INTERVALS = 4000  # intervals in which a trajectory is looked at to begin with
@@ -36,7 +36,7 @@ DEGREE = 5
 TURNING = 1e-2  # of the largest acceleration: more at a rest turns a trajectory smoothly
 NEWTON = 12  # steps
 HALVINGS = 60  # of the interval in which a trajectory leaves a stop
-PLACES, WEIGHTS = np.polynomial.legendre.leggauss(6)
+GAUSS_NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
 class Stops(NamedTuple):
@@ -47,50 +47,50 @@ class Stops(NamedTuple):
 
 
 class Ramps:
-    """A parameter that grows as the length but near some places, where the length is a power of it.
+    """A parameter that grows as the length but near some stops, where the length is a power of it.
 
     Parameters
     ----------
-    places : array of shape (place,)
+    stops : array of shape (stop,)
         Lengths, increasing.
-    widths : array of shape (place,)
+    widths : array of shape (stop,)
         How far the power reaches, by length.
     power : int
         2 or higher.
     """
 
-    def __init__(self, places: np.ndarray, widths: np.ndarray, power: int):
+    def __init__(self, stops: np.ndarray, widths: np.ndarray, power: int):
         polynomial = np.polynomial.Polynomial
         slope = (polynomial([0.0] * (power - 2) + [1.0]) * polynomial([1.0, 0.0, -1.0]) ** FLAT).integ()
         self.power, self.share = power, (slope / slope(1.0)).integ()
-        self.places, self.widths = places, widths
+        self.stops, self.widths = stops, widths
         self.reach = widths / self.share(1.0)
         self.gained = np.append(0.0, np.cumsum(2 * (self.reach - widths)))
-        self.centres = places + self.gained[:-1] + self.reach - widths
+        self.centres = stops + self.gained[:-1] + self.reach - widths
 
     def parameter(self, lengths: np.ndarray) -> Float[np.ndarray, " length"]:
         """Return the parameter at lengths."""
-        found = lengths + self.gained[np.searchsorted(self.places, lengths)]
-        if not len(self.places):
-            return found
-        near = np.argmin(np.abs(lengths[:, None] - self.places), axis=1)
-        away = lengths - self.places[near]
-        wanted = np.minimum(np.abs(away), self.widths[near]) / self.reach[near]
-        share = np.minimum((self.power * wanted) ** (1 / self.power), 1.0)  # Newton's steps go down to the root
+        shifted = lengths + self.gained[np.searchsorted(self.stops, lengths)]
+        if not len(self.stops):
+            return shifted
+        near = np.argmin(np.abs(lengths[:, None] - self.stops), axis=1)
+        away = lengths - self.stops[near]
+        target = np.minimum(np.abs(away), self.widths[near]) / self.reach[near]
+        share = np.minimum((self.power * target) ** (1 / self.power), 1.0)  # Newton's steps go down to the root
         slope = self.share.deriv()
         for _ in range(NEWTON):
-            share = np.maximum(share - (self.share(share) - wanted) / np.maximum(slope(share), 1e-300), 0.0)
+            share = np.maximum(share - (self.share(share) - target) / np.maximum(slope(share), 1e-300), 0.0)
         inside = np.abs(away) < self.widths[near]
-        return np.where(inside, self.centres[near] + np.sign(away) * self.reach[near] * share, found)
+        return np.where(inside, self.centres[near] + np.sign(away) * self.reach[near] * share, shifted)
 
     def motion(self, total: float) -> JoinedPieces:
         """Return the length over the parameter, up to a total length."""
         begins, pieces = [0.0], [np.polynomial.Polynomial([0.0, 1.0])]
-        for place, centre, reach, width in zip(self.places, self.centres, self.reach, self.widths, strict=True):
+        for stop, centre, reach, width in zip(self.stops, self.centres, self.reach, self.widths, strict=True):
             before, after = np.polynomial.Polynomial([1.0, -1.0 / reach]), np.polynomial.Polynomial([0.0, 1.0 / reach])
             begins += [centre - reach, centre, centre + reach]
-            pieces += [place - reach * self.share(before), place + reach * self.share(after)]
-            pieces.append(np.polynomial.Polynomial([place + width, 1.0]))
+            pieces += [stop - reach * self.share(before), stop + reach * self.share(after)]
+            pieces.append(np.polynomial.Polynomial([stop + width, 1.0]))
         height = max(len(piece.coef) for piece in pieces)
         powers = np.stack([np.pad(piece.coef, (0, height - len(piece.coef))) for piece in pieces], axis=1)
         return JoinedPieces(np.array(begins), powers, total + float(self.gained[-1]))
@@ -120,18 +120,18 @@ def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
         if not largest > 0:
             raise TrajectoryError("the path does not move: all its points are the same", name="path")
         rests = _rests(path, times, speeds, RESTING * largest)
-        if min(speeds[0], speeds[-1]) > STILL * largest and _turns_well(path, times, rests):
+        if min(speeds[0], speeds[-1]) > REST_SPEED * largest and _turns_well(path, times, rests):
             return path
         times = np.union1d(times, rests)
         lengths = np.append(0.0, np.cumsum(_between(path, times[:-1], times[1:])))
         stops = _stops(path, times, lengths, rests)
         best = None
         for count in NODES:
-            found = _splined(path, times, lengths, stops, order, count)
-            if best is not None and found.deviation * GAIN > best.deviation:
+            splined = _splined(path, times, lengths, stops, order, count)
+            if best is not None and splined.deviation * GAIN > best.deviation:
                 break
-            best = found
-            if found.deviation <= NEAR * lengths[-1]:
+            best = splined
+            if splined.deviation <= NEAR * lengths[-1]:
                 break
     assert best is not None
     return best
@@ -141,33 +141,33 @@ def _instants(path: Path, own: np.ndarray) -> Float[np.ndarray, " time"]:
     """Return many instants, and all at which pieces of laws meet."""
     knots = [np.asarray(law.breakpoints) for law in path.laws.values() if isinstance(law, SplineMotion)]
     every = np.concatenate([np.linspace(path.start, path.stop, INTERVALS + 1), own, *knots])
-    found = np.unique(every[(every >= path.start) & (every <= path.stop)])
-    apart = np.diff(found, append=np.inf) > 1e-12 * (path.stop - path.start)
-    return found[apart]
+    instants = np.unique(every[(every >= path.start) & (every <= path.stop)])
+    distinct = np.diff(instants, append=np.inf) > 1e-12 * (path.stop - path.start)
+    return instants[distinct]
 
 
 def _speeds(path: Path, times: np.ndarray) -> Float[np.ndarray, " time"]:
     return np.linalg.norm(path.derivatives(times, 1)[:, 1], axis=1)
 
 
-def _rests(path: Path, times: np.ndarray, speeds: np.ndarray, still: float) -> Float[np.ndarray, " rest"]:
+def _rests(path: Path, times: np.ndarray, speeds: np.ndarray, slow: float) -> Float[np.ndarray, " rest"]:
     """Return the instants within at which a trajectory stands still: of a stay many."""
     before, at, after = speeds[:-2], speeds[1:-1], speeds[2:]
-    resting = 1 + np.flatnonzero(at <= still)
-    lowest = 1 + np.flatnonzero((at <= before) & (at <= after) & (at > still) & (at < SLOW * speeds.max()))
+    resting = 1 + np.flatnonzero(at <= slow)
+    lowest = 1 + np.flatnonzero((at <= before) & (at <= after) & (at > slow) & (at < SLOW * speeds.max()))
     if not len(lowest):
         return times[resting]
     low, high, best, least = times[lowest - 1], times[lowest + 1], times[lowest], speeds[lowest]
     share, every = np.linspace(0.0, 1.0, ZOOM)[:, None], np.arange(len(lowest))
     for _ in range(ZOOMS):
         laid = low + share * (high - low)
-        found = _speeds(path, laid.reshape(-1)).reshape(laid.shape)
-        top = np.argmin(found, axis=0)
-        better = found[top, every] < least
-        best, least = np.where(better, laid[top, every], best), np.where(better, found[top, every], least)
+        speeds_there = _speeds(path, laid.reshape(-1)).reshape(laid.shape)
+        top = np.argmin(speeds_there, axis=0)
+        better = speeds_there[top, every] < least
+        best, least = np.where(better, laid[top, every], best), np.where(better, speeds_there[top, every], least)
         reach = (high - low) / (ZOOM - 1)
         low, high = np.maximum(best - reach, low), np.minimum(best + reach, high)
-    return np.union1d(times[resting], best[least <= still])
+    return np.union1d(times[resting], best[least <= slow])
 
 
 def _turns_well(path: Path, times: np.ndarray, rests: np.ndarray) -> bool:
@@ -182,7 +182,7 @@ def _turns_well(path: Path, times: np.ndarray, rests: np.ndarray) -> bool:
 def _between(path: Path, begins: np.ndarray, ends: np.ndarray) -> Float[np.ndarray, " interval"]:
     """Return lengths of the path from instants to others, by Gauss's quadrature."""
     half = (ends - begins) / 2
-    laid = begins[:, None] + half[:, None] * (1 + PLACES)
+    laid = begins[:, None] + half[:, None] * (1 + GAUSS_NODES)
     return half * (_speeds(path, laid.reshape(-1)).reshape(laid.shape) @ WEIGHTS)
 
 
@@ -224,9 +224,9 @@ def _splined(path: Path, times: np.ndarray, lengths: np.ndarray, stops: Stops, o
     edges = ramps.parameter(edges)
     counts = np.maximum(PART, np.ceil(count * np.diff(edges) / edges[-1]).astype(int))
     parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(edges[:-1], edges[1:], counts, strict=True)]
-    wanted = np.append(np.concatenate(parts), edges[-1])
+    parameters = np.append(np.concatenate(parts), edges[-1])
     breaks = np.append(0, np.cumsum(counts))
-    instants = np.interp(wanted, own, times)
+    instants = np.interp(parameters, own, times)
     instants[breaks] = times[np.searchsorted(own, edges)]
     before = np.clip(np.searchsorted(times, instants, side="right") - 1, 0, len(times) - 1)
     knots = ramps.parameter(lengths[before] + _between(path, times[before], instants))
@@ -236,17 +236,17 @@ def _splined(path: Path, times: np.ndarray, lengths: np.ndarray, stops: Stops, o
     if back.all():
         scale = edges[-1]
         laws = {name: SplineMotion(knots / scale, x, DEGREE) for name, x in zip(path.names, points.T, strict=True)}
-        found, at = Path(laws, 0.0, 1.0), own / scale
+        result, at = Path(laws, 0.0, 1.0), own / scale
     else:
         joined = breaks[np.concatenate([[True], ~back, [True]])]
         corners = Ramps(edges[1:-1][~back], widths[~back], order + 1)
         leader = corners.motion(float(edges[-1]))
         columns = zip(path.names, points.T, strict=True)
         laws = {name: FollowingMotion(_joined(knots, column, joined), leader) for name, column in columns}
-        found, at = Path(laws, 0.0, float(leader.stop)), corners.parameter(own)
-    at = np.clip(at, found.start, found.stop)
-    off = np.linalg.norm(found.derivatives(at, 0)[:, 0] - path.derivatives(times, 0)[:, 0], axis=1)
-    return dataclasses.replace(found, deviation=float(off.max()))
+        result, at = Path(laws, 0.0, float(leader.stop)), corners.parameter(own)
+    at = np.clip(at, result.start, result.stop)
+    off = np.linalg.norm(result.derivatives(at, 0)[:, 0] - path.derivatives(times, 0)[:, 0], axis=1)
+    return dataclasses.replace(result, deviation=float(off.max()))
 
 
 def _joined(knots: np.ndarray, values: np.ndarray, breaks: Int[np.ndarray, " break"]) -> JoinedPieces:

@@ -105,8 +105,8 @@ def follow_tool_path(
     tool, n = tool_of(robot, link, point, axis), len(robot.joint_names)
     scale = coordinate_scale(robot, tool)
     ranges = joint_ranges(robot)
-    laws = _held(robot, hold, path)
-    held = tuple(robot.joint_names.index(name) for name in laws.names) if laws else ()
+    laws = _fixed_joint_laws(robot, hold, path)
+    fixed_joints = tuple(robot.joint_names.index(name) for name in laws.names) if laws else ()
     given = _numbers("posture", posture, n)
     rest = middle(*ranges) if given is None else given
     weight = _numbers("weights", weights, n)
@@ -115,25 +115,25 @@ def follow_tool_path(
         raise RobotError("must be greater than zero", name="weights", value=weight.tolist())
     kinds = tuple(kind for kind in ("position", "rotation", "direction") if kind in path.kinds)
     columns = task_columns(robot, tool, random_coordinates(*ranges, scale, CONFIGURATIONS, 0), kinds, scale)
-    if held:
-        units = np.broadcast_to(np.eye(n)[list(held)], (len(columns), len(held), n))
+    if fixed_joints:
+        units = np.broadcast_to(np.eye(n)[list(fixed_joints)], (len(columns), len(fixed_joints), n))
         columns = np.concatenate([columns, units], axis=1)
     basis, whole = reachable_rows(columns)
-    equations = PathEquations(robot.tree, tool, basis, scale, weight, held, kinds, n)
+    equations = PathEquations(robot.tree, tool, basis, scale, weight, fixed_joints, kinds, n)
     if whole < min(basis.shape[1], n):
         message = "the held joints and the tool do not determine the other joints; hold others, or fewer"
         raise RobotError(message, name="hold", value=list(laws.names) if laws else None)
 
     def target(instants: np.ndarray, levels: int) -> dict[str, Any]:
-        found = path.series(instants, levels)
+        goal = path.series(instants, levels)
         if laws:
             jet = laws.derivatives(instants, levels)
-            found["held"] = _coefficients(jet) / scale[list(held)][:, None]
+            goal["held"] = _coefficients(jet) / scale[list(fixed_joints)][:, None]
         if equations.has_posture:
-            still = np.zeros((levels + 1, n, len(instants)))
-            still[0] = (rest / scale)[:, None]
-            found["posture"] = still
-        return found
+            states = np.zeros((levels + 1, n, len(instants)))
+            states[0] = (rest / scale)[:, None]
+            goal["posture"] = states
+        return goal
 
     begin = _start(robot, tool, path, ranges if limits else None, laws, start, scale, kinds, link)
     u = np.concatenate([begin / scale, np.zeros(equations.size - n)])
@@ -159,33 +159,33 @@ def _start(
     near = _numbers("start", start, n)
     goal = {kind: np.moveaxis(x[0], -1, 0) for kind, x in path.series(np.array([path.start]), 0).items()}
     guess = middle(*joint_ranges(robot)) if near is None else near
-    found = poses_within(
+    result = poses_within(
         robot, tool, {kind: goal[kind] for kind in kinds}, (lower, upper, scale), guess[None], 8 if near is None else 1
     )
-    if not found[1][0] <= REACHED**2:
-        missed = float(np.sqrt(found[1][0]))
+    if not result[1][0] <= REACHED**2:
+        missed = float(np.sqrt(result[1][0]))
         message = (
             f"the beginning of the path is not reached: {missed:.3g} rad, or sizes of the robot, are left; move the "
             "path, or give another start"
         )
         raise RobotError(message, name=link, value=goal["position"][0].tolist() if "position" in goal else None)
-    return found[0][0]
+    return result[0][0]
 
 
 def _to_posture(equations: PathEquations, u: np.ndarray, target: Any, begin: float, link: str) -> np.ndarray:
     """Return the unknowns nearest to a posture, reached from given ones while the posture moves there from them."""
     first = target(np.array([begin]), 0)
-    own, wanted = u[: equations.count], first["posture"][0, :, 0]
+    own, posture = u[: equations.count], first["posture"][0, :, 0]
 
     def moving(shares: np.ndarray, levels: int) -> dict[str, Any]:
-        found = {}
+        goal = {}
         for kind, values in first.items():
-            found[kind] = np.zeros((levels + 1, *values.shape[1:-1], len(shares)))
-            found[kind][0] = values[0]
-        found["posture"][0] = own[:, None] + (wanted - own)[:, None] * shares
+            goal[kind] = np.zeros((levels + 1, *values.shape[1:-1], len(shares)))
+            goal[kind][0] = values[0]
+        goal["posture"][0] = own[:, None] + (posture - own)[:, None] * shares
         if levels:
-            found["posture"][1] = (wanted - own)[:, None]
-        return found
+            goal["posture"][1] = (posture - own)[:, None]
+        return goal
 
     nodes = followed(equations, u, moving, 0.0, 1.0, 30)
     if nodes.failed is not None:
@@ -207,7 +207,7 @@ def _raise_for(motion: ToolPathMotion, nodes: Nodes) -> None:
     raise error(words, name=motion.link)
 
 
-def _held(robot: Robot, hold: Any, path: ToolPath) -> JointTrajectory | None:
+def _fixed_joint_laws(robot: Robot, hold: Any, path: ToolPath) -> JointTrajectory | None:
     if hold is None or (isinstance(hold, Mapping) and not hold):
         return None
     if not isinstance(hold, Mapping):

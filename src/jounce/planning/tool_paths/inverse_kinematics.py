@@ -127,10 +127,12 @@ def inverse_kinematics(
         raise RobotError("there is no pose to reach; give at least one", value=f"shape {lead}")
     begin = np.broadcast_to(begin, (*lead, n)).reshape(count, n)
     goal = {kind: np.broadcast_to(x, (*lead, *WIDTHS[kind])).reshape(count, *WIDTHS[kind]) for kind, x in goal.items()}
-    found = poses_within(robot, tool, goal, (lower, upper, scale), begin, starts, within, most_steps, seed)
+    result = poses_within(robot, tool, goal, (lower, upper, scale), begin, starts, within, most_steps, seed)
     anywhere = random_coordinates(lower, upper, scale, CONFIGURATIONS, seed)
     basis = task_columns(robot, tool, anywhere, tuple(goal), scale)
-    return _result(robot, link, point, found, goal, lead, within, (lower, upper, scale), reachable_rows(basis)[1], tool)
+    return _result(
+        robot, link, point, result, goal, lead, within, (lower, upper, scale), reachable_rows(basis)[1], tool
+    )
 
 
 def poses_within(
@@ -149,19 +151,19 @@ def poses_within(
     constants = (tool, lower / scale, upper / scale, scale, np.float64(within * FINER))
 
     def solved(begin: np.ndarray, chosen: Any) -> list[np.ndarray]:
-        wanted = [x[chosen] for x in goal.values()]
-        found = _marched(robot, begin, wanted, constants, tuple(goal), min(most_steps, SOON))
-        steps, slow = SOON, np.flatnonzero(found[3] > 0)
+        targets = [x[chosen] for x in goal.values()]
+        result = _marched(robot, begin, targets, constants, tuple(goal), min(most_steps, SOON))
+        steps, slow = SOON, np.flatnonzero(result[3] > 0)
         while slow.size and steps < most_steps:  # ever fewer go on by themselves
             left = min(steps, most_steps - steps)
-            more = _marched(robot, found[0][slow], [x[slow] for x in wanted], constants, tuple(goal), left)
-            for whole, part in zip(found, more, strict=True):
+            more = _marched(robot, result[0][slow], [x[slow] for x in targets], constants, tuple(goal), left)
+            for whole, part in zip(result, more, strict=True):
                 whole[slow] = part
             steps, slow = steps + left, slow[more[3] > 0]
-        return found
+        return result
 
-    found = solved(begin, slice(None))
-    failed = np.flatnonzero(~(found[1] <= within**2))
+    result = solved(begin, slice(None))
+    failed = np.flatnonzero(~(result[1] <= within**2))
     if failed.size and starts > 1:
         others = random_coordinates(lower, upper, scale, (starts - 1) * len(failed), seed)
         again = solved(others, np.repeat(failed, starts - 1))
@@ -170,14 +172,14 @@ def poses_within(
         good = tried[1] <= within**2
         best = np.where(good.any(1), np.argmin(np.where(good, away, np.inf), 1), np.argmin(tried[1], 1))
         rows = np.arange(len(failed))
-        nearer = tried[1][rows, best] < found[1][failed]
-        for whole, part in zip(found, tried, strict=True):
+        nearer = tried[1][rows, best] < result[1][failed]
+        for whole, part in zip(result, tried, strict=True):
             whole[failed[nearer]] = part[rows, best][nearer]
-    return found
+    return result
 
 
-def _marched(robot: Robot, begin: Any, wanted: Any, constants: Any, kinds: tuple[str, ...], steps: int) -> list[Any]:
-    arrays = (begin[:, None], *(x[:, None] for x in wanted))
+def _marched(robot: Robot, begin: Any, targets: Any, constants: Any, kinds: tuple[str, ...], steps: int) -> list[Any]:
+    arrays = (begin[:, None], *(x[:, None] for x in targets))
     return [np.asarray(x)[:, 0] for x in solve_poses(robot, arrays, (*constants, np.int64(steps)), (kinds,))]
 
 
@@ -185,7 +187,7 @@ def _result(
     robot: Robot,
     link: str,
     point: Any,
-    found: Any,
+    solved: Any,
     goal: Any,
     lead: Any,
     within: float,
@@ -193,7 +195,7 @@ def _result(
     rank: int,
     tool: Tool,
 ) -> JointPoses:
-    q, square, level, _, values, shares = found
+    q, square, level, _, values, shares = solved
     lower, upper, scale = ranges
     status = np.where(level <= STATIONARY, int(Status.NOT_ASSEMBLED), int(Status.NOT_CONVERGED))
     status = np.where(square <= within**2, int(Status.OK), status)
@@ -206,8 +208,8 @@ def _result(
     parts = (given, status, q, distance, angle, singular, values, shares)
     shaped = [x.reshape((*lead, *x.shape[1:])) for x in parts]
     names = ("q", "status", "closest", "distance", "angle", "singular", "singular_values", "shares")
-    found = dict(zip(names, shaped, strict=True))
-    return JointPoses(**found, joint_names=robot.joint_names, limited=limited.reshape((*lead, -1)))
+    solved = dict(zip(names, shaped, strict=True))
+    return JointPoses(**solved, joint_names=robot.joint_names, limited=limited.reshape((*lead, -1)))
 
 
 def _away(robot: Robot, link: str, point: Any, q: Any, goal: Any, tool: Tool) -> tuple[Any, Any]:

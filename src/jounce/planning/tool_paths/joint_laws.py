@@ -48,10 +48,10 @@ def followed_closely(exact: Callable[[_Times], _Motion], times: _Times, known: _
     """
     if len(times) < 2 or (np.diff(times) <= 0).any():
         raise TrajectoryError("laws need two instants at least, which increase", name="time", value=times.tolist()[:5])
-    span = float(times[-1] - times[0])
+    duration = float(times[-1] - times[0])
     given = exact(times)
     near = NEAR * max(1.0, float(np.abs(given[:, 0]).max()))
-    side = SIDE * span
+    side = SIDE * duration
     first, last = exact(times[[0, -1]] + [side, -side])[:, None]
     inside = np.concatenate([_shifted(first, -side), _shifted(last, side)])
     outside = np.flatnonzero(_jumped(given[[0, -1]], inside))  # a law that is held at its end says what it is then
@@ -71,11 +71,11 @@ def followed_closely(exact: Callable[[_Times], _Motion], times: _Times, known: _
         done = np.concatenate([done, intervals[open_][missed <= near]])
         if not len(bad):
             return joined, rows
-        short = bad[intervals[bad, 1] - intervals[bad, 0] <= SHORT * span]
+        short = bad[intervals[bad, 1] - intervals[bad, 0] <= SHORT * duration]
         if len(short):
-            found = np.array([_kink(exact, joined[k : k + 2], rows[k : k + 2], near) for k in short.tolist()])
-            kinks.add(found)
-            keep = _clear(nodes, times, found)  # what was laid about them is no longer needed
+            at_kinks = np.array([_kink(exact, joined[k : k + 2], rows[k : k + 2], near) for k in short.tolist()])
+            kinks.add(at_kinks)
+            keep = _clear(nodes, times, at_kinks)  # what was laid about them is no longer needed
             nodes, q = nodes[keep], q[keep]
         bad = np.setdiff1d(bad, short)
         if not len(short) and len(bad):
@@ -119,9 +119,9 @@ class _Kinks:
         """Return instants and derivatives with the kinks among them, each twice; an instant at a kink is left out."""
         if not len(self.times):
             return nodes, q
-        apart = (np.abs(nodes[:, None] - self.times) > 2 * self.side).all(axis=1)
-        times = np.concatenate([nodes[apart], self.times, self.times])
-        rows = np.concatenate([q[apart], self.before, self.after])
+        distinct = (np.abs(nodes[:, None] - self.times) > 2 * self.side).all(axis=1)
+        times = np.concatenate([nodes[distinct], self.times, self.times])
+        rows = np.concatenate([q[distinct], self.before, self.after])
         order = np.argsort(times, kind="stable")  # the left side stays before the right one
         return times[order], rows[order]
 
@@ -147,9 +147,9 @@ def _missed(
     chosen = np.flatnonzero(open_)
     steps = times[chosen + 1] - times[chosen]
     looks = times[chosen, None] + SHARES * steps[:, None]
-    wanted = exact(looks.reshape(-1))[:, 0].reshape(len(chosen), len(SHARES), -1)
-    found = [_within(HermiteMotion(times, column), looks) for column in np.moveaxis(q, -1, 0)]
-    missed = np.abs(np.stack(found, axis=-1) - wanted).max(axis=2)
+    exact_values = exact(looks.reshape(-1))[:, 0].reshape(len(chosen), len(SHARES), -1)
+    deviations = [_within(HermiteMotion(times, column), looks) for column in np.moveaxis(q, -1, 0)]
+    missed = np.abs(np.stack(deviations, axis=-1) - exact_values).max(axis=2)
     worst = np.argmax(missed, axis=1)[:, None]
     return np.take_along_axis(missed, worst, axis=1)[:, 0], np.take_along_axis(looks, worst, axis=1)[:, 0]
 

@@ -61,22 +61,22 @@ class JointPoses(Displayed):
         *index : int
             Of the pose in the batch; none for a single one.
         """
-        place: Any = index
+        lane: Any = index
         words = []
-        if self.status[place] == Status.OK:
+        if self.status[lane] == Status.OK:
             words.append("reached")
         else:
-            gap = f"the nearest found is {self.distance[place]:.3g} m and {self.angle[place]:.3g} rad away"
-            if self.status[place] == Status.NOT_CONVERGED:
+            gap = f"the nearest found is {self.distance[lane]:.3g} m and {self.angle[lane]:.3g} rad away"
+            if self.status[lane] == Status.NOT_CONVERGED:
                 words.append(f"not converged: {gap}; allow more steps, or give another start")
             else:
                 words.append(f"not reached: {gap}, and nothing near it is nearer; move the pose, or try more starts")
-            held = [name for name, at in zip(self.joint_names, self.limited[place], strict=True) if at]
-            if held:
-                words.append(f"at their limits: {', '.join(held)}")
-        if self.singular[place]:
-            lost = ", ".join(losing_joints(self.joint_names, self.shares[place]))
-            least, largest = self.singular_values[place][-1], self.singular_values[place][0]
+            limiting = [name for name, at in zip(self.joint_names, self.limited[lane], strict=True) if at]
+            if limiting:
+                words.append(f"at their limits: {', '.join(limiting)}")
+        if self.singular[lane]:
+            lost = ", ".join(losing_joints(self.joint_names, self.shares[lane]))
+            least, largest = self.singular_values[lane][-1], self.singular_values[lane][0]
             words.append(
                 f"singular: the motions of {lost} cancel at the tool (singular values from {largest:.2g} down to "
                 f"{least:.2g})"

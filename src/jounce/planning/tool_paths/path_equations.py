@@ -37,7 +37,7 @@ class PathEquations(Module):
         The rows that the joints can move, those of joints held included.
     scale, weights : array of shape (n,)
         What counts as one in a coordinate, and the weight of its distance from the posture.
-    held : tuple of int
+    fixed_joints : tuple of int
         Joints that have laws of their own.
     kinds : tuple of str
         What is followed.
@@ -50,7 +50,7 @@ class PathEquations(Module):
     basis: Any
     scale: Any
     weights: Any
-    held: tuple[int, ...] = eqx.field(static=True)
+    fixed_joints: tuple[int, ...] = eqx.field(static=True)
     kinds: tuple[str, ...] = eqx.field(static=True)
     count: int = eqx.field(static=True)
 
@@ -73,8 +73,8 @@ class PathEquations(Module):
         """Return the rows of the task at coordinates in their scale, as series."""
         goal = {kind: target[kind] for kind in self.kinds}
         rows = task_rows(self.tree, self.tool, x * jnp.asarray(self.scale)[None, :, None], goal)
-        if self.held:
-            rows = jnp.concatenate([rows, x[:, jnp.asarray(self.held)] - target["held"]], axis=1)
+        if self.fixed_joints:
+            rows = jnp.concatenate([rows, x[:, jnp.asarray(self.fixed_joints)] - target["held"]], axis=1)
         return jnp.sum(jnp.asarray(self.basis)[None, :, :, None] * rows[:, :, None], axis=1)
 
     def residual(self, u: Unknowns, target: dict[str, Any]) -> Float[Numbers, "order row batch"]:
@@ -101,12 +101,12 @@ class PathEquations(Module):
         first = {kind: series[:1] for kind, series in target.items()}
 
         def correct(carry: tuple[Corrected, Any, Any]) -> Any:
-            found, _, count = carry
-            factor = PathFactor.of(self.matrix(found.u, first))
-            step = -factor.solve(self.residual(found.u[None], first)[0])
+            x, _, count = carry
+            factor = PathFactor.of(self.matrix(x.u, first))
+            step = -factor.solve(self.residual(x.u[None], first)[0])
             size = jnp.max(jnp.abs(step), axis=0)
-            begun = jnp.where(count > 0, found.first, size)
-            return Corrected(found.u + step, factor, begun, size), found.last, count + 1
+            begun = jnp.where(count > 0, x.first, size)
+            return Corrected(x.u + step, factor, begun, size), x.last, count + 1
 
         def open_(carry: tuple[Corrected, Any, Any]) -> Any:
             return ~(jnp.all(carry[1] <= CLOSE)) & (carry[2] < MOST)
@@ -153,8 +153,8 @@ class PathFactor(Module):
         def product(right: Any) -> Any:
             return jnp.sum(self.inverse * right[None], axis=1)
 
-        found = product(right)
-        return found + product(right - jnp.sum(self.matrix * found[None], axis=1))
+        solution = product(right)
+        return solution + product(right - jnp.sum(self.matrix * solution[None], axis=1))
 
 
 class Corrected(NamedTuple):

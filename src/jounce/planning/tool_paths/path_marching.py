@@ -53,7 +53,7 @@ def march(equations: PathEquations, start: Any, steps: Any, targets: Any, inner:
     steps : array of shape (nodes,)
         To the next node, s.
     targets, inner : dict of array
-        Series at the nodes, (nodes, order + 1, ..., 1), and values within the intervals, (nodes, 1, ..., places).
+        Series at the nodes, (nodes, order + 1, ..., 1), and values within the intervals, (nodes, 1, ..., points).
 
     Returns
     -------
@@ -70,20 +70,20 @@ def march(equations: PathEquations, start: Any, steps: Any, targets: Any, inner:
 
     def node(guess: Any, entry: Any) -> Any:
         step, target, within = entry
-        found = equations.corrected(guess, target)
-        factor = found.factor
-        series = equations.series(found.u, factor, target, ORDER)
+        corrected = equations.corrected(guess, target)
+        factor = corrected.factor
+        series = equations.series(corrected.u, factor, target, ORDER)
         powers = (shares * step)[None] ** jnp.arange(ORDER + 1.0)[:, None]
-        places = jnp.sum(series * powers[:, None], axis=0)
-        other = equations.matrix(places, within) - factor.matrix
+        positions = jnp.sum(series * powers[:, None], axis=0)
+        other = equations.matrix(positions, within) - factor.matrix
         change = jnp.sum(factor.inverse[:, :, None] * other[None], axis=1)
         change = jnp.max(jnp.sum(jnp.abs(change), axis=1))
-        gap = jnp.sum(factor.inverse * equations.residual(places[None], within)[0][None], axis=1)
+        gap = jnp.sum(factor.inverse * equations.residual(positions[None], within)[0][None], axis=1)
         gap = jnp.max(jnp.abs(gap))
-        moved = jnp.max(jnp.abs(places - found.u))
+        moved = jnp.max(jnp.abs(positions - corrected.u))
         tame = change * gap / jnp.where(moved == 0, 1.0, moved)
-        told = series[..., 0], found.first[0], found.last[0], change, gap, tame
-        return places[:, -1:], told
+        result = series[..., 0], corrected.first[0], corrected.last[0], change, gap, tame
+        return positions[:, -1:], result
 
     return jax.lax.scan(node, start, (steps, targets, inner))
 
@@ -105,8 +105,8 @@ def followed(
     time = np.linspace(begin, end, FIRST + 1)
     while True:
         steps = np.diff(time)
-        found = _marched(equations, start, time, target, order)
-        series, first, last, change, gap, tame = found
+        result = _marched(equations, start, time, target, order)
+        series, first, last, change, gap, tame = result
         with np.errstate(invalid="ignore"):
             at_node = (last <= GOOD) & (first <= 2 * NEAR)
             at_node[0] = last[0] <= GOOD
@@ -135,16 +135,16 @@ def _marched(equations: PathEquations, start: Any, time: Any, target: Any, order
     series = {kind: _filled(array, ORDER) for kind, array in target(filled, min(order, ORDER)).items()}
     targets = {kind: np.moveaxis(array, -1, 0)[..., None] for kind, array in series.items()}
     shares = np.arange(1, PLACES + 1) / PLACES
-    places = np.minimum((filled[:, None] + shares * steps[:, None]).ravel(), time[-1])
+    instants = np.minimum((filled[:, None] + shares * steps[:, None]).ravel(), time[-1])
     inner = {
         kind: np.moveaxis(array.reshape(*array.shape[:-1], count, PLACES), -2, 0)
-        for kind, array in target(places, 0).items()
+        for kind, array in target(instants, 0).items()
     }
     guess, parts = np.asarray(start)[:, None], []
     for begin in range(0, count, BLOCK):
         block = slice(begin, begin + BLOCK)
-        guess, found = march(equations, guess, steps[block], *jax.tree.map(lambda x, b=block: x[b], (targets, inner)))
-        parts.append(found)
+        guess, result = march(equations, guess, steps[block], *jax.tree.map(lambda x, b=block: x[b], (targets, inner)))
+        parts.append(result)
     return [np.concatenate(x)[: len(time)] for x in zip(*parts, strict=True)]
 
 

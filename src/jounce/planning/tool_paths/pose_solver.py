@@ -47,19 +47,19 @@ def solve_poses(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tupl
     values, shares : array of shape (1, k, batch) and (1, k, coordinates, batch)
         Singular values of the task, and its right singular vectors.
     """
-    start, *wanted = arrays
+    start, *targets = arrays
     tool, lower, upper, scale, enough, most = constants
-    goal: Goal = dict(zip(kinds, wanted, strict=True))
+    goal: Goal = dict(zip(kinds, targets, strict=True))
     lower, upper, scale = (jnp.asarray(x)[:, None] for x in (lower, upper, scale))
 
     def missed(x: Any) -> Any:
         return misses(tree, tool, x * scale, goal)
 
-    def looked(x: Any) -> _Look:
+    def evaluated(x: Any) -> _Look:
         rows = missed(x)
         return _Look(x, rows, columns_of(missed, x), jnp.sum(rows * rows, axis=0))
 
-    def held(at: _Look) -> tuple[Any, Any]:
+    def projected_slope(at: _Look) -> tuple[Any, Any]:
         slope = jnp.sum(at.columns * at.rows[:, None], axis=0)
         outward = ((at.x <= lower) & (slope > 0)) | ((at.x >= upper) & (slope < 0))
         slope = jnp.where(outward, 0.0, slope)
@@ -67,7 +67,7 @@ def solve_poses(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tupl
         return slope, jnp.max(jnp.abs(slope), axis=0) / size
 
     def step_from(at: _Look, damping: Any) -> Any:
-        slope, _ = held(at)
+        slope, _ = projected_slope(at)
         columns = at.columns * jnp.where(slope == 0, 0.0, 1.0)[None]
         normal = jnp.sum(columns[:, :, None] * columns[:, None], axis=0)
         size = jnp.max(jnp.sum(columns**2, axis=0), axis=0)
@@ -77,7 +77,7 @@ def solve_poses(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tupl
 
     def improved(carry: Any) -> Any:
         best, x, damping, active, count = carry
-        trial = looked(x)  # the start in the first pass, which is better than nothing
+        trial = evaluated(x)  # the start in the first pass, which is better than nothing
         better = (trial.square < best.square) & active
         model = best.rows + jnp.sum(best.columns * (trial.x - best.x)[None], axis=1)
         good = best.square - trial.square > 0.25 * (best.square - jnp.sum(model * model, axis=0))
@@ -89,14 +89,21 @@ def solve_poses(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tupl
         x = step_from(best, damping)
         moved = jnp.max(jnp.abs(x - best.x), axis=0)
         active = active & (best.square > enough**2) & (moved > STALLED) & (damping < STIFF)
-        return best, x, damping, active & (held(best)[1] > FLAT), count + 1
+        return best, x, damping, active & (projected_slope(best)[1] > FLAT), count + 1
 
     x = jnp.clip(start[0] / scale, lower, upper)
     rows = jax.eval_shape(missed, x).shape
     nothing = _Look(x, jnp.zeros(rows), jnp.zeros((rows[0], *x.shape)), jnp.full(x.shape[1:], jnp.inf))
     begin = nothing, x, jnp.full(x.shape[1:], FIRST), jnp.full(x.shape[1:], True), jnp.zeros((), int)
-    found = jax.lax.while_loop(lambda carry: jnp.any(carry[3]) & (carry[4] <= most), improved, begin)
-    best, active = found[0], found[3]
+    state = jax.lax.while_loop(lambda carry: jnp.any(carry[3]) & (carry[4] <= most), improved, begin)
+    best, active = state[0], state[3]
     _, values, shares = singular_values(best.columns)
-    last = best.x * scale, best.square, held(best)[1], active.astype(float), values, jnp.swapaxes(shares, 0, 1)
+    last = (
+        best.x * scale,
+        best.square,
+        projected_slope(best)[1],
+        active.astype(float),
+        values,
+        jnp.swapaxes(shares, 0, 1),
+    )
     return jax.tree.map(lambda part: part[None], last)

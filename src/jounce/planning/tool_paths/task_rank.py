@@ -23,7 +23,7 @@ def _columns(tree: Tree, arrays: tuple[Any, ...], constants: Any, kinds: tuple[s
     """Return the Jacobian of a task where it is done, by coordinates in their scale."""
     tool, scale = constants
     q = arrays[0][0]
-    frame = link_frame(tree, q[None], tool.place)
+    frame = link_frame(tree, q[None], tool.frame)
     here = {
         "position": frame.position.coefficients[0][None],
         "rotation": jnp.stack([axis.coefficients[0] for axis in frame.axes], axis=1)[None],

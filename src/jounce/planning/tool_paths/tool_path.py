@@ -126,10 +126,10 @@ class ToolPath(Displayed):
         >>> path.position([0.5], order=2)[0].round(6).tolist()
         [[0.5, 0.25, 0.0], [1.0, 1.0, 0.0], [0.0, 2.0, 0.0]]
         """
-        times, places = check_samples(times, positions)
-        if places.ndim != 2 or places.shape[1] != 3:
-            raise TrajectoryError(f"must have the shape (samples, 3), not {places.shape}", name="positions")
-        laws = [SplineMotion(times, column, degree) for column in places.T]
+        times, positions_given = check_samples(times, positions)
+        if positions_given.ndim != 2 or positions_given.shape[1] != 3:
+            raise TrajectoryError(f"must have the shape (samples, 3), not {positions_given.shape}", name="positions")
+        laws = [SplineMotion(times, column, degree) for column in positions_given.T]
         turned = None if orientations is None else rotation_matrices("orientations", orientations)
         if turned is not None and turned.ndim > 2:
             turned = AttitudeSamples.from_rotation_matrices(times, turned, degree)
@@ -158,8 +158,8 @@ class ToolPath(Displayed):
             return knots(self._progress.laws["progress"], self.start, self.stop)
         turning = self._attitude[1] if isinstance(self._attitude, tuple) else None
         parts = [part for part in (self._position, self._direction, turning) if part is not None]
-        found = [knots(law, self.start, self.stop) for part in parts for law in part.laws.values()]
-        every = np.unique(np.concatenate([np.zeros(0), *found]))
+        instants = [knots(law, self.start, self.stop) for part in parts for law in part.laws.values()]
+        every = np.unique(np.concatenate([np.zeros(0), *instants]))
         return every[(every > self.start) & (every < self.stop)]
 
     def judge(self, order: int) -> None:
@@ -213,15 +213,15 @@ class ToolPath(Displayed):
                     message = f"has a spike at {times[beyond][0]:.9g} s, too narrow to have been seen"
                     raise TrajectoryError(message, name="progress", value=float(first[beyond][0]))
                 time = Jet((jnp.asarray(nearest), *time.coefficients[1:]))
-        found: Goal = {}
+        goal: Goal = {}
         if self._position is not None:
-            found["position"] = self._position(time)
+            goal["position"] = self._position(time)
         if self._attitude is not None:
-            found["rotation"] = self._rotation(time)
+            goal["rotation"] = self._rotation(time)
         if self._direction is not None:
             vector = self._direction(time)
-            found["direction"] = vector / sqrt(dot(vector, vector))
-        series = {kind: np.asarray(stacked(jet)) for kind, jet in found.items()}
+            goal["direction"] = vector / sqrt(dot(vector, vector))
+        series = {kind: np.asarray(stacked(jet)) for kind, jet in goal.items()}
         for kind, array in series.items():
             if not np.isfinite(array).all():
                 bad = int(np.argwhere(~np.isfinite(array))[0, -1])
@@ -235,8 +235,8 @@ class ToolPath(Displayed):
             return attitude.attitude(time)
         if isinstance(attitude, tuple):
             return rotation_matrix(attitude[0], attitude[1](time))
-        still = jnp.broadcast_to(jnp.asarray(attitude)[..., None], (3, 3, *time.shape))
-        return Jet.constant(still, time.order)
+        fixed = jnp.broadcast_to(jnp.asarray(attitude)[..., None], (3, 3, *time.shape))
+        return Jet.constant(fixed, time.order)
 
 
 def _three(name: str, laws: Any, keys: tuple[str, ...], start: float, stop: float) -> JointTrajectory:
@@ -250,8 +250,8 @@ def _laws(name: str, laws: Mapping[str, Any], start: float, stop: float) -> Join
         return JointTrajectory(laws, start, stop)
     except JounceError as error:
         inside = (error.name or "").removeprefix("laws").removeprefix(".")
-        place = f"{name}.{inside}" if error.name and error.name.startswith("laws") and inside != name else name
-        raise error.located(name=place if error.name and error.name.startswith("laws") else error.name) from None
+        location = f"{name}.{inside}" if error.name and error.name.startswith("laws") and inside != name else name
+        raise error.located(name=location if error.name and error.name.startswith("laws") else error.name) from None
 
 
 def _reach(progress: JointTrajectory) -> tuple[float, float]:
@@ -263,14 +263,14 @@ def _reach(progress: JointTrajectory) -> tuple[float, float]:
 
     grid = np.linspace(progress.start, progress.stop, INSTANTS)
     measures = both(grid)
-    peaks, found = local_maxima(measures), measures.max(axis=0)
+    peaks, largest = local_maxima(measures), measures.max(axis=0)
     low, high = grid[np.maximum(peaks - 1, 0)], grid[np.minimum(peaks + 1, INSTANTS - 1)]
     for _ in range(ROUNDS):
         near = np.linspace(low, high, POINTS)
         there = both(near.ravel()).reshape(*near.shape, 2)[:, :, [0, 1], [0, 1]]
-        found, top = np.maximum(found, there.max(axis=(0, 1))), np.argmax(there, axis=0)
+        largest, top = np.maximum(largest, there.max(axis=(0, 1))), np.argmax(there, axis=0)
         low, high = (np.take_along_axis(near, np.clip(top + step, 0, POINTS - 1)[None], axis=0)[0] for step in (-1, 1))
-    return float(-found[0]), float(found[1])
+    return float(-largest[0]), float(largest[1])
 
 
 def _attitude(given: Any, start: float, stop: float) -> Any:
@@ -280,8 +280,8 @@ def _attitude(given: Any, start: float, stop: float) -> Any:
     if isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], str):
         check_sequence(given[0], TrajectoryError, "orientation")
         return given[0], _three("orientation", given[1], ANGLES, start, stop)
-    found = rotation_matrices("orientation", given)
-    if found.shape != (3, 3):
+    rotations = rotation_matrices("orientation", given)
+    if rotations.shape != (3, 3):
         message = "a constant orientation is one quaternion or matrix; ToolPath.through takes one for each instant"
-        raise TrajectoryError(message, name="orientation", value=f"shape {found.shape}")
-    return found
+        raise TrajectoryError(message, name="orientation", value=f"shape {rotations.shape}")
+    return rotations

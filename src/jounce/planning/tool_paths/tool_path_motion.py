@@ -46,13 +46,20 @@ def _along(
     target = dict(zip(names, series, strict=True))
     tool, basis, scale, weights = constants
     equations = PathEquations(tree, tool, basis, scale, weights, *static)
-    found = equations.corrected(guess[0], target)
-    u = equations.series(found.u, found.factor, target, order)
+    corrected = equations.corrected(guess[0], target)
+    u = equations.series(corrected.u, corrected.factor, target, order)
     x, scale = u[:, : equations.count], jnp.asarray(scale)[None, :, None]
     goal = {kind: target[kind] for kind in equations.kinds}
-    _, values, shares = singular_values(found.factor.matrix[: equations.rows, : equations.count])
+    _, values, shares = singular_values(corrected.factor.matrix[: equations.rows, : equations.count])
     missed = task_rows(tree, tool, x * scale, goal)
-    return x * scale, missed, found.first[None], found.last[None], values[None], jnp.swapaxes(shares, 0, 1)[None]
+    return (
+        x * scale,
+        missed,
+        corrected.first[None],
+        corrected.last[None],
+        values[None],
+        jnp.swapaxes(shares, 0, 1)[None],
+    )
 
 
 class ToolPathMotion(Displayed):
@@ -111,9 +118,9 @@ class ToolPathMotion(Displayed):
         names = tuple(series)
         arrays = (predicted(nodes, inside)[:, None], *(_by_instant(series[name]) for name in names))
         constants = (equations.tool, equations.basis, equations.scale, equations.weights)
-        static = (equations.held, equations.kinds, equations.count)
-        found = [np.asarray(x) for x in _along(robot, arrays, constants, (names, static, self.order))]
-        self.q, missed, _, last, values, shares = found
+        static = (equations.fixed_joints, equations.kinds, equations.count)
+        solved = [np.asarray(x) for x in _along(robot, arrays, constants, (names, static, self.order))]
+        self.q, missed, _, last, values, shares = solved
         self.residual: Float[np.ndarray, "time derivative"] = np.abs(missed).max(axis=-1)
         self.singular_values = values[:, 0, :rank]
         self._shares = shares[:, 0, max(rank - 1, 0)]
@@ -166,7 +173,7 @@ class ToolPathMotion(Displayed):
             )
         if jump > JUMP:
             return Status.BRANCH_JUMP, f"the path jumps at t = {time:.6g} s; its laws must be continuous"
-        if equations.has_posture or equations.held:
+        if equations.has_posture or equations.fixed_joints:
             kind, other = (
                 ("posture", "posture, other weights") if equations.has_posture else ("joints held", "law of them")
             )
@@ -249,11 +256,11 @@ class ToolPathMotion(Displayed):
             return in_chunks(lambda some: known(instants[some]), len(instants), BLOCKS, axis=0)
 
         def known(instants: np.ndarray) -> np.ndarray:
-            found = self.at(instants, order)
-            if (found.status != Status.OK).any():
-                bad = int(np.argmax(found.status != Status.OK))
-                raise TrajectoryError(f"there are no coordinates: {found.explain(bad)}", name="time")
-            return found.q
+            motion = self.at(instants, order)
+            if (motion.status != Status.OK).any():
+                bad = int(np.argmax(motion.status != Status.OK))
+                raise TrajectoryError(f"there are no coordinates: {motion.explain(bad)}", name="time")
+            return motion.q
 
         return exact
 
@@ -278,6 +285,6 @@ def _by_instant(series: np.ndarray) -> np.ndarray:
 def _singular(robot: Robot, equations: PathEquations, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return singular values and right singular vectors of a task where it is done."""
     columns = task_columns(robot, equations.tool, (x * equations.scale)[None], equations.kinds, equations.scale)[0]
-    columns = equations.basis.T @ np.concatenate([columns, np.eye(equations.count)[list(equations.held)]])
+    columns = equations.basis.T @ np.concatenate([columns, np.eye(equations.count)[list(equations.fixed_joints)]])
     _, values, shares = np.linalg.svd(columns, full_matrices=False)
     return values, shares

@@ -16,7 +16,7 @@ from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.robot.model.arguments import floats, joints_of
 from jounce.robot.model.robot_size import robot_size
 from jounce.robot.model.tree import Frame, Tree, axes_with_z_along
-from jounce.robot.recursions.kinematics import link_frame, place_of
+from jounce.robot.recursions.kinematics import frame_at, link_frame
 from jounce.shapes import ArrayLike, Numbers
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class Tool(NamedTuple):
 
     Attributes
     ----------
-    place : Frame
+    frame : Frame
         Its point, on the moving body.
     axes : array of shape (3, 3)
         In the frame of the link; the last column is the axis that may have a direction.
@@ -41,7 +41,7 @@ class Tool(NamedTuple):
         What counts as much as 1 rad, m: the size of the robot.
     """
 
-    place: Frame
+    frame: Frame
     axes: Any
     length: Any
 
@@ -62,8 +62,8 @@ def tool_of(robot: AbstractRobot, link: str, point: ArrayLike, axis: ArrayLike) 
     norm = float(np.linalg.norm(axis))
     if not norm:
         raise RobotError("must not be zero", name="axis", value=axis.tolist())
-    place = place_of(robot, link, point)
-    return Tool(place, axes_with_z_along(axis / norm), np.float64(robot_size(robot)))
+    frame = frame_at(robot, link, point)
+    return Tool(frame, axes_with_z_along(axis / norm), np.float64(robot_size(robot)))
 
 
 def task_rows(tree: Tree, tool: Tool, q: Any, goal: Goal) -> Float[Numbers, "order row batch"]:
@@ -72,16 +72,16 @@ def task_rows(tree: Tree, tool: Tool, q: Any, goal: Goal) -> Float[Numbers, "ord
     Rows of the position are in sizes of the robot; those of an orientation are the sine of the angle that is left,
     about its axis; those of a direction are two components of it across the axis.
     """
-    frame = link_frame(tree, q, tool.place)
+    frame = link_frame(tree, q, tool.frame)
     rows = []
     if "position" in goal:
         rows.append((frame.position - Jet(tuple(goal["position"]))) * (1.0 / tool.length))
     if "rotation" in goal:
-        wanted = [Jet(tuple(goal["rotation"][:, :, j])) for j in range(3)]
-        rows.append(total(cross(d, a) for d, a in zip(wanted, frame.axes, strict=True)) * 0.5)
+        targets = [Jet(tuple(goal["rotation"][:, :, j])) for j in range(3)]
+        rows.append(total(cross(d, a) for d, a in zip(targets, frame.axes, strict=True)) * 0.5)
     if "direction" in goal:
-        wanted = Jet(tuple(goal["direction"]))
-        rows += [dot(frame.direction(tool.axes[:, j]), wanted)[None] for j in range(2)]
+        targets = Jet(tuple(goal["direction"]))
+        rows += [dot(frame.direction(tool.axes[:, j]), targets)[None] for j in range(2)]
     return stacked(concatenate(rows))
 
 
@@ -90,7 +90,7 @@ def misses(tree: Tree, tool: Tool, q: Any, goal: Goal) -> Float[Numbers, "row ba
 
     Differences of axes, whose squares add up to that of ``2 sin(angle / 2)`` for an orientation.
     """
-    frame = link_frame(tree, q[None], tool.place)
+    frame = link_frame(tree, q[None], tool.frame)
     rows = []
     if "position" in goal:
         rows.append((frame.position.coefficients[0] - goal["position"][0]) / tool.length)

@@ -60,7 +60,7 @@ def cam_facts(cam: PlateCam) -> dict[str, Any]:
     >>> facts["undercut"], facts["continuous_to"]
     (False, 3)
     """
-    told = cam.continuity
+    continuity_facts = cam.continuity
     return {
         "title": cam.title,
         "follower": "oscillating" if cam.follower.turning else "translating",
@@ -75,14 +75,14 @@ def cam_facts(cam: PlateCam) -> dict[str, Any]:
         "face": None if cam.face is None else [_extreme(end) for end in cam.face],
         "undercut": cam.is_undercut,
         "undercuts": [{"start": x.start, "stop": x.stop, "angle": x.angle, "lost": x.lost} for x in cam.undercuts],
-        "continuous_to": told.smoothness,
-        "derivatives": jump_facts(told),
-        "remark": told.unknown,
+        "continuous_to": continuity_facts.smoothness,
+        "derivatives": jump_facts(continuity_facts),
+        "remark": continuity_facts.unknown,
     }
 
 
-def _extreme(found: Extreme | None) -> dict[str, float] | None:
-    return None if found is None else {"value": found.value, "angle": found.angle}
+def _extreme(extreme: Extreme | None) -> dict[str, float] | None:
+    return None if extreme is None else {"value": extreme.value, "angle": extreme.angle}
 
 
 def cam_words(facts: dict[str, Any], units: ShownUnits) -> str:
@@ -92,8 +92,8 @@ def cam_words(facts: dict[str, Any], units: ShownUnits) -> str:
         label, factor = units.of(unit, name)
         return f"{value * factor:.6g} {label}"
 
-    def told(found: dict[str, float], unit: str, name: str = "") -> str:
-        return f"{worded(found['value'], unit, name)} at {worded(found['angle'], 'rad', 'angle')}"
+    def extreme_words(extreme: dict[str, float], unit: str, name: str = "") -> str:
+        return f"{worded(extreme['value'], unit, name)} at {worded(extreme['angle'], 'rad', 'angle')}"
 
     lift = "rad" if facts["follower"] == "oscillating" else "m"
     lines = [
@@ -103,15 +103,15 @@ def cam_words(facts: dict[str, Any], units: ShownUnits) -> str:
         f"rise: {worded(facts['rise'], lift, 'lift')}",
     ]
     pressed = abs(facts["pressure_angle"]["value"]) > ROUNDING
-    pressure = told(facts["pressure_angle"], "rad", "pressure_angle") if pressed else "zero throughout"
+    pressure = extreme_words(facts["pressure_angle"], "rad", "pressure_angle") if pressed else "zero throughout"
     lines.append(f"largest pressure angle: {pressure}")
     for key, word in (("least_radius", "convex"), ("least_concave_radius", "concave")):
         if facts[key] is not None:
-            lines.append(f"least radius of curvature, {word}: {told(facts[key], 'm')}")
+            lines.append(f"least radius of curvature, {word}: {extreme_words(facts[key], 'm')}")
     if facts["face"] is not None:
         low, high = facts["face"]
         width = worded(high["value"] - low["value"], "m")
-        lines.append(f"face: at least {width} wide, from {told(low, 'm')} to {told(high, 'm')}")
+        lines.append(f"face: at least {width} wide, from {extreme_words(low, 'm')} to {extreme_words(high, 'm')}")
     unit, factor = (lift, 1.0) if lift == "rad" else units.of(lift, "lift")  # a derivative by rad is none of degrees
     jumps = [{**x, "largest": x["largest"] and x["largest"] * factor} for x in facts["derivatives"]]
     law = {
@@ -124,9 +124,9 @@ def cam_words(facts: dict[str, Any], units: ShownUnits) -> str:
     if not facts["undercut"]:
         lines.append("not undercut: the profile gives the follower its law")
     for part in facts["undercuts"]:
-        span = f"from {worded(part['start'], 'rad', 'angle')} to {worded(part['stop'], 'rad', 'angle')}"
+        range_words = f"from {worded(part['start'], 'rad', 'angle')} to {worded(part['stop'], 'rad', 'angle')}"
         most = f"{worded(part['lost'], lift, 'lift')} at {worded(part['angle'], 'rad', 'angle')}"
-        lines.append(f"UNDERCUT {span}: the follower loses up to {most}")
+        lines.append(f"UNDERCUT {range_words}: the follower loses up to {most}")
     if facts["undercut"]:
         lines.append("make the base circle larger, the roller smaller, or the law gentler")
     return "\n".join(lines)

@@ -103,9 +103,9 @@ def curve_facts(curve: Curve) -> dict[str, Any]:
                 "branches": [
                     [
                         {"body": name, "shift": shift.tolist(), "turn": turn.tolist()}
-                        for name, (shift, turn) in way.items()
+                        for name, (shift, turn) in direction.items()
                     ]
-                    for way in curve.directions(number)
+                    for direction in curve.directions(number)
                 ],
             }
             for number, point in enumerate(curve.change_points)
@@ -143,20 +143,20 @@ def curve_tables(facts: Facts) -> list[Table]:
     ]
     points = []
     for number, point in enumerate(facts["change_points"]):
-        for k, way in enumerate(point["branches"]):
-            place = (
+        for k, direction in enumerate(point["branches"]):
+            location = (
                 [str(number), f"{point['arc_length']:.9g}", value_words(point["value"], unit)] if k == 0 else [""] * 3
             )
-            points.append([*place, "this curve" if k == 0 else str(k), _way_words(way)])
+            points.append([*location, "this curve" if k == 0 else str(k), _direction_words(direction)])
         if not point["decided"]:
             points.append([""] * 3 + ["?", "there may be others: the second order does not tell them apart"])
     value = facts["driver"] or ""
-    found = [
+    tables = [
         table("Limit positions", ("arc length", value, "kind"), limits, (0, 1)),
         table("Branches", ("branch", "from", "to", f"least {value}", f"largest {value}"), branches, (1, 2, 3, 4)),
         table("Change points", ("point", "arc length", value, "branch", "direction"), points, (1, 2)),
     ]
-    return [each for each in found if each.rows]
+    return [each for each in tables if each.rows]
 
 
 def value_words(value: float | None, unit: str) -> str:
@@ -168,10 +168,10 @@ def value_words(value: float | None, unit: str) -> str:
     return f"{value:.12g} {unit}".rstrip()
 
 
-def _way_words(way: list[BodyDirection]) -> str:
+def _direction_words(direction: list[BodyDirection]) -> str:
     """Word how bodies move along a branch: those that turn by their turns, others by their shifts."""
     parts = []
-    for body in way:
+    for body in direction:
         turn = np.array(body["turn"])
         if np.linalg.norm(turn) > SMALL:
             size = turn[0] if len(turn) == 1 else np.linalg.norm(turn)

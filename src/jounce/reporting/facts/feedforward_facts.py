@@ -17,20 +17,20 @@ from jounce.reporting.text.tables import Table, number
 REST = 1e-6  # of the largest velocity of a motor: less is at rest
 
 
-def feedforward_words(found: Feedforward, held: Mapping[str, float]) -> str:
+def feedforward_words(motion: Feedforward, resting: Mapping[str, float]) -> str:
     """Word what has drives, when, and with which velocities motors begin."""
-    elastic = [name for name, drive in found.drives.items() if drive.elastic]
-    rigid = [name for name in found.names if name not in elastic]
+    elastic = [name for name, drive in motion.drives.items() if drive.elastic]
+    rigid = [name for name in motion.names if name not in elastic]
     lines = [
-        f"{found.title}: {count(len(found.names), 'drive')}, {len(elastic)} of them elastic",
-        f"t = {found.time[0]:g} s to {found.time[-1]:g} s, {count(len(found.time), 'instant')}",
+        f"{motion.title}: {count(len(motion.names), 'drive')}, {len(elastic)} of them elastic",
+        f"t = {motion.time[0]:g} s to {motion.time[-1]:g} s, {count(len(motion.time), 'instant')}",
     ]
     if rigid:
         lines.append(f"rigid: {', '.join(rigid)}")
-    if held:
-        lines.append(f"not in the trajectory, held still: {', '.join(held)}")
-    velocity, largest = found.start[1, 1], np.abs(found.position[:, 1]).max(axis=0)
-    moving = [name for name, v, most in zip(found.names, velocity, largest, strict=True) if abs(v) > REST * most]
+    if resting:
+        lines.append(f"not in the trajectory, held still: {', '.join(resting)}")
+    velocity, largest = motion.start[1, 1], np.abs(motion.position[:, 1]).max(axis=0)
+    moving = [name for name, v, most in zip(motion.names, velocity, largest, strict=True) if abs(v) > REST * most]
     if moving:
         lines.append(f"already moving at the start, as the trajectory does not begin at rest: {', '.join(moving)}")
     return "\n".join(lines)
@@ -55,29 +55,29 @@ def drives_table(report: LimitRows) -> Table:
     return Table("", headings, rows, (3, 4, 5, 6), True, marks, (5,), "broken" if any(marks) else "")
 
 
-def expansion_table(found: Feedforward) -> Table | None:
+def expansion_table(motion: Feedforward) -> Table | None:
     """Return what the regular expansion in the damping misses after each order; None where nothing is damped."""
     rows = [
-        [name, f"{1e3 * drive.time_constant:.4g}", *(f"{x:.1e}" for x in found.expansion_errors[:, k])]
-        for k, name in enumerate(found.names)
-        if (drive := found.drives.get(name)) is not None and drive.time_constant > 0
+        [name, f"{1e3 * drive.time_constant:.4g}", *(f"{x:.1e}" for x in motion.expansion_errors[:, k])]
+        for k, name in enumerate(motion.names)
+        if (drive := motion.drives.get(name)) is not None and drive.time_constant > 0
     ]
     if not rows:
         return None
-    orders = [f"order {k}" for k in range(len(found.expansion_errors))]
+    orders = [f"order {k}" for k in range(len(motion.expansion_errors))]
     title = "Damped springs: time constant D/K, and what the expansion in it misses of the largest deflection"
     return Table(title, ("drive", "D/K in ms", *orders), rows, tuple(range(1, 2 + len(orders))))
 
 
 def drives_verdict(report: LimitRows) -> str:
-    """Word whether limits of drives are kept, and the place nearest to one, or that breaks one most."""
+    """Word whether limits of drives are kept, and the quantity nearest to one, or that breaks one most."""
     worst = report.worst
     if worst is None:
         return "No limits are given."
-    place = f"{worst.joint} {worst.quantity}, {worst.ratio:.4g} of its limit at t = {worst.time:.5g} s"
+    location = f"{worst.joint} {worst.quantity}, {worst.ratio:.4g} of its limit at t = {worst.time:.5g} s"
     if report.kept:
-        return f"All limits kept ({len(report.limited)}).\nClosest: {place}"
-    return f"{len(report.broken)} of {count(len(report.limited), 'limit')} broken.\nWorst: {place}"
+        return f"All limits kept ({len(report.limited)}).\nClosest: {location}"
+    return f"{len(report.broken)} of {count(len(report.limited), 'limit')} broken.\nWorst: {location}"
 
 
 def link_error_words(errors: LinkErrors) -> str:
@@ -93,46 +93,46 @@ def _largest(values: np.ndarray, errors: LinkErrors) -> str:
     lost = ~np.isfinite(values).all(axis=1)
     if lost.any():
         return f"more than can be followed beyond t = {errors.time[np.argmax(lost)]:g} s"
-    place = int(np.argmax(values.max(axis=0)))
-    return f"{values[:, place].max():.2g} {errors.units[place]} ({errors.names[place]})"
+    column = int(np.argmax(values.max(axis=0)))
+    return f"{values[:, column].max():.2g} {errors.units[column]} ({errors.names[column]})"
 
 
 def feedforward_result(
-    found: Feedforward, file: Path, trajectory: Path | None, errors: LinkErrors | None, written: Path | None
+    motion: Feedforward, file: Path, trajectory: Path | None, errors: LinkErrors | None, written: Path | None
 ) -> dict[str, Any]:
     """Return what `jounce feedforward` tells, as plain data in SI units."""
     names = {"worst": "value", "at": "time"}
     keys = ("joint", "quantity", "unit", "worst", "limit", "ratio", "at", "broken")
-    report = found.report
+    report = motion.report
     drives = []
-    for k, name in enumerate(found.names):
-        drive = found.drives.get(name)
+    for k, name in enumerate(motion.names):
+        drive = motion.drives.get(name)
         drives.append(
             {
                 "name": name,
                 "elastic": drive is not None and drive.elastic,
                 "time_constant": 0.0 if drive is None else drive.time_constant,
-                "expansion_errors": found.expansion_errors[:, k],
-                "velocity_at_start": found.start[1, 1, k],
+                "expansion_errors": motion.expansion_errors[:, k],
+                "velocity_at_start": motion.start[1, 1, k],
             }
         )
-    told = None
+    error_facts = None
     if errors is not None:
         rigid = [None] * len(errors.names) if errors.rigid is None else errors.rigid.max(axis=0)
-        told = [
+        error_facts = [
             {"name": name, "unit": unit, "error": exact, "error_without_springs": other}
             for name, unit, exact, other in zip(
                 errors.names, errors.units, errors.exact.max(axis=0), rigid, strict=True
             )
         ]
     return {
-        "system": found.title,
+        "system": motion.title,
         "file": file,
         "trajectory": trajectory,
-        "time": {"start": found.time[0], "stop": found.time[-1], "count": len(found.time)},
+        "time": {"start": motion.time[0], "stop": motion.time[-1], "count": len(motion.time)},
         "drives": drives,
         "kept": report.kept,
         "limits": [{key: getattr(row, names.get(key, key)) for key in keys} for row in report.rows],
-        "simulated": told,
+        "simulated": error_facts,
         "written": written,
     }

@@ -106,40 +106,40 @@ class StartingState:
         return facts_of(independent(columns, equations) if whole else mobility(self.mechanism, self.instant))
 
     def _assembled(self) -> tuple[dict[str, Any] | None, dict[str, Any]]:
-        told = {"status": "assembled", "message": None, "at": self.instant, "open": None}
+        facts = {"status": "assembled", "message": None, "at": self.instant, "open": None}
         model = build(initial_as_drivers(self.mechanism)) if self.mechanism.initial else self.model
         if not model.rows:
-            return model.guess, told
+            return model.guess, facts
         model, trial = settled(model, self.instant, TOLERANCE)
-        told["open"] = float(np.max(np.abs(trial.gaps))) if np.isfinite(trial.gaps).all() else None
+        facts["open"] = float(np.max(np.abs(trial.gaps))) if np.isfinite(trial.gaps).all() else None
         try:
             check_assembled(model, trial, self.instant)
         except JounceError as error:
-            return None, told | {"status": "open", "message": error.message}
+            return None, facts | {"status": "open", "message": error.message}
         warn_of_parts_turned_over(model, trial)
-        return trial.coordinates, told
+        return trial.coordinates, facts
 
     def _counted(self) -> dict[str, Any]:
-        mechanism, model, place = self.mechanism, self.model, self.coordinates
+        mechanism, model, coordinates = self.mechanism, self.model, self.coordinates
         columns = int(model.system.shape[1])
-        if place is not None:
-            model, _ = with_reference(dataclasses.replace(model, guess=place), place, self.instant)
+        if coordinates is not None:
+            model, _ = with_reference(dataclasses.replace(model, guess=coordinates), coordinates, self.instant)
         trial = assemble_from_guess(model, self.instant, TOLERANCE) if model.rows else None
-        told = message = None
+        facts = message = None
         pattern = model.system.pattern
         jacobian = HostJacobian.of(pattern, np.zeros(pattern.entry_count))
         if trial is not None and trial.jacobian.finite().all():
             self.here = trial.jacobian
-            model, told = redundancy_of(model, trial, self.instant)
-            jacobian = told.jacobian
+            model, facts = redundancy_of(model, trial, self.instant)
+            jacobian = facts.jacobian
             try:
-                check_mobility(model, told)
+                check_mobility(model, facts)
             except MobilityError as error:
                 message = error.message
         drives = np.array([name.startswith("drivers.") for name in model.rows], bool)
         freedom, rank = columns - jacobian.take(~drives).rank, jacobian.rank
-        repeated = () if told is None else told.repetitions
-        self.is_singular = told is not None and told.is_singular
+        repeated = () if facts is None else facts.repetitions
+        self.is_singular = facts is not None and facts.is_singular
         return {
             "coordinates": columns,
             "equations": len(model.rows),
@@ -148,7 +148,7 @@ class StartingState:
             "of_joints": freedom,
             "left": columns - rank,
             "redundant": len(model.rows) - rank,
-            "redundant_among": [] if told is None else list(told.among),
+            "redundant_among": [] if facts is None else list(facts.among),
             "repeated": [{**x._asdict(), "of": list(x.of)} for x in repeated],
             "moving": freely_moving(model, jacobian.free_directions).split(", ") if columns > rank else [],
             "words": freedom_words(freedom, mechanism.drivers),

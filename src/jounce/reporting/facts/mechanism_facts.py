@@ -212,8 +212,8 @@ def grid_facts(instants: Float[np.ndarray, " time"]) -> dict[str, Any]:
     >>> grid_facts(np.array([0.0, 0.5, 1.0]))
     {'start': 0.0, 'stop': 1.0, 'count': 3}
     """
-    found = {"start": float(instants[0]), "stop": float(instants[-1]), "count": len(instants)}
-    return found | ({"remark": remark} if (remark := last_step_words(instants)) else {})
+    facts = {"start": float(instants[0]), "stop": float(instants[-1]), "count": len(instants)}
+    return facts | ({"remark": remark} if (remark := last_step_words(instants)) else {})
 
 
 def _numbers(mechanism: Mechanism, value: Any, size: int) -> list[float] | None:
@@ -224,7 +224,7 @@ def _numbers(mechanism: Mechanism, value: Any, size: int) -> list[float] | None:
 
 def _parameters(mechanism: Mechanism, path: str | PathLike[str] | None) -> list[dict[str, Any]]:
     given = read_source(path).data.get("parameters") or {} if path is not None else mechanism.parameters
-    found = []
+    rows = []
     for name, value in mechanism.parameter_values.items():
         written = given.get(name)
         try:
@@ -233,9 +233,9 @@ def _parameters(mechanism: Mechanism, path: str | PathLike[str] | None) -> list[
             dimension = None
         unit = None if dimension is None else unit_of_dimension(dimension)
         text = written if isinstance(written, str) else getattr(written, "text", None)
-        found.append({"name": name, "value": float(value), "unit": unit, "written": text})
+        rows.append({"name": name, "value": float(value), "unit": unit, "written": text})
     order = list(mechanism.parameters)
-    return sorted(found, key=lambda entry: order.index(entry["name"]))
+    return sorted(rows, key=lambda entry: order.index(entry["name"]))
 
 
 def unit_of_dimension(dimension: Dimension) -> str:
@@ -259,14 +259,14 @@ def _power(base: str, power: int | Fraction) -> str:
 
 
 def _bodies(mechanism: Mechanism, model: Model, coordinates: dict[str, Any] | None) -> list[dict[str, Any]]:
-    components, found = POSITION_COMPONENTS[mechanism.space], []
+    components, rows = POSITION_COMPONENTS[mechanism.space], []
     attitude = "angle" if components == 2 else "quaternion"
     for k, (name, body) in enumerate(mechanism.bodies.items(), start=1):
         mass, center, inertia = body_mass(name, body, mechanism.parameter_values, components, solid=False)
         given = body.mass is not None
         guess = _pose(model.guess, k, attitude)
         pose = None if coordinates is None else _pose(coordinates, k, attitude)
-        found.append({
+        rows.append({
             "name": name,
             "mass": float(mass) if given else None,
             "center_of_mass": np.asarray(center, float).tolist() if given else None,
@@ -275,7 +275,7 @@ def _bodies(mechanism: Mechanism, model: Model, coordinates: dict[str, Any] | No
             "pose": pose,
             "moved": None if pose is None else _moved(guess, pose, attitude),
         })  # fmt: skip
-    return found
+    return rows
 
 
 def _pose(coordinates: dict[str, Any], k: int, attitude: str) -> dict[str, Any]:
@@ -295,13 +295,13 @@ def _moved(guess: dict[str, Any], pose: dict[str, Any], attitude: str) -> dict[s
 
 
 def _element(name: str, element: Any) -> dict[str, Any]:
-    found: dict[str, Any] = {"name": name, "type": element.type_name or type(element).__name__}
-    found["bodies"] = list(element.bodies)
+    facts: dict[str, Any] = {"name": name, "type": element.type_name or type(element).__name__}
+    facts["bodies"] = list(element.bodies)
     fields = value_fields(type(element))
     for key in ("motion", "law"):
         if key in fields:
-            found[key] = _law_words(getattr(element, key))
-    return found
+            facts[key] = _law_words(getattr(element, key))
+    return facts
 
 
 def _law_words(law: Any) -> str:

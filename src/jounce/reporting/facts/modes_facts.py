@@ -99,11 +99,11 @@ def equilibrium_tables(rest: Equilibrium) -> list[Table]:
         [name, vector(np.ravel(values).tolist()), rest.mechanism.outputs[name].unit]
         for name, values in rest.outputs.items()
     ]
-    found = [
+    tables = [
         table("Bodies, at rest", ("body", "position/m", attitude), bodies),
         table("Outputs", ("output", "value", "unit"), outputs),
     ]
-    return [each for each in found if each.rows]
+    return [each for each in tables if each.rows]
 
 
 def modes_table(modes: Modes) -> Table:
@@ -111,7 +111,7 @@ def modes_table(modes: Modes) -> Table:
     rows = []
     for row in modes.rows:
         swings, rate = row["kind"] == "oscillation" or row["damped_frequency"] > 0, abs(row["eigenvalue"].real)
-        told = "" if row["kind"] == "oscillation" else row["kind"].replace("rigid", "free")
+        kind = "" if row["kind"] == "oscillation" else row["kind"].replace("rigid", "free")
         rows.append(
             [
                 str(row["mode"]),
@@ -119,7 +119,7 @@ def modes_table(modes: Modes) -> Table:
                 number(row["damping_ratio"]) if swings else "-",
                 "" if rate <= 1e-12 * abs(row["eigenvalue"]) or not rate else number(1 / rate),
                 f"{row['moves_most']}, {100 * row['share']:.0f} %",
-                told,
+                kind,
             ]
         )
     headings = ("mode", "frequency/Hz", "damping ratio", "time constant/s", "moves most", "")

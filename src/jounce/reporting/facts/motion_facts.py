@@ -96,7 +96,7 @@ def motion_facts(motion: Motion | Stretches) -> dict[str, Any]:
     failed = np.flatnonzero(motion.status != Status.OK)
     rows = build(with_outputs_held(mechanism)).rows
     drives = sum(name.startswith("drivers.") for name in rows)
-    span = {"start": float(times[0]), "stop": float(times[-1])}
+    interval = {"start": float(times[0]), "stop": float(times[-1])}
     facts = {
         "title": mechanism.title,
         "space": mechanism.space,
@@ -105,7 +105,7 @@ def motion_facts(motion: Motion | Stretches) -> dict[str, Any]:
         "drivers": list(mechanism.drivers),
         "forces": list(mechanism.forces),
         "order": motion.order,
-        "time": span | {"count": len(times), "solved": len(times) - len(failed)},
+        "time": interval | {"count": len(times), "solved": len(times) - len(failed)},
         "failures": [
             {"index": k, "time": times[k], "status": Status(motion.status[k]).name, "fault": motion.faults.get(k)}
             for k in failed.tolist()
@@ -131,8 +131,8 @@ def _remarks(motion: Motion | Stretches) -> list[str]:
         where = ", ".join(f"{instant:g} s" for instant in instants[:6]) + (", ..." if len(instants) > 6 else "")
         remark = f"grows without bound towards t = {where}, its extremes say only how near an instant comes"
         names.setdefault(remark, []).append(name)
-    told = [f"{', '.join(those)}: {remark}" for remark, those in names.items()]
-    return [*filter(None, [last_step_words(motion.time)]), *told]
+    remarks = [f"{', '.join(those)}: {remark}" for remark, those in names.items()]
+    return [*filter(None, [last_step_words(motion.time)]), *remarks]
 
 
 def _simulated(motion: Simulation) -> dict[str, Any]:

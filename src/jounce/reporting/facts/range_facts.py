@@ -67,7 +67,7 @@ def range_facts(mechanism: Mechanism, driver: str | None = None) -> dict[str, An
         transmission = {"smallest": least, "smallest_at": least_at, "largest": most, "largest_at": most_at}
     sizes, values = _on_branch(curve)
     worst = int(np.argmin(sizes))
-    found = {
+    facts = {
         "driver": curve.driver,
         "unit": curve.unit,
         "low": None if whole else low,
@@ -81,7 +81,7 @@ def range_facts(mechanism: Mechanism, driver: str | None = None) -> dict[str, An
         "smallest_singular_value_at": float(values[worst]),
         "change_points": [curve.value(point.arc_length) for point in curve.change_points],
     }
-    return found | {"warnings": _warnings(found, whole, float(np.median(sizes)))}
+    return facts | {"warnings": _warnings(facts, whole, float(np.median(sizes)))}
 
 
 def _is_limit(curve: Curve, value: float) -> bool:
@@ -98,43 +98,45 @@ def _on_branch(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
     return curve.smallest_singular_values[inside], curve.values[inside, 0]
 
 
-def _warnings(found: Facts, whole: bool, median: float) -> list[str]:
-    told = []
-    unit = found["unit"]
-    if (transmission := found["transmission"]) is not None and transmission["smallest"] < POOR_ANGLE:
+def _warnings(facts: Facts, whole: bool, median: float) -> list[str]:
+    messages = []
+    unit = facts["unit"]
+    if (transmission := facts["transmission"]) is not None and transmission["smallest"] < POOR_ANGLE:
         where = value_words(transmission["smallest_at"], unit)
         angle = f"{math.degrees(transmission['smallest']):.3g} deg"
-        told.append(f"poor transmission: the transmission angle goes down to {angle}, at {found['driver']} = {where}")
-    elif found["transmission"] is None and whole and found["smallest_singular_value"] < POOR_SHARE * median:
-        where = value_words(found["smallest_singular_value_at"], unit)
-        told.append(f"poor transmission: close to a singular position at {found['driver']} = {where}")
-    ends = " and ".join(value_words(found[end], unit) for end in ("low", "high") if found[f"{end}_is_dead_point"])
+        messages.append(
+            f"poor transmission: the transmission angle goes down to {angle}, at {facts['driver']} = {where}"
+        )
+    elif facts["transmission"] is None and whole and facts["smallest_singular_value"] < POOR_SHARE * median:
+        where = value_words(facts["smallest_singular_value_at"], unit)
+        messages.append(f"poor transmission: close to a singular position at {facts['driver']} = {where}")
+    ends = " and ".join(value_words(facts[end], unit) for end in ("low", "high") if facts[f"{end}_is_dead_point"])
     if ends:
-        told.append(f"{found['driver']} turns back at dead points: {ends}; keep its law well inside")
-    if found["change_points"]:
-        where = ", ".join(value_words(value, unit) for value in found["change_points"])
-        told.append(f"branches cross at change points: {found['driver']} = {where}")
-    return told
+        messages.append(f"{facts['driver']} turns back at dead points: {ends}; keep its law well inside")
+    if facts["change_points"]:
+        where = ", ".join(value_words(value, unit) for value in facts["change_points"])
+        messages.append(f"branches cross at change points: {facts['driver']} = {where}")
+    return messages
 
 
-def range_words(found: Facts) -> str:
+def range_words(facts: Facts) -> str:
     """Word the range of a driver and how well it transmits."""
-    unit, driver = found["unit"], found["driver"]
+    unit, driver = facts["unit"], facts["driver"]
     lines = ["Range"]
-    if found["low"] is None:
+    if facts["low"] is None:
         lines.append(f"  {driver} makes whole turns on this circuit")
     else:
-        lines.append(f"  {driver} from {value_words(found['low'], unit)} to {value_words(found['high'], unit)}")
+        lines.append(f"  {driver} from {value_words(facts['low'], unit)} to {value_words(facts['high'], unit)}")
         lines += [
             f"  (its {end} value is as far as the curve was followed)"
             for end, key in (("least", "low"), ("largest", "high"))
-            if not found[f"{key}_is_dead_point"]
+            if not facts[f"{key}_is_dead_point"]
         ]
-    if found["type"]:
-        lines.append(f"  {found['type']}")
-    if (transmission := found["transmission"]) is not None:
+    if facts["type"]:
+        lines.append(f"  {facts['type']}")
+    if (transmission := facts["transmission"]) is not None:
         least, most = (math.degrees(transmission[end]) for end in ("smallest", "largest"))
         lines.append(f"  transmission angle from {least:.6g} deg to {most:.6g} deg")
-    smallest = value_words(found["smallest_singular_value_at"], unit)
-    lines.append(f"  smallest singular value {found['smallest_singular_value']:.3g}, at {driver} = {smallest}")
-    return "\n".join([*lines, *(f"  warning: {warning}" for warning in found["warnings"])])
+    smallest = value_words(facts["smallest_singular_value_at"], unit)
+    lines.append(f"  smallest singular value {facts['smallest_singular_value']:.3g}, at {driver} = {smallest}")
+    return "\n".join([*lines, *(f"  warning: {warning}" for warning in facts["warnings"])])

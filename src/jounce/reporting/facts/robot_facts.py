@@ -152,9 +152,9 @@ def inspected_robot(robot: Robot, path: str | PathLike[str] | None = None) -> di
         message = error.message
     for closure in facts["closures"]:
         name = closure["name"]
-        kept, rest = (len(part) for part in wrenches[name]) if name in wrenches else (None, None)
-        borne += kept or 0
-        closure.update(equations=kept, redundant=rest)
+        transmitted, rest = (len(part) for part in wrenches[name]) if name in wrenches else (None, None)
+        borne += transmitted or 0
+        closure.update(equations=transmitted, redundant=rest)
     coordinates = len(robot.joint_names)
     left = None if message else coordinates - borne
     words = "unknown" if left is None else freedom_words(left, ())

@@ -18,17 +18,17 @@ Column = tuple[str, str, int]
 """An output, a component or nothing, and a derivative."""
 
 
-def columns_of(spread: xarray.Dataset, wanted: Sequence[Column] | None) -> list[Column]:
+def columns_of(spread: xarray.Dataset, selection: Sequence[Column] | None) -> list[Column]:
     """Return the columns that are meant, one for each component; all of the outputs unless some are wanted."""
     outputs = [str(name) for name in spread.data_vars if f"{name}_peak" in spread.data_vars]
     levels = [int(order) for order in spread["derivative"].values]
-    asked = [(name, "", order) for name in outputs for order in levels] if wanted is None else list(wanted)
-    found = []
+    asked = [(name, "", order) for name in outputs for order in levels] if selection is None else list(selection)
+    columns = []
     for name, component, order in asked:
         axes = [dim for dim in spread[name].dims if dim not in ("time", "derivative")]
         labels = ["".join(map(str, x)) for x in itertools.product(*(spread[axis].values for axis in axes))]
-        found += [(name, label, order) for label in labels if component in ("", label)]
-    return list(dict.fromkeys(found))
+        columns += [(name, label, order) for label in labels if component in ("", label)]
+    return list(dict.fromkeys(columns))
 
 
 def spread_facts(spread: xarray.Dataset, columns: Sequence[Column]) -> dict[str, Any]:
@@ -50,7 +50,7 @@ def _facts(spread: Any, column: Column, names: Sequence[str]) -> dict[str, Any]:
     widest = of("std")
     widest = of("linear_std") if widest is None else widest
     at = 0 if widest is None or np.isnan(widest).all() else int(np.nanargmax(widest))
-    found: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "output": f"{name}_{component}" if component else name,
         "derivative": order,
         "unit": derivative_unit(spread[name].attrs["units"], order),
@@ -59,26 +59,26 @@ def _facts(spread: Any, column: Column, names: Sequence[str]) -> dict[str, Any]:
     }
     for kind in ("linear_std", "std", "low", "high"):
         values = of(kind)
-        found[kind] = None if values is None else float(values[at])
+        facts[kind] = None if values is None else float(values[at])
     for kind in ("peak", "peak_mean", "peak_std", "peak_low", "peak_high"):
         values = of(kind)
-        found[kind] = None if values is None else float(values)
+        facts[kind] = None if values is None else float(values)
     share = of("share")
-    found["share"] = None if share is None else dict(zip(names, share[:, at].tolist(), strict=True))
+    facts["share"] = None if share is None else dict(zip(names, share[:, at].tolist(), strict=True))
     for kind in ("first_order", "total_order"):
         values = of(f"peak_{kind}")
-        found[f"peak_{kind}"] = None if values is None else dict(zip(names, values.tolist(), strict=True))
-    return found
+        facts[f"peak_{kind}"] = None if values is None else dict(zip(names, values.tolist(), strict=True))
+    return facts
 
 
 def chosen(spread: xarray.Dataset, variable: str, column: Column) -> np.ndarray:
     """Return what a variable holds of a column: numbers over time, for each parameter, or one."""
     _, component, order = column
-    found = spread[variable].sel(derivative=order)
-    axes = [dim for dim in found.dims if dim not in ("time", "parameter")]
-    labels = ["".join(map(str, x)) for x in itertools.product(*(found[axis].values for axis in axes))]
-    kept = [dim for dim in ("parameter", "time") if dim in found.dims]
-    values = found.transpose(*axes, *kept).values
+    data = spread[variable].sel(derivative=order)
+    axes = [dim for dim in data.dims if dim not in ("time", "parameter")]
+    labels = ["".join(map(str, x)) for x in itertools.product(*(data[axis].values for axis in axes))]
+    dims = [dim for dim in ("parameter", "time") if dim in data.dims]
+    values = data.transpose(*axes, *dims).values
     return np.asarray(values.reshape(-1, *values.shape[len(axes) :])[labels.index(component)])
 
 
@@ -88,12 +88,12 @@ def spread_summary(facts: dict[str, Any], name: str, samples: int) -> str:
     lines = [f"{name}: standard deviations (SI) {', '.join(parts)}"]
     if samples:
         solved = facts["solved"]
-        told = (
+        note = (
             "all were solved"
             if solved == samples
             else f"at some instants only {solved} were solved, the rest is left out"
         )
-        lines.append(f"  {samples} designs, of which {told}")
+        lines.append(f"  {samples} designs, of which {note}")
     return "\n".join(lines)
 
 
@@ -113,8 +113,8 @@ def index_table(facts: dict[str, Any]) -> Table:
     rows = []
     for x in facts["spread"]:
         first, total = x["peak_first_order"], x["peak_total_order"]
-        told = [f"{name} {number(round(first[name], 4))} / {number(round(total[name], 4))}" for name in first]
-        rows.append([x["output"], str(x["derivative"]), number(x["peak"]), number(x["peak_std"]), ", ".join(told)])
+        cells = [f"{name} {number(round(first[name], 4))} / {number(round(total[name], 4))}" for name in first]
+        rows.append([x["output"], str(x["derivative"]), number(x["peak"]), number(x["peak_std"]), ", ".join(cells)])
     return Table(
         "Peaks", ("output", "derivative", "nominal", "std", "index of first order / total"), rows, (1, 2, 3), True
     )

@@ -388,8 +388,8 @@ def result_schema() -> dict[str, Any]:
 
 def _schema(kind: Any) -> dict[str, Any]:
     """Return the schema of a type, whole: each part in its place."""
-    found = TypeAdapter(kind).json_schema(mode="serialization", schema_generator=_Closed)
-    parts = found.pop("$defs", {})
+    json_schema = TypeAdapter(kind).json_schema(mode="serialization", schema_generator=_Closed)
+    parts = json_schema.pop("$defs", {})
 
     def whole(schema: Any) -> Any:
         if isinstance(schema, dict):
@@ -397,4 +397,4 @@ def _schema(kind: Any) -> dict[str, Any]:
             return whole(parts[part]) if part else {key: whole(entry) for key, entry in schema.items()}
         return [whole(entry) for entry in schema] if isinstance(schema, list) else schema
 
-    return whole(found)
+    return whole(json_schema)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits.limit_report import LimitReport
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
-from jounce.dynamics.limits.trajectories import told_drives
+from jounce.dynamics.limits.trajectories import drives_note
 from jounce.errors import UNSET, JounceError, show_value
 from jounce.kinematics import Motion, Stretches
 from jounce.reporting.facts.mechanism_facts import grid_facts
@@ -59,31 +59,37 @@ def result_json(command: str, data: Mapping[str, Any]) -> str:
 
 def complaint(kind: str, problem: object) -> str:
     """Return an error or a warning as JSON in one line: its kind, message, file, line, name and value."""
-    told: dict[str, Any] = {"kind": type(problem).__name__ if isinstance(problem, Exception) else "Error"}
+    record: dict[str, Any] = {"kind": type(problem).__name__ if isinstance(problem, Exception) else "Error"}
     cause = problem.args[0] if isinstance(problem, Exception) and problem.args else None
-    found = cause if isinstance(cause, JounceError) else problem
-    if isinstance(found, JounceError):
-        told["kind"] = type(found).__name__
-        value = None if found.value is UNSET else plain(found.value)
-        place = None if found.path is None else str(found.path)
-        told |= {"message": found.message, "file": place, "line": found.line, "name": found.name, "value": value}
+    cause_or_problem = cause if isinstance(cause, JounceError) else problem
+    if isinstance(cause_or_problem, JounceError):
+        record["kind"] = type(cause_or_problem).__name__
+        value = None if cause_or_problem.value is UNSET else plain(cause_or_problem.value)
+        path = None if cause_or_problem.path is None else str(cause_or_problem.path)
+        record |= {
+            "message": cause_or_problem.message,
+            "file": path,
+            "line": cause_or_problem.line,
+            "name": cause_or_problem.name,
+            "value": value,
+        }
     else:
-        told |= {"message": str(found), "file": None, "line": None, "name": None, "value": None}
-    told["text"] = " ".join(str(found).split())
-    return json.dumps({kind: told}, allow_nan=False)
+        record |= {"message": str(cause_or_problem), "file": None, "line": None, "name": None, "value": None}
+    record["text"] = " ".join(str(cause_or_problem).split())
+    return json.dumps({kind: record}, allow_nan=False)
 
 
 def motion_result(motion: Motion | Stretches, file: Path, written: Path | None, refine: bool = True) -> dict[str, Any]:
     """Return what `jounce run` and `jounce simulate` tell of a motion."""
-    told = [told_peak(peak) for peak in peaks(motion, refine=refine)]
-    return {"file": file, **motion_facts(motion), "peaks": told, "written": written}
+    peak_records = [peak_facts(peak) for peak in peaks(motion, refine=refine)]
+    return {"file": file, **motion_facts(motion), "peaks": peak_records, "written": written}
 
 
-def told_peak(peak: Peak) -> dict[str, Any]:
-    """Return what is told of a peak, in SI."""
-    told = dataclasses.asdict(peak)
-    del told["size"]
-    return told
+def peak_facts(peak: Peak) -> dict[str, Any]:
+    """Return the facts of a peak, in SI."""
+    record = dataclasses.asdict(peak)
+    del record["size"]
+    return record
 
 
 def limits_result(
@@ -111,7 +117,7 @@ def limits_result(
 
 def torques_result(
     dataset: xarray.Dataset,
-    found: Iterable[Peak],
+    peaks_found: Iterable[Peak],
     motion: JointTrajectory,
     ends: Sequence[TrajectoryEnd],
     files: tuple[Path, Path],
@@ -119,7 +125,7 @@ def torques_result(
 ) -> dict[str, Any]:
     """Return what `jounce torques` tells of a robot on a trajectory."""
     (robot, trajectory), times = files, dataset["time"].values
-    told = [told_peak(peak) for peak in found]
+    peak_records = [peak_facts(peak) for peak in peaks_found]
     return {
         "robot": dataset.attrs["title"],
         "file": robot,
@@ -127,8 +133,8 @@ def torques_result(
         "rates": dataset.sizes["derivative"] - 1,
         "time": grid_facts(times),
         "held": [name for name in dataset.data_vars if name not in motion.names],
-        "drives": dataset.attrs["drives"] == told_drives(True),
-        "peaks": [{"joint": peak.pop("output"), **peak} for peak in told],
+        "drives": dataset.attrs["drives"] == drives_note(True),
+        "peaks": [{"joint": peak.pop("output"), **peak} for peak in peak_records],
         "ends": ends_facts(ends),
         "between": between_facts(motion),
         "written": written,

@@ -60,22 +60,22 @@ def law_facts(mechanism: Mechanism, first: float, last: float) -> list[dict[str,
     >>> facts["of"], facts["continuous_to"], facts["derivatives"][4]["jumps"]
     ('ram_y', 3, 6)
     """
-    led, held, found = led_outputs(mechanism), with_outputs_held(mechanism), []
-    for name, driver in held.drivers.items():
+    led, fixed, facts = led_outputs(mechanism), with_outputs_held(mechanism), []
+    for name, driver in fixed.drivers.items():
         motion = getattr(driver, "motion", None)
         if motion is None:
             continue
         law = resolve_motion(motion, mechanism.parameter_values)
-        told = continuity(law, first, last)
-        found.append({
+        smoothness = continuity(law, first, last)
+        facts.append({
             "driver": name,
             "of": led[name].output if name in led else name,
             "unit": "rad" if is_turning(driver) else "m",
-            "continuous_to": told.smoothness,
-            "derivatives": jump_facts(told),
-            "remark": "; ".join(filter(None, (told.unknown, _uneven_repeat(law, held)))),
+            "continuous_to": smoothness.smoothness,
+            "derivatives": jump_facts(smoothness),
+            "remark": "; ".join(filter(None, (smoothness.unknown, _uneven_repeat(law, fixed)))),
         })  # fmt: skip
-    return found
+    return facts
 
 
 def _uneven_repeat(law: AbstractMotion, mechanism: Mechanism) -> str:
@@ -83,30 +83,30 @@ def _uneven_repeat(law: AbstractMotion, mechanism: Mechanism) -> str:
     own, leader = law.parts if isinstance(law, FollowingMotion) and law.parts else (None, None)
     if not isinstance(own, SplineMotion) or own.beyond != "repeat":
         return ""
-    span = float(own.stop) - float(own.breakpoints[0])
-    turns = max(span, TURN) / min(span, TURN)
+    period = float(own.stop) - float(own.breakpoints[0])
+    turns = max(period, TURN) / min(period, TURN)
     if abs(turns - round(turns)) <= WHOLE * turns:
         return ""
     for name, driver in mechanism.drivers.items():
         motion = getattr(driver, "motion", None)
         if motion is not None and is_turning(driver) and _same(motion, leader, mechanism.parameter_values):
-            return f"repeats every {math.degrees(span):.6g} deg of {name}, and so moves on it from turn to turn"
+            return f"repeats every {math.degrees(period):.6g} deg of {name}, and so moves on it from turn to turn"
     return ""
 
 
 def _same(motion: Any, law: AbstractMotion | None, parameters: Mapping[str, Any]) -> bool:
     """Tell whether what a driver has for a law is a law."""
-    found = resolve_motion(motion, parameters)
-    if isinstance(found, ExpressionMotion) and isinstance(law, ExpressionMotion):
-        return found.expression == law.expression
-    return found is law or bool(eqx.tree_equal(found, law))
+    resolved = resolve_motion(motion, parameters)
+    if isinstance(resolved, ExpressionMotion) and isinstance(law, ExpressionMotion):
+        return resolved.expression == law.expression
+    return resolved is law or bool(eqx.tree_equal(resolved, law))
 
 
-def jump_facts(told: Continuity) -> list[dict[str, Any]]:
+def jump_facts(smoothness: Continuity) -> list[dict[str, Any]]:
     """Return the jumps of each derivative of a law: JumpFacts."""
     return [
         {"order": x.order, "jumps": x.count, "largest": _number(x.size), "at": _number(x.instant)}
-        for x in told.derivatives
+        for x in smoothness.derivatives
     ]
 
 

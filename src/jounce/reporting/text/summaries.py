@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from jounce.dynamics.limits.limit_report import LimitReport
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
-from jounce.dynamics.limits.trajectories import told_drives
+from jounce.dynamics.limits.trajectories import drives_note
 from jounce.mechanism.time import last_step_words
 from jounce.reporting.motion_ends import between_words, breaks_words, ends_words
 from jounce.reporting.text.law_facts import law_words
@@ -25,7 +25,9 @@ Facts = Mapping[str, Any]
 def motion_summary(facts: Facts, file: str) -> str:
     """Word what was solved or simulated: bodies, degrees of freedom, instants, and how well energy was kept."""
     time, title = facts["time"], facts["title"] or file
-    span = f"t = {time['start']:g} s" if time["count"] == 1 else f"from t = {time['start']:g} s to {time['stop']:g} s"
+    interval = (
+        f"t = {time['start']:g} s" if time["count"] == 1 else f"from t = {time['start']:g} s to {time['stop']:g} s"
+    )
     solved = time["solved"] == time["count"]
     instants = count(time["count"], "instant") if solved else f"{time['solved']} of {time['count']} instants"
     bodies = count(len(facts["bodies"]), "moving body", "moving bodies")
@@ -33,13 +35,13 @@ def motion_summary(facts: Facts, file: str) -> str:
     order = f"derivatives to order {facts['order']}"
     if "steps" in facts:
         head = f"{facts['space']}: {bodies}, {joints}, {count(len(facts['forces']), 'force')}"
-        taken = f"{instants} {span} in {count(facts['steps'], 'step')}, {order}"
-        lines = [title, head, facts["mobility"], taken, *_kept(facts), *facts["remarks"]]
+        taken = f"{instants} {interval} in {count(facts['steps'], 'step')}, {order}"
+        lines = [title, head, facts["mobility"], taken, *_conservation_lines(facts), *facts["remarks"]]
         return "\n".join(wrapped(line) for line in lines)
     equations, drives = facts["equations_of_joints"], facts["equations_of_drivers"]
     bodies, joints = f"{bodies} ({facts['coordinates']} coordinates)", f"{joints} ({count(equations, 'equation')})"
     lines = [title, f"{facts['space']}: {bodies}, {joints}", freedom_words(drives, facts["drivers"])]
-    lines.append(f"{instants} {span}, {order}")
+    lines.append(f"{instants} {interval}, {order}")
     if facts["change_points"]:
         passed = ", ".join(f"{t:g} s" for t in facts["change_points"][:6])
         more = ", ..." if len(facts["change_points"]) > 6 else ""
@@ -48,7 +50,7 @@ def motion_summary(facts: Facts, file: str) -> str:
     return "\n".join(lines)
 
 
-def _kept(facts: Facts) -> list[str]:
+def _conservation_lines(facts: Facts) -> list[str]:
     """Word how well a simulation kept energy and constraints."""
     if not facts["time"]["solved"]:
         return []
@@ -60,8 +62,8 @@ def _kept(facts: Facts) -> list[str]:
         lines.append("(drivers, actuators and dampers change it)")
     if kinks:
         names = ", ".join(dict.fromkeys(kink["name"] for kink in kinks))
-        found = count(len(kinks), "kink or jump", "kinks or jumps")
-        lines.append(f"{found}: {names}, the first at t = {kinks[0]['time']:.6g} s; no derivatives there")
+        kinks_text = count(len(kinks), "kink or jump", "kinks or jumps")
+        lines.append(f"{kinks_text}: {names}, the first at t = {kinks[0]['time']:.6g} s; no derivatives there")
     lines.append(f"constraint drift: {facts['drift']:.1e} (rad, or sizes of the mechanism)")
     return lines
 
@@ -138,18 +140,18 @@ def limits_summary(report: LimitReport, motion: JointTrajectory, robot: Path, tr
     lines += filter(None, [last_step_words(motion.times)])
     if report.held:
         units = {row.joint: "m" if row.unit == "N" else "rad" for row in report.rows if row.unit in ("N", "N m")}
-        held = [f"{name} at {value:.6g} {units[name]}" for name, value in report.held.items()]
-        lines.append(f"not in the trajectory, held still: {', '.join(held)}")
+        resting = [f"{name} at {value:.6g} {units[name]}" for name, value in report.held.items()]
+        lines.append(f"not in the trajectory, held still: {', '.join(resting)}")
     if any(row.unit.startswith("N") for row in report.limited):
-        lines.append(f"torques: {told_drives(report.drives)}")
+        lines.append(f"torques: {drives_note(report.drives)}")
     free: dict[str, list[str]] = {}
     for row in report.rows:
         if row.ratio is None:
             free.setdefault(row.quantity, []).append(row.joint)
     if free:
         limited = {row.quantity for row in report.limited}
-        told = [f"{word} of {', '.join(names)}" if word in limited else word for word, names in free.items()]
-        lines.append(f"without a limit: {', '.join(told)}")
+        unlimited = [f"{word} of {', '.join(names)}" if word in limited else word for word, names in free.items()]
+        lines.append(f"without a limit: {', '.join(unlimited)}")
     lines += [*between_words(motion), *ends_words(report.ends)]
     return "\n".join(wrapped(line) for line in lines)
 
@@ -159,35 +161,35 @@ def torques_summary(
 ) -> str:
     """Word of which joints torques were computed, when, which stand still, and what is met at the ends."""
     rates, instants = dataset.sizes["derivative"] - 1, dataset["time"].values
-    told = f", with {count(rates, 'rate')}" if rates else ""
+    note = f", with {count(rates, 'rate')}" if rates else ""
     lines = [
-        f"{dataset.attrs['title']}: torques of {count(len(dataset.data_vars), 'moving joint')}{told} "
+        f"{dataset.attrs['title']}: torques of {count(len(dataset.data_vars), 'moving joint')}{note} "
         f"({robot.name}, {trajectory.name})",
         f"t = {instants[0]:g} s to {instants[-1]:g} s, {count(len(instants), 'instant')}",
     ]
     lines.append(f"torques: {dataset.attrs['drives']}")
     lines += filter(None, [last_step_words(instants)])
-    still = [str(name) for name in dataset.data_vars if name not in motion.names]
-    if still:
-        lines.append(f"not in the trajectory, held still: {', '.join(still)}")
+    resting = [str(name) for name in dataset.data_vars if name not in motion.names]
+    if resting:
+        lines.append(f"not in the trajectory, held still: {', '.join(resting)}")
     lines += [*between_words(motion), *ends_words(ends)]
     return "\n".join(wrapped(line) for line in lines)
 
 
 def verdict(report: LimitReport) -> str:
-    """Word whether the limits are kept, and the place that is nearest to breaking one or breaks one most."""
+    """Word whether the limits are kept, and the quantity that is nearest to breaking one or breaks one most."""
     number, worst = len(report.limited), report.worst
     assert worst is not None
     size = "infinite by a jump" if worst.infinite else f"{worst.ratio:.4g} of its limit"
-    place = f"{worst.joint} {worst.quantity}, {size} at t = {worst.time:.5g} s"
+    location = f"{worst.joint} {worst.quantity}, {size} at t = {worst.time:.5g} s"
     ends = [] if report.hand_over else breaks_words(report.ends)
     if report.kept:
-        return f"All limits kept ({number}).\nClosest: {place}"
+        return f"All limits kept ({number}).\nClosest: {location}"
     if report.broken:
-        return "\n".join([f"{len(report.broken)} of {count(number, 'limit')} broken.\nWorst: {place}", *ends])
-    told = [f"Limits broken at the ends, not within the motion ({number}). Closest there: {place}", *ends]
+        return "\n".join([f"{len(report.broken)} of {count(number, 'limit')} broken.\nWorst: {location}", *ends])
+    lines = [f"Limits broken at the ends, not within the motion ({number}). Closest there: {location}", *ends]
     hint = "If the robot moves before the start and after the stop, say so with --hand-over."
-    return "\n".join([*map(wrapped, told), hint])
+    return "\n".join([*map(wrapped, lines), hint])
 
 
 def wrapped(line: str) -> str:

@@ -45,26 +45,26 @@ class Table:
 
 def table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> Table:
     """Return a table without the columns that are empty throughout."""
-    kept = [k for k in range(len(headings)) if any(row[k] for row in rows)] or [0]
-    aligned = [k for k, column in enumerate(kept) if column in numbers]
-    return Table(title, [headings[k] for k in kept], [[row[k] for k in kept] for row in rows], aligned)
+    columns = [k for k in range(len(headings)) if any(row[k] for row in rows)] or [0]
+    aligned = [k for k, column in enumerate(columns) if column in numbers]
+    return Table(title, [headings[k] for k in columns], [[row[k] for k in columns] for row in rows], aligned)
 
 
 def mechanism_tables(facts: Facts, bodies: Table) -> list[Table]:
     """Return parameters, bodies, elements and outputs of a mechanism."""
     parameters = [[p["name"], f"{p['value']:.9g}", p["unit"] or "", p["written"] or ""] for p in facts["parameters"]]
-    found = [table("Parameters (SI)", ("name", "value", "unit", "as written"), parameters, (1,)), bodies]
+    tables = [table("Parameters (SI)", ("name", "value", "unit", "as written"), parameters, (1,)), bodies]
     for section, title in (("joints", "Joints"), ("drivers", "Drivers"), ("initial", "Initial conditions")):
         rows = [
             [x["name"], x["type"], ", ".join(x["bodies"]), str(x.get("rows", "")), x.get("motion", "")]
             for x in facts[section]
         ]
-        found.append(table(title, (section.rstrip("s"), "type", "bodies", "equations", "motion"), rows, (3,)))
+        tables.append(table(title, (section.rstrip("s"), "type", "bodies", "equations", "motion"), rows, (3,)))
     forces = [[x["name"], x["type"], ", ".join(x["bodies"]), x.get("law", "")] for x in facts["forces"]]
     outputs = [[x["name"], x["quantity"], ", ".join(x["of"]), x["unit"]] for x in facts["outputs"]]
-    found.append(table("Forces", ("force", "type", "bodies", "law"), forces))
-    found.append(table("Outputs", ("output", "quantity", "of", "unit"), outputs))
-    return [each for each in found if each.rows]
+    tables.append(table("Forces", ("force", "type", "bodies", "law"), forces))
+    tables.append(table("Outputs", ("output", "quantity", "of", "unit"), outputs))
+    return [each for each in tables if each.rows]
 
 
 def bodies_table(facts: Facts) -> Table:
@@ -77,8 +77,8 @@ def bodies_table(facts: Facts) -> Table:
         if moved is not None:
             by = f"{_rounded(moved['distance']):.3g} m, {_rounded(math.degrees(moved['angle'])):.3g} deg"
         rows.append([body["name"], number(body["mass"]), vector(pose["position"]), vector(turned), by])
-    placed = "put together" if facts["assembly"]["status"] == "assembled" else "as guessed"
-    title = f"Bodies, {placed}, at t = {facts['assembly']['at']:g} s"
+    state_words = "put together" if facts["assembly"]["status"] == "assembled" else "as guessed"
+    title = f"Bodies, {state_words}, at t = {facts['assembly']['at']:g} s"
     return table(title, ("body", "mass/kg", "position/m", "angle/rad" if angle == "angle" else angle, "moved by"), rows)
 
 
@@ -92,10 +92,10 @@ def robot_tables(facts: Facts) -> list[Table]:
             continue
         limits, mimic = joint["limits"], joint["mimic"]
         free = limits["lower"] is None and limits["upper"] is None
-        span = "-" if free else f"{number(limits['lower'])} to {number(limits['upper'])} {joint['unit']}"
+        range_words = "-" if free else f"{number(limits['lower'])} to {number(limits['upper'])} {joint['unit']}"
         follows = f"{mimic['joint']} x {mimic['multiplier']:g}" if mimic else ""
         most = [number(limits[key]) for key in ("velocity", "effort")]
-        moving.append([joint["name"], joint["type"], links, span, *most, follows])
+        moving.append([joint["name"], joint["type"], links, range_words, *most, follows])
     headings = ("joint", "type", "links", "range", "velocity", "effort", "follows")
     links = []
     for link in facts["links"]:
@@ -105,30 +105,30 @@ def robot_tables(facts: Facts) -> list[Table]:
         [x["name"], x["type"], ", ".join(x["links"]), *(_count(x, key) for key in ("equations", "redundant"))]
         for x in facts["closures"]
     ]
-    found = [
+    tables = [
         table("Moving joints (rad, m, N m, N)", headings, moving, (4, 5)),
         table("Fixed joints", ("joint", "links"), fixed),
         table("Links", ("link", "mass/kg", "centre of mass/m", "fixed to"), links, (1,)),
         table("Loops closed by", ("closure", "type", "links", "equations", "redundant"), closures, (3, 4)),
     ]
-    return [each for each in found if each.rows]
+    return [each for each in tables if each.rows]
 
 
 def _count(closure: Facts, key: str) -> str:
-    found = closure.get(key, "")
-    return "-" if found is None else str(found)
+    value = closure.get(key, "")
+    return "-" if value is None else str(value)
 
 
-def peaks_table(found: Sequence[Peak]) -> Table:
+def peaks_table(given: Sequence[Peak]) -> Table:
     """Return peak values with their times; the largest magnitudes stand out."""
-    latest = max((abs(at) for p in found for at in (p.minimum_at, p.maximum_at) if math.isfinite(at)), default=1.0)
+    latest = max((abs(at) for p in given for at in (p.minimum_at, p.maximum_at) if math.isfinite(at)), default=1.0)
     decimals = 3 - math.floor(math.log10(latest or 1.0))  # of times: a table is read, not computed with
     rows = []
-    for peak in found:
+    for peak in given:
         early, late = (x if float(f"{x:.3g}") == x else round(x, decimals) for x in (peak.minimum_at, peak.maximum_at))
         low, high = peak.shown
         rows.append([peak.output, peak.derivative, peak.unit, *map(number, (low, early, high, late))])
-    marks = [[k for k, largest in zip((3, 5), peak.largest, strict=True) if largest] for peak in found]
+    marks = [[k for k, largest in zip((3, 5), peak.largest, strict=True) if largest] for peak in given]
     headings = ("output", "derivative", "unit", "minimum", "at t/s", "maximum", "at t/s")
     return Table("", headings, rows, (3, 4, 5, 6), True, marks, (3, 5), "largest magnitude")
 

@@ -87,22 +87,22 @@ def base_body(robot: AbstractRobot) -> BaseBody:
 
 def scene_axes(quaternion: Float[Numbers, "4 batch"], twist: TwistSeries) -> tuple[Jet, Jet, Jet]:
     """Return the axes of the scene as vectors in the axes of the base: ``u' = -w x u``, to one order more."""
-    still = body_axes(quaternion)
-    found = []
+    axes = body_axes(quaternion)
+    coefficients = []
     for i in range(3):
-        axis = Jet([jnp.stack([column[i] for column in still])])
+        axis = Jet([jnp.stack([column[i] for column in axes])])
         for k in range(len(twist)):
             turned = cross(axis, Jet(tuple(twist[: k + 1, 3:])))
             axis = axis.append(turned.dense().coefficients[k] / (k + 1))
-        found.append(axis)
-    return found[0], found[1], found[2]
+        coefficients.append(axis)
+    return coefficients[0], coefficients[1], coefficients[2]
 
 
 def in_base(axes: tuple[Jet, Jet, Jet], vector: Jet | Numbers) -> Jet:
     """Return a vector in the axes of the base, from its components in those of the scene."""
     parts = [vector[i : i + 1] for i in range(3)]
-    found = axes[0] * parts[0] + axes[1] * parts[1] + axes[2] * parts[2]
-    return found.dense()
+    rotated = axes[0] * parts[0] + axes[1] * parts[1] + axes[2] * parts[2]
+    return rotated.dense()
 
 
 def falling(axes: tuple[Jet, Jet, Jet], gravity: Numbers, levels: int) -> Float[Numbers, "level 3 batch"]:

@@ -212,8 +212,8 @@ def mass_matrix(
     """
     rates, drives = flag("rates", rates, error=RobotError), flag("drives", drives, error=RobotError)
     q = checked_coordinates(robot, q) if rates else checked_position(robot, q)
-    found = _mass_matrix(robot, (q,), (), (drives,))
-    return found if rates else found[..., 0, :, :]
+    matrix = _mass_matrix(robot, (q,), (), (drives,))
+    return matrix if rates else matrix[..., 0, :, :]
 
 
 def bias_forces(
@@ -272,5 +272,5 @@ def bias_forces(
     rates = flag("rates", rates, error=RobotError)
     drives = set(chosen) == set(PARTS) if drives is None else flag("drives", drives, error=RobotError)
     q = checked_coordinates(robot, q, 1, most=None if rates else 1)
-    found = _bias(robot, (q,), (), (frozenset(chosen), drives))
-    return found if rates else found[..., 0, :]
+    forces = _bias(robot, (q,), (), (frozenset(chosen), drives))
+    return forces if rates else forces[..., 0, :]

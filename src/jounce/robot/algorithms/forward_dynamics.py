@@ -17,7 +17,7 @@ from jounce.robot.model.arguments import checked_state, floats, joints_of
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.articulated_bodies import LEAST_INERTIA
 from jounce.robot.recursions.batches import Batched
-from jounce.robot.recursions.kinematics import place_of
+from jounce.robot.recursions.kinematics import frame_at
 from jounce.robot.recursions.tree_equations import TreeEquations, Unknowns, free_base
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike, Numbers, is_traced
@@ -139,16 +139,16 @@ def forward_dynamics(
         check_name("moving joint", name, robot.joint_names, RobotError, name="driven")
         mask[robot.joint_names.index(name)] = 1.0
     pushes = wrench_arrays(robot, wrenches, lead, levels, time, free=base is not None)
-    places = tuple(place_of(robot, wrench.link, wrench.point) for wrench in wrenches)
+    frames = tuple(frame_at(robot, wrench.link, wrench.point) for wrench in wrenches)
     moved = () if base is None else (*base_arrays(base, lead, 1), at_base)
     arrays = (state, forces, *moved, *pushes)
-    constants = (mask, places, None if base is None else base_body(robot))
+    constants = (mask, frames, None if base is None else base_body(robot))
     traced = is_traced((arrays, robot.tree, constants))
     static = (tuple(wrench.frame == "base" for wrench in wrenches), drives, traced)
-    q, margin, *found = _moved(robot, arrays, constants, static)
+    q, margin, *base_twist = _moved(robot, arrays, constants, static)
     if strict and not traced:
         _check_margins(robot, margin, mask)
-    return q if base is None else (BaseMotion(base.position, base.quaternion, found[0]), q)
+    return q if base is None else (BaseMotion(base.position, base.quaternion, base_twist[0]), q)
 
 
 def _checked_forces(robot: Robot, tau: Any, lead: tuple[int, ...], free: bool) -> tuple[Any, Any]:
@@ -156,8 +156,8 @@ def _checked_forces(robot: Robot, tau: Any, lead: tuple[int, ...], free: bool) -
     tau, n = floats("tau", tau), len(robot.joint_names)
     columns = (n, 6 + n) if free else (n,)
     if tau.ndim != len(lead) + 2 or tau.shape[:-2] != lead or tau.shape[-1] not in columns or not tau.shape[-2]:
-        wanted = " or ".join(f"({', '.join([*map(str, lead), 'order + 1', str(c)])})" for c in columns)
-        raise RobotError(f"must have the shape {wanted}, as the state has, not {tau.shape}", name="tau")
+        expected = " or ".join(f"({', '.join([*map(str, lead), 'order + 1', str(c)])})" for c in columns)
+        raise RobotError(f"must have the shape {expected}, as the state has, not {tau.shape}", name="tau")
     if tau.shape[-1] == n:
         return tau, np.zeros((*tau.shape[:-1], 6))
     return tau[..., 6:], tau[..., :6]
@@ -173,17 +173,17 @@ def _moved(
     reversible: bool,
 ) -> Any:
     """Return coordinates, margins of the joints and the twist of the base, as Taylor coefficients."""
-    driven, places, body = constants
-    equations = TreeEquations(tree, driven, body, places, global_axes, drives)
+    driven, frames, body = constants
+    equations = TreeEquations(tree, driven, body, frames, global_axes, drives)
     levels, lanes = len(arrays[1]), arrays[0].shape[-1]
 
-    def found(arrays: tuple[Any, ...]) -> Any:
+    def coefficients_of(arrays: tuple[Any, ...]) -> Any:
         return _coefficients(equations, arrays, reversible)
 
     if levels == 1 or lanes % WIDE or lanes == WIDE:
-        return found(arrays)
+        return coefficients_of(arrays)
     parts = tuple(jnp.moveaxis(x.reshape(*x.shape[:-1], lanes // WIDE, WIDE), -2, 0) for x in arrays)
-    whole = jax.lax.map(found, parts)
+    whole = jax.lax.map(coefficients_of, parts)
     return jax.tree.map(lambda x: jnp.moveaxis(x, 0, -2).reshape(*x.shape[1:-1], lanes), whole)
 
 
@@ -203,9 +203,9 @@ def _coefficients(equations: TreeEquations, arrays: tuple[Any, ...], reversible:
     # forces of driven joints are what they have to be: nothing is missing there
     given = ((1.0 - mask) * forces, at_base, pushes)
     # one sample, of whose program machine code is made: that of long histories is too long
-    alone = state.shape[-1] == 1 and not reversible and len(forces) <= MOST_UNROLLED
+    single = state.shape[-1] == 1 and not reversible and len(forces) <= MOST_UNROLLED
     motion = equations.motion(state[0], state[1], base)
-    series = motion_series(equations, motion, applied, given, driven, order, reversible=reversible, unrolled=alone)
+    series = motion_series(equations, motion, applied, given, driven, order, reversible=reversible, unrolled=single)
     q, margin = coordinates_of(series, order), series.factor.margin[None]
     moved, rates = series.motion.base, series.accelerations.base
     if moved is None or rates is None:

@@ -16,7 +16,7 @@ from jounce.robot.algorithms.wrenches import FRAMES, Wrench, wrench_arrays
 from jounce.robot.model.arguments import checked_coordinates
 from jounce.robot.model.tree import Frame, Tree
 from jounce.robot.recursions.batches import Batched
-from jounce.robot.recursions.kinematics import body_frames, place_of
+from jounce.robot.recursions.kinematics import body_frames, frame_at
 from jounce.robot.recursions.newton_euler import BodyWrenches, inertial_wrench, recursive_newton_euler
 from jounce.robot.recursions.tree_scan import of_one_body, to_coordinates
 from jounce.robot.robot import Robot
@@ -121,7 +121,7 @@ def joint_wrenches(
     arrays, static = _applied(robot, q, wrenches, time)
     turned = [robot.frames[link].rotation for link in robot.moving_links]
     aligned = np.moveaxis(np.array(turned).reshape(-1, 3, 3), 0, -1)
-    return _carried(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
+    return _joint_wrenches(robot, arrays[0], (arrays[1], aligned), (*static, frame == "base"))
 
 
 def _applied(
@@ -129,14 +129,14 @@ def _applied(
 ) -> tuple[Any, Any]:
     """Return the arrays, the constants and what is static of the wrenches."""
     given = wrench_arrays(robot, wrenches, q.shape[:-2], q.shape[-2] - 2, time, free=free)
-    places = tuple(place_of(robot, wrench.link, wrench.point) for wrench in wrenches)
-    return ((q, *given), places), (tuple(wrench.frame == "base" for wrench in wrenches),)
+    frames = tuple(frame_at(robot, wrench.link, wrench.point) for wrench in wrenches)
+    return ((q, *given), frames), (tuple(wrench.frame == "base" for wrench in wrenches),)
 
 
 def _on_bodies(
     tree: Tree,
     arrays: tuple[Any, ...],
-    places: tuple[Frame, ...],
+    link_frames: tuple[Frame, ...],
     global_axes: tuple[bool, ...],
     scene: tuple[Jet, Jet, Jet] | None = None,
 ) -> BodyWrenches | None:
@@ -150,7 +150,7 @@ def _on_bodies(
     levels = q.shape[0] - 2
     frames: Any = body_frames(tree, q[:levels]) if any(global_axes) else None
     whole = jnp.zeros((levels, tree.shape.bodies + 1, 6, q.shape[-1]))
-    for values, (body, point, rotation), in_base in zip(wrenches, places, global_axes, strict=True):
+    for values, (body, point, rotation), in_base in zip(wrenches, link_frames, global_axes, strict=True):
         force, torque = Jet(tuple(values[:, :3])), Jet(tuple(values[:, 3:]))
         if in_base:
             frame = frames.take(body)
@@ -166,10 +166,10 @@ def _on_bodies(
 
 @Batched
 def _generalised_forces(
-    tree: Tree, arrays: tuple[Any, ...], places: tuple[Frame, ...], global_axes: tuple[bool, ...], drives: bool
+    tree: Tree, arrays: tuple[Any, ...], frames: tuple[Frame, ...], global_axes: tuple[bool, ...], drives: bool
 ) -> Float[Numbers, "levels coordinate batch"]:
     q = arrays[0]
-    applied = _on_bodies(tree, arrays, places, global_axes)
+    applied = _on_bodies(tree, arrays, frames, global_axes)
     applied = None if applied is None else applied[:, :-1]
     forces = to_coordinates(tree, recursive_newton_euler(tree, q, applied)[0])
     return forces + _of_drives(tree, q) if drives else forces
@@ -185,33 +185,33 @@ def _forces_of_free_tree(
     tree: Tree, arrays: tuple[Any, ...], constants: Any, global_axes: tuple[bool, ...], drives: bool
 ) -> Float[Numbers, "levels row batch"]:
     q, *wrenches, pose, twist = arrays
-    places, body = constants
+    frames, body = constants
     scene = scene_axes(pose[0, 3:], twist)
-    applied = _on_bodies(tree, (q, *wrenches), places, global_axes, scene)
+    applied = _on_bodies(tree, (q, *wrenches), frames, global_axes, scene)
     moving = twist[:, 3:], twist[:, :3] + falling(scene, tree.gravity, len(twist))
     on_bodies = None if applied is None else applied[:, :-1]
-    along, _, _, carried = recursive_newton_euler(tree, q, on_bodies, moving)
+    along, _, _, transmitted = recursive_newton_euler(tree, q, on_bodies, moving)
     forces = to_coordinates(tree, along)
     w, v = (Jet(tuple(x)) for x in moving)
     own = inertial_wrench(jnp.asarray(body.mass), jnp.asarray(body.center), jnp.asarray(body.inertia), w, v)
-    at_base = jnp.concatenate([stacked(a) + b for a, b in zip(own, carried, strict=True)], axis=1)
+    at_base = jnp.concatenate([stacked(a) + b for a, b in zip(own, transmitted, strict=True)], axis=1)
     at_base = at_base if applied is None else at_base - applied[:, -1]
     return jnp.concatenate([at_base, forces + _of_drives(tree, q) if drives else forces], axis=1)
 
 
 @Batched
-def _carried(
+def _joint_wrenches(
     tree: Tree, arrays: tuple[Any, ...], constants: Any, global_axes: tuple[bool, ...], in_base: bool
 ) -> BodyWrenches:
     q = arrays[0]
-    places, aligned = constants
-    applied = _on_bodies(tree, arrays, places, global_axes)
+    link_frames, aligned = constants
+    applied = _on_bodies(tree, arrays, link_frames, global_axes)
     applied = None if applied is None else applied[:, :-1]
     _, force, moment, _ = recursive_newton_euler(tree, q, applied)
     parts = [Jet(tuple(jnp.swapaxes(x, 1, 2))) for x in (force, moment)]  # components, bodies, batch
     if in_base:
         frames = body_frames(tree, q[:-2])
-        found = [frames.without_base().direction(part) for part in parts]
+        rotated = [frames.without_base().direction(part) for part in parts]
     else:
-        found = [part.map(lambda c: jnp.einsum("ijb,ibs->jbs", aligned, c)) for part in parts]
-    return jnp.swapaxes(stacked(concatenate(found)), 1, 2)
+        rotated = [part.map(lambda c: jnp.einsum("ijb,ibs->jbs", aligned, c)) for part in parts]
+    return jnp.swapaxes(stacked(concatenate(rotated)), 1, 2)

@@ -10,20 +10,20 @@ from jounce.jet.algebra import stacked
 from jounce.robot.model.arguments import checked_coordinates
 from jounce.robot.model.tree import Frame, Tree
 from jounce.robot.recursions.batches import Batched
-from jounce.robot.recursions.kinematics import body_frames, link_frame, place_of
+from jounce.robot.recursions.kinematics import body_frames, frame_at, link_frame
 from jounce.robot.recursions.tree_scan import Series
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike, Numbers
 
 
-def jacobian_jet(tree: Tree, q: Series, place: Frame) -> Jet:
+def jacobian_jet(tree: Tree, q: Series, frame: Frame) -> Jet:
     """Return the Jacobian of a frame as a jet of shape (6, coordinates, batch), linear rows first."""
     frames = body_frames(tree, q)
-    target = frames.take(place.body).point(place.position)[:, None]
+    target = frames.take(frame.body).point(frame.position)[:, None]
     bodies = frames.without_base()
     axis = bodies.axes[2]
     turning = jnp.asarray(tree.turning)[:, None]
-    moved = jnp.asarray(tree.ancestors)[place.body][:, None] * jnp.asarray(tree.multiplier)[:, None]
+    moved = jnp.asarray(tree.ancestors)[frame.body][:, None] * jnp.asarray(tree.multiplier)[:, None]
     linear = cross(axis, target - bodies.position) * turning + axis * (1 - turning)
     columns = concatenate([linear, axis * turning]) * moved
     if tree.shape.direct:
@@ -33,8 +33,8 @@ def jacobian_jet(tree: Tree, q: Series, place: Frame) -> Jet:
 
 
 @Batched
-def _jacobian(tree: Tree, arrays: tuple[Series], place: Frame) -> Any:
-    return stacked(jacobian_jet(tree, arrays[0], place))
+def _jacobian(tree: Tree, arrays: tuple[Series], frame: Frame) -> Any:
+    return stacked(jacobian_jet(tree, arrays[0], frame))
 
 
 def jacobian(
@@ -72,19 +72,19 @@ def jacobian(
     >>> jn.jacobian(jn.Robot("one", links, [pin]), [[0.0]], "rod", [2, 0, 0])[0, :, 0].tolist()
     [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
     """
-    return _jacobian(robot, (checked_coordinates(robot, q),), place_of(robot, link, point))
+    return _jacobian(robot, (checked_coordinates(robot, q),), frame_at(robot, link, point))
 
 
-def twist(tree: Tree, q: Series, place: Frame) -> Jet:
+def twist(tree: Tree, q: Series, frame_in_body: Frame) -> Jet:
     """Return the velocity of a point and the angular velocity of its link, (6, batch), one order shorter than q."""
-    frame = link_frame(tree, q, place)
+    frame = link_frame(tree, q, frame_in_body)
     assert frame.angular_velocity is not None  # there are velocities
     return concatenate([frame.position.differentiate(), frame.angular_velocity])
 
 
 @Batched
-def _operational(tree: Tree, arrays: tuple[Series], place: Frame) -> Any:
-    return stacked(twist(tree, arrays[0], place))
+def _operational(tree: Tree, arrays: tuple[Series], frame: Frame) -> Any:
+    return stacked(twist(tree, arrays[0], frame))
 
 
 def operational_accelerations(
@@ -117,4 +117,4 @@ def operational_accelerations(
     >>> jn.operational_accelerations(robot, [[0.0], [2.0], [0.0]], "rod", [1, 0, 0]).tolist()
     [[0.0, 2.0, 0.0, 0.0, 0.0, 2.0], [-4.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
     """
-    return _operational(robot, (checked_coordinates(robot, q, 1),), place_of(robot, link, point))
+    return _operational(robot, (checked_coordinates(robot, q, 1),), frame_at(robot, link, point))

@@ -18,7 +18,7 @@ from jounce.robot.algorithms.jacobian import jacobian_jet, twist
 from jounce.robot.model.arguments import checked_position, floats
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.batches import Batched
-from jounce.robot.recursions.kinematics import place_of
+from jounce.robot.recursions.kinematics import frame_at
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike, Numbers
 
@@ -55,7 +55,7 @@ def _solved(
     constants: Any,
     rows: tuple[int, ...],
 ) -> Any:
-    position, wanted = arrays
+    position, target = arrays
     frame, damping, threshold = constants
     rows_ = np.array(rows)
 
@@ -70,11 +70,11 @@ def _solved(
     # the pseudo-inverse is made once, and serves all orders
     pseudo = jnp.sum(v[:, None] * (u * inverse[None])[None], axis=2)
     q = position
-    for k in range(wanted.shape[0]):
+    for k in range(target.shape[0]):
         trial = jnp.concatenate([q, jnp.zeros_like(position)])
-        missing = wanted[k] - task_twist(trial)[k]
+        missing = target[k] - task_twist(trial)[k]
         q = jnp.concatenate([q, jnp.sum(pseudo * missing[None], axis=1)[None] / (k + 1)])
-    residual = wanted - task_twist(q)
+    residual = target - task_twist(q)
     return q, s[None], near.any(axis=0).astype(float)[None, None], residual
 
 
@@ -140,15 +140,15 @@ def joint_motion(
     for name, value, least in (("damping", damping, 0.0), ("threshold", threshold, 1e-15)):
         if finite_numbers(name, value, ()) < least:
             raise RobotError(f"must be {least:g} or greater", name=name, value=value)
-    start, wanted = checked_position(robot, position, "position"), floats("operational", operational)
+    start, target = checked_position(robot, position, "position"), floats("operational", operational)
     lead = start.shape[:-2]
-    if wanted.ndim < 2 or wanted.shape[:-2] != lead or wanted.shape[-1] not in (6, len(rows)) or wanted.shape[-2] < 1:
+    if target.ndim < 2 or target.shape[:-2] != lead or target.shape[-1] not in (6, len(rows)) or target.shape[-2] < 1:
         shape = f"{(*lead, 'order', len(rows))}".replace("'", "")
-        raise RobotError(f"must have the shape {shape}, order 1 or more, not {wanted.shape}", name="operational")
-    if wanted.shape[-1] == 6:
-        wanted = wanted[..., np.array(rows)]
-    constants = (place_of(robot, link, point), np.float64(damping), np.float64(threshold))
-    q, values, singular, residual = _solved(robot, (start, wanted), constants, (rows,))
+        raise RobotError(f"must have the shape {shape}, order 1 or more, not {target.shape}", name="operational")
+    if target.shape[-1] == 6:
+        target = target[..., np.array(rows)]
+    constants = (frame_at(robot, link, point), np.float64(damping), np.float64(threshold))
+    q, values, singular, residual = _solved(robot, (start, target), constants, (rows,))
     values, singular = values[..., 0, :], singular[..., 0, 0] > 0
     if strict and damping == 0 and not isinstance(singular, Tracer) and np.any(singular):
         first = tuple(int(i) for i in np.argwhere(np.atleast_1d(singular))[0])

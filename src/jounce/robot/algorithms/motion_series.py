@@ -73,12 +73,12 @@ def motion_series(
         return jax.tree.map(jnp.subtract, forces, equations.needed(motion, accelerations, wrenches))
 
     change = factor.solve(missing(motion, trial, start))
-    found = jax.tree.map(jnp.add, trial, change)
-    rates = equations.motion_rates(motion, found)
+    solved = jax.tree.map(jnp.add, trial, change)
+    rates = equations.motion_rates(motion, solved)
     if order == 0:
         series = jax.tree.map(lambda a, b: jnp.stack([a, b]), motion, rates)
-        return MotionSeries(series, jax.tree.map(lambda x: x[None], found), factor)
-    structure = jax.tree.structure((motion, found, start))
+        return MotionSeries(series, jax.tree.map(lambda x: x[None], solved), factor)
+    structure = jax.tree.structure((motion, solved, start))
 
     def program(*leaves: Any) -> Any:
         motion, accelerations, given = jax.tree.unflatten(structure, leaves)
@@ -86,7 +86,7 @@ def motion_series(
 
     before, after = ([None] * len(jax.tree.leaves(part)) for part in (motion, start))  # of the unknowns
     recursion = Recursion(
-        program, jax.tree.leaves((motion, found, start)), order, reversible=reversible, unrolled=unrolled
+        program, jax.tree.leaves((motion, solved, start)), order, reversible=reversible, unrolled=unrolled
     )
     put = jax.lax.dynamic_update_index_in_dim
 
@@ -110,7 +110,7 @@ def motion_series(
 
         return jax.tree.map(begun, *first)
 
-    carry = recursion.history, rates, room(order + 2, motion, rates), room(order + 1, found)
+    carry = recursion.history, rates, room(order + 2, motion, rates), room(order + 1, solved)
     if unrolled:
         for k in range(1, order + 1):
             carry = level(k, carry)

@@ -14,7 +14,7 @@ from jounce.modules import Module
 from jounce.robot.algorithms.wrenches import Wrench, check_wrenches
 from jounce.robot.model.arguments import floats
 from jounce.robot.model.tree import Frame
-from jounce.robot.recursions.kinematics import place_of
+from jounce.robot.recursions.kinematics import frame_at
 from jounce.robot.robot import Robot
 
 STATE = 3  # arguments of a function of time, coordinates and rates
@@ -79,8 +79,8 @@ def wrench_laws(
     for k, wrench in enumerate(wrenches):
         each = ("force", "torque")
         parts.append(tuple(_part(f"wrenches[{k}].{name}", getattr(wrench, name), n) for name in each))
-    places = tuple(place_of(robot, wrench.link, wrench.point) for wrench in wrenches)
-    return WrenchLaws(tuple(parts)), places, tuple(wrench.frame == "base" for wrench in wrenches)
+    frames = tuple(frame_at(robot, wrench.link, wrench.point) for wrench in wrenches)
+    return WrenchLaws(tuple(parts)), frames, tuple(wrench.frame == "base" for wrench in wrenches)
 
 
 def _part(where: str, given: Any, n: int) -> WrenchPart:
@@ -93,10 +93,10 @@ def _part(where: str, given: Any, n: int) -> WrenchPart:
     of_state = len(inspect.signature(given).parameters) == STATE
     state = (jnp.zeros(()), jnp.zeros(n), jnp.zeros(n)) if of_state else (jnp.zeros(()),)
     try:
-        found = OfSample.of(given, *state)
+        sampled = OfSample.of(given, *state)
     except TypeError as error:
         message = f"must be a function of time, or of time, q and rates, by operations of JAX: {error}"
         raise RobotError(message.splitlines()[0], name=where) from error
-    if found.shape != (3,):
-        raise RobotError(f"the function must return three components, not the shape {found.shape}", name=where)
-    return WrenchPart(np.zeros(3), found, of_state)
+    if sampled.shape != (3,):
+        raise RobotError(f"the function must return three components, not the shape {sampled.shape}", name=where)
+    return WrenchPart(np.zeros(3), sampled, of_state)

@@ -103,18 +103,18 @@ def mechanism(
     for kind, given in laws.items():
         for name in given:
             check_name("moving joint that follows no other", name, robot.joint_names, RobotError, name=kind)
-    kept = {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}
-    parts = RobotParts(robot, kept, forces, outputs, drives)
-    wanted = _coordinate_outputs(parts.coordinates) if outputs is None else outputs
+    needed = {*driven, *(x for x in (outputs or {}).values() if isinstance(x, str))}
+    parts = RobotParts(robot, needed, forces, outputs, drives)
+    selected = _coordinate_outputs(parts.coordinates) if outputs is None else outputs
     start = _start(robot, q, driven, parameters or {}, time)
     joints = parts.joints()
     if robot.closures:
         loops = Loops(robot)
         free = np.array([name not in driven for name in robot.joint_names], bool)
         start = loops.closed(start, free)
-        borne = loops.wrenches if redundant_reactions else [kept for kept, _ in loops.independent(start)]
-        found = zip(robot.closures.values(), borne, strict=True)
-        joints |= {closure.name: parts.closure(closure, kept) for closure, kept in found if len(kept)}
+        borne = loops.wrenches if redundant_reactions else [needed for needed, _ in loops.independent(start)]
+        pairs = zip(robot.closures.values(), borne, strict=True)
+        joints |= {closure.name: parts.closure(closure, needed) for closure, needed in pairs if len(needed)}
     return Mechanism(
         space="spatial",
         bodies=parts.bodies(start),
@@ -122,7 +122,7 @@ def mechanism(
         drivers={name + DRIVE: parts.driver(name, law) for name, law in laws["drivers"].items()},
         initial={name + START: parts.driver(name, law) for name, law in laws["initial"].items()},
         forces={**(forces or {}), **parts.losses()},
-        outputs={name: parts.output(name, x) if isinstance(x, str) else x for name, x in wanted.items()},
+        outputs={name: parts.output(name, x) if isinstance(x, str) else x for name, x in selected.items()},
         parameters=parameters or {},
         gravity=robot.gravity.tolist(),
         time=time,
@@ -133,13 +133,13 @@ def mechanism(
 
 def _coordinate_outputs(joints: tuple[str, ...]) -> dict[str, str]:
     """Return joints by the names of the outputs of their coordinates: their own, unless results have such columns."""
-    found = {}
+    outputs = {}
     for joint in joints:
         name = joint
         while names_column(name) or (name != joint and name in joints):
             name += "_"
-        found[name] = joint
-    return found
+        outputs[name] = joint
+    return outputs
 
 
 def _start(

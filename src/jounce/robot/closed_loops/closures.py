@@ -25,7 +25,7 @@ from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.robot.model.links_and_joints import Closure
 from jounce.robot.model.tree import Frame, Tree, axes_with_z_along
 from jounce.robot.recursions.batches import Batched
-from jounce.robot.recursions.kinematics import body_frames, place_of
+from jounce.robot.recursions.kinematics import body_frames, frame_at
 from jounce.robot.recursions.tree_scan import Series
 from jounce.shapes import ArrayLike, Numbers
 
@@ -97,17 +97,19 @@ def constraint_wrenches(closure: Closure) -> np.ndarray:
 
 
 @Batched
-def _gaps(tree: Tree, arrays: tuple[Series], places: tuple[Frame, Frame]) -> Float[Numbers, "order 2 3 closure batch"]:
+def _gaps(
+    tree: Tree, arrays: tuple[Series], link_frames: tuple[Frame, Frame]
+) -> Float[Numbers, "order 2 3 closure batch"]:
     """Return offset of the points and missing turn of each closure, in axes of its first link."""
     frames = body_frames(tree, arrays[0])
 
-    def placed(place: Frame) -> tuple[Jet, list[Jet]]:
-        frame = jax.tree.map(lambda c: jnp.take(c, place.body, axis=1), frames)
-        local = (place.position, *jnp.moveaxis(place.rotation, 2, 0))
+    def point_and_axes(link_frame: Frame) -> tuple[Jet, list[Jet]]:
+        frame = jax.tree.map(lambda c: jnp.take(c, link_frame.body, axis=1), frames)
+        local = (link_frame.position, *jnp.moveaxis(link_frame.rotation, 2, 0))
         point, *axes = (jnp.moveaxis(x, 0, -1)[:, :, None] for x in local)
         return frame.point(point), [frame.direction(axis) for axis in axes]
 
-    (origin, axes), (other, others) = map(placed, places)
+    (origin, axes), (other, others) = map(point_and_axes, link_frames)
     turn = total(cross(a, b) for a, b in zip(axes, others, strict=True)) * 0.5
     seen = [stack([axis.dot(vector) for axis in axes]) for vector in (other - origin, turn)]
     return jnp.stack([stacked(part) for part in seen], axis=1)
@@ -130,19 +132,19 @@ class Loops:
         self.wrenches = [constraint_wrenches(closure) for closure in robot.closures.values()]
         sides: list[list[Frame]] = [[], []]
         for closure in robot.closures.values():
-            first, second = (place_of(robot, link, p) for link, p in zip(closure.links, closure.points, strict=True))
+            first, second = (frame_at(robot, link, p) for link, p in zip(closure.links, closure.points, strict=True))
             sides[0].append(first)
             sides[1].append(second._replace(rotation=second.rotation @ closure.rotation.T))
-        self.places = tuple(jax.tree.map(lambda *xs: np.stack(xs), *side) for side in sides)
+        self.frames = tuple(jax.tree.map(lambda *xs: np.stack(xs), *side) for side in sides)
 
     def gaps(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the scaled gaps of all closures, (closures, 6), and their slopes by the scaled coordinates."""
         count = len(q)
         directions = np.diag(self.scale) if count else np.zeros((1, 0))
         states = np.stack([np.broadcast_to(q, directions.shape), directions], axis=1)
-        found = _gaps(self.tree, (states,), self.places)  # (coordinates, 2, 2, 3, closures)
-        found = np.moveaxis(found.reshape(*found.shape[:2], 6, -1), -1, 2) / np.repeat([self.size, 1.0], 3)
-        return found[0, 0], np.moveaxis(found[:count, 1], 0, -1)
+        values = _gaps(self.tree, (states,), self.frames)  # (coordinates, 2, 2, 3, closures)
+        values = np.moveaxis(values.reshape(*values.shape[:2], 6, -1), -1, 2) / np.repeat([self.size, 1.0], 3)
+        return values[0, 0], np.moveaxis(values[:count, 1], 0, -1)
 
     def closed(self, q: Float[np.ndarray, " joint"], free: Any = slice(None)) -> Float[np.ndarray, " joint"]:
         """Return the coordinates nearest to the given ones at which the loops are closed; only those free change.
@@ -196,8 +198,8 @@ class Loops:
 
         What vanishes in this position only, as at a dead point, counts as independent: positions nearby tell.
         """
-        found = self._split(q)
-        best = found
+        split = self._split(q)
+        best = split
         random = np.random.default_rng(1)  # any directions do, the same each time
         for _ in range(2):
             slopes = np.concatenate([w @ s for (w, _), s in zip(best, self.gaps(q)[1], strict=True)])
@@ -209,22 +211,22 @@ class Loops:
                 nearby = self._split(self.closed(q + SWAY * self.scale * sway / np.abs(sway).max()))
             except RobotError:
                 continue
-            if sum(len(kept) for kept, _ in nearby) > sum(len(kept) for kept, _ in best):
+            if sum(len(chosen) for chosen, _ in nearby) > sum(len(chosen) for chosen, _ in best):
                 best = nearby
         unscaled = np.repeat([1.0, self.size], 3)
-        return [(kept * unscaled, rest * unscaled) for kept, rest in best]
+        return [(chosen * unscaled, rest * unscaled) for chosen, rest in best]
 
     def _split(self, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         _, slopes = self.gaps(q)
         motions = np.eye(len(q))  # that the closures so far allow
-        found = []
+        groups = []
         for wrenches, slope in zip(self.wrenches, slopes, strict=True):
             rows = wrenches @ slope @ motions
             left, sizes, right = np.linalg.svd(rows)
             rank = int(np.sum(sizes > RANK_TOLERANCE))
-            found.append(tuple(_aligned(part) @ wrenches for part in (left[:, :rank], left[:, rank:])))
+            groups.append(tuple(_aligned(part) @ wrenches for part in (left[:, :rank], left[:, rank:])))
             motions = motions @ right[rank:].T
-        return found
+        return groups
 
 
 def _aligned(basis: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from jounce.rigid import SpatialPose
 from jounce.shapes import Numbers
 
 KINDS = ("turn-turn", "turn-slide", "slide-turn", "slide-slide")
-PLACES = "ijmn"
+ROLES = "ijmn"
 LARGEST_DENOMINATOR = 1000  # of ratios that are taken for those of whole numbers
 
 
@@ -91,15 +91,15 @@ class CoupledJoints(AbstractConstraint, type="coupled", space="spatial"):
 
     def __check_init__(self):
         check_choice("kinds", self.kinds, KINDS, MechanismError)
-        places = PLACES[: len(self.bodies)]
+        roles = ROLES[: len(self.bodies)]
         pairs = {self.roles[:2], self.roles[2:]}
-        if len(self.roles) != 4 or set(self.roles) != set(places) or any(len({*pair}) != 2 for pair in pairs):
-            message = f"must name two bodies of each joint by {', '.join(places)}, such as ijim"
+        if len(self.roles) != 4 or set(self.roles) != set(roles) or any(len({*pair}) != 2 for pair in pairs):
+            message = f"must name two bodies of each joint by {', '.join(roles)}, such as ijim"
             raise MechanismError(message, name="roles", value=self.roles)
 
     def residual(self, *bodies_and_time: Any) -> Jet:
         """Return what the second joint lacks of following the first."""
-        bodies = [bodies_and_time[PLACES.index(place)] for place in self.roles]
+        bodies = [bodies_and_time[ROLES.index(role)] for role in self.roles]
         turning = [kind == "turn" for kind in self.kinds.split("-")]
         first = (self.point_1, self.axis_1, self.vector_1, self.opposite_1)
         second = (self.point_2, self.axis_2, self.vector_2, self.opposite_2)
@@ -128,7 +128,7 @@ def coupled(leader: JointPlacement, follower: JointPlacement, multiplier: float,
         period = WHOLE_TURN
     return CoupledJoints(
         tuple(bodies),
-        "".join(PLACES[bodies.index(body)] for body in (*leader.bodies, *follower.bodies)),
+        "".join(ROLES[bodies.index(body)] for body in (*leader.bodies, *follower.bodies)),
         "-".join("turn" if joint.turning else "slide" for joint in (leader, follower)),
         *(leader.point, leader.axis_i, leader.vector_i, leader.vector_j),
         *(follower.point, follower.axis_i, follower.vector_i, follower.vector_j),

@@ -45,7 +45,7 @@ class RobotParts:
     ----------
     robot : Robot
         The robot.
-    kept : set of str
+    needed : set of str
         Joints whose coordinates are wanted, so that they are not merged into a free body or a ball.
     forces, outputs
         What may name links that are otherwise merged.
@@ -53,11 +53,11 @@ class RobotParts:
         Whether armature, damping and friction of the joints are wanted.
     """
 
-    def __init__(self, robot: AbstractRobot, kept: set[str], forces: Any, outputs: Any, drives: bool):
+    def __init__(self, robot: AbstractRobot, needed: set[str], forces: Any, outputs: Any, drives: bool):
         self.robot, self.tree = robot, robot.opened().tree
         self.moving = robot.moving_joints
         self.driven = [x for x in self.moving if any(getattr(x, field) for field in DRIVES)] if drives else []
-        kept = kept.union(joint.name for joint in self.driven)
+        needed = needed.union(joint.name for joint in self.driven)
         if GROUND in robot.moving_links:
             raise RobotError("a link of this name moves; rename it, it stands for the base", name="links", value=GROUND)
         elements = [*(forces or {}).values(), *(x for x in (outputs or {}).values() if not isinstance(x, str))]
@@ -67,7 +67,7 @@ class RobotParts:
         for k in range(len(self.moving)):
             for count in (6, 3):
                 first = k - count + 1
-                if first >= 0 and self._is_free(first, count, kept, links) and first not in self._inner():
+                if first >= 0 and self._is_free(first, count, needed, links) and first not in self._inner():
                     self.merged[k] = count
                     break
         self.rotors: dict[str, str] = {}  # what the bodies are called, by joint
@@ -83,11 +83,11 @@ class RobotParts:
         """Return the indices of the massless bodies within merged chains."""
         return {k for last, count in self.merged.items() for k in range(last - count + 1, last)}
 
-    def _is_free(self, first: int, count: int, kept: set[str], links: set[str]) -> bool:
+    def _is_free(self, first: int, count: int, needed: set[str], links: set[str]) -> bool:
         """Whether joints in a row let a body move freely (6), or turn freely (3), and nobody asks for one of them."""
         robot, tree, chain = self.robot, self.tree, self.moving[first : first + count]
         following = {joint.mimic.joint for joint in self.moving if joint.mimic is not None}
-        if any(joint.mimic is not None or joint.name in kept | following for joint in chain):
+        if any(joint.mimic is not None or joint.name in needed | following for joint in chain):
             return False
         for k, joint in enumerate(chain[:-1], first):
             children = [other for other in self.moving if robot.frames[other.parent].body == k]
@@ -105,7 +105,7 @@ class RobotParts:
         axes.append(tree.rotation[slides[1]] @ tree.rotation[slides[2]] @ np.eye(3)[2])
         return bool(abs(np.linalg.det(np.array(axes))) > 1e-3)
 
-    def placed(self, index: int) -> JointPlacement:
+    def joint_placement(self, index: int) -> JointPlacement:
         """Return a moving joint in the frames of the two bodies."""
         joint = self.moving[index]
         parent, position, rotation = on_body(self.robot, joint.parent)
@@ -116,40 +116,40 @@ class RobotParts:
         )
 
     def _named(self, name: str) -> JointPlacement:
-        return self.placed([joint.name for joint in self.moving].index(name))
+        return self.joint_placement([joint.name for joint in self.moving].index(name))
 
     def joints(self) -> dict[str, AbstractConstraint]:
         """Return the joints of the tree, and what couples joints that follow others."""
-        found: dict[str, AbstractConstraint] = {}
+        joints: dict[str, AbstractConstraint] = {}
         inner = self._inner()
         for k, joint in enumerate(self.moving):
             if k in inner or self.merged.get(k) == 6:
                 continue
             if self.merged.get(k) == 3:
-                first = self.placed(k - 2)
+                first = self.joint_placement(k - 2)
                 bodies = (first.bodies[0], joint.child)
-                found[self.moving[k - 2].name] = spatial.Spherical(bodies, first.point, np.zeros(3))
+                joints[self.moving[k - 2].name] = spatial.Spherical(bodies, first.point, np.zeros(3))
                 continue
-            at = self.placed(k)
+            at = self.joint_placement(k)
             ends = (at.point, np.zeros(3), at.axis_i, at.axis_j)
             if at.turning:
-                found[joint.name] = spatial.Revolute(at.bodies, *ends)
+                joints[joint.name] = spatial.Revolute(at.bodies, *ends)
             else:
-                found[joint.name] = spatial.Prismatic(at.bodies, *ends, at.vector_i, at.vector_j)
+                joints[joint.name] = spatial.Prismatic(at.bodies, *ends, at.vector_i, at.vector_j)
         for joint in self.moving:
             if joint.mimic is not None:
                 pair = (self._named(joint.mimic.joint), self._named(joint.name))
-                found[self._named_apart(f"{joint.name}_mimic", found)] = coupled(
+                joints[self._unique_name(f"{joint.name}_mimic", joints)] = coupled(
                     *pair, joint.mimic.multiplier, joint.mimic.offset
                 )
         origin, x, _, z = np.zeros(3), *np.eye(3)
         for name, rotor in self.rotors.items():
             turning = JointPlacement((GROUND, rotor), True, origin, z, z, x, x)
-            found[self._named_apart(name + ROTOR, found)] = spatial.Revolute(turning.bodies, origin, origin, z, z)
-            found[self._named_apart(name + GEAR, found)] = coupled(self._named(name), turning, 1.0, 0.0)
-        return found
+            joints[self._unique_name(name + ROTOR, joints)] = spatial.Revolute(turning.bodies, origin, origin, z, z)
+            joints[self._unique_name(name + GEAR, joints)] = coupled(self._named(name), turning, 1.0, 0.0)
+        return joints
 
-    def _named_apart(self, name: str, taken: Any) -> str:
+    def _unique_name(self, name: str, taken: Any) -> str:
         return _unused(name, {*taken, *self.robot.joints, *self.robot.closures})
 
     def closure(self, closure: Closure, wrenches: np.ndarray) -> LinkClosure:
@@ -181,18 +181,18 @@ class RobotParts:
 
     def losses(self) -> dict[str, AbstractForce]:
         """Return the dampers of the joints, and their dry friction."""
-        found: dict[str, AbstractForce] = {}
+        forces_found: dict[str, AbstractForce] = {}
         for joint in self.driven:
             at, law = self._named(joint.name), f"-{joint.friction!r}*sign(v)"
             turn = {"axis_i": at.axis_i, "vector_i": at.vector_i, "vector_j": at.vector_j}
             ends = {"point_i": at.point, "point_j": np.zeros(3), "vector_i": at.axis_i}
             if joint.damping:
-                kind, places = (SpatialTorsionalSpring, turn) if at.turning else (SlideSpring, ends)
-                found[joint.name + DAMPING] = kind(at.bodies, **places, stiffness=0.0, damping=joint.damping)
+                kind, fields = (SpatialTorsionalSpring, turn) if at.turning else (SlideSpring, ends)
+                forces_found[joint.name + DAMPING] = kind(at.bodies, **fields, stiffness=0.0, damping=joint.damping)
             if joint.friction:
-                kind, places = (SpatialTorque, turn) if at.turning else (SlideForce, ends)
-                found[joint.name + FRICTION] = kind(at.bodies, **places, law=law)
-        return found
+                kind, fields = (SpatialTorque, turn) if at.turning else (SlideForce, ends)
+                forces_found[joint.name + FRICTION] = kind(at.bodies, **fields, law=law)
+        return forces_found
 
     def bodies(self, q: np.ndarray) -> dict[str, Body]:
         """Return the moving bodies with their masses, at the pose that the coordinates give.
@@ -206,11 +206,11 @@ class RobotParts:
             body, position, rotation = on_body(robot, name)
             if link.inertia is not None and body != GROUND:
                 masses[body].append(link.inertia.moved(position, rotation))
-        found = {}
+        bodies = {}
         for name, parts in masses.items():
             at = forward_kinematics(tree, q[None], name)
             whole = Inertia.total(parts) if parts else None
-            found[name] = Body(
+            bodies[name] = Body(
                 at.position[0].tolist(),
                 orientation=from_rotation_matrices(np.asarray(at.rotation[0])).tolist(),
                 mass=None if whole is None else whole.mass,
@@ -222,8 +222,8 @@ class RobotParts:
             angle = mimic.multiplier * q[robot.joint_names.index(mimic.joint)] + mimic.offset
             attitude = {"axis": [0.0, 0.0, 1.0], "angle": float(angle)}
             inertia = [robot.joints[name].armature] * 3
-            found[rotor] = Body([0.0] * 3, orientation=attitude, mass=0.0, inertia=inertia)
-        return found
+            bodies[rotor] = Body([0.0] * 3, orientation=attitude, mass=0.0, inertia=inertia)
+        return bodies
 
 
 def _unused(name: str, taken: Container[str]) -> str:

@@ -50,8 +50,8 @@ class AbstractRobot(Displayed, abc.ABC):
             )
             raise RobotError(message, name=f"links.{self.joints[massless[0]].child}.inertia", value=None)
         given = _by_name("closures", closures, Closure)
-        placed = {name: self._checked_closure(closure) for name, closure in given.items()}
-        self.closures: Mapping[str, Closure] = MappingProxyType(placed)
+        closures_checked = {name: self._checked_closure(closure) for name, closure in given.items()}
+        self.closures: Mapping[str, Closure] = MappingProxyType(closures_checked)
         self._made = True
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -193,8 +193,8 @@ class AbstractRobot(Displayed, abc.ABC):
             If there is no such link.
         """
         check_name("link", link, self.links, RobotError, name="link")
-        held = self.links[link].inertia
-        whole = payload if held is None else Inertia.total([held, payload])
+        inertia = self.links[link].inertia
+        whole = payload if inertia is None else Inertia.total([inertia, payload])
         links = {**self.links, link: Link(link, whole)}
         return self._changed(links=list(links.values()))
 
@@ -242,10 +242,10 @@ class AbstractRobot(Displayed, abc.ABC):
         4.905
         """
         check_name("link", link, self.links, RobotError, name="link")
-        held = self.links[link].inertia or Inertia(0.0, strict=False)
+        previous = self.links[link].inertia or Inertia(0.0, strict=False)
         given = {"mass": mass, "center_of_mass": center_of_mass, "tensor": tensor}
-        values: dict[str, Any] = {k: getattr(held, k) if v is None else v for k, v in given.items()}
-        if is_traced(values) or isinstance(held, TracedInertia):
+        values: dict[str, Any] = {k: getattr(previous, k) if v is None else v for k, v in given.items()}
+        if is_traced(values) or isinstance(previous, TracedInertia):
             inertia = TracedInertia(**values)
         else:
             inertia = Inertia(**values, strict=self.strict)
@@ -265,10 +265,10 @@ class AbstractRobot(Displayed, abc.ABC):
             finite_numbers(f"locked.{name}", value, ())
         joints = []
         for joint in self.joints.values():
-            held = positions.get(joint.name)
+            coordinate = positions.get(joint.name)
             if joint.moving and joint.mimic is not None and joint.mimic.joint in positions:
-                held = joint.mimic.multiplier * positions[joint.mimic.joint] + joint.mimic.offset
-            joints.append(joint if held is None else _held(joint, float(held)))
+                coordinate = joint.mimic.multiplier * positions[joint.mimic.joint] + joint.mimic.offset
+            joints.append(joint if coordinate is None else _fixed_at(joint, float(coordinate)))
         return self._changed(joints=joints)
 
     def with_floating_base(self: Made, sequence: str = "ZYX") -> Made:
@@ -303,8 +303,8 @@ class AbstractRobot(Displayed, abc.ABC):
 
     def _changed(self: Made, **parts: Any) -> Made:
         """Return the robot with other links, joints, gravity or closures."""
-        held = {name: list(getattr(self, name).values()) for name in ("links", "joints", "closures")}
-        return type(self)(**{"name": self.name, "gravity": self.gravity, "strict": self.strict, **held, **parts})
+        current = {name: list(getattr(self, name).values()) for name in ("links", "joints", "closures")}
+        return type(self)(**{"name": self.name, "gravity": self.gravity, "strict": self.strict, **current, **parts})
 
     def _checked_closure(self, closure: Closure) -> Closure:
         """Return a closure with what it leaves to the pose at coordinates zero."""
@@ -333,31 +333,31 @@ class AbstractRobot(Displayed, abc.ABC):
             raise RobotError(message, name=f"joints.{joint.name}.mimic", value=joint.mimic.joint)
 
 
-def _by_name(kind: str, parts: Sequence[Any], wanted: type) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+def _by_name(kind: str, parts: Sequence[Any], expected: type) -> dict[str, Any]:
+    by_name: dict[str, Any] = {}
     for k, part in enumerate(parts):
-        if not isinstance(part, wanted):
-            raise RobotError(f"must be a {wanted.__name__}", name=f"{kind}[{k}]", value=part)
-        if part.name in found:
+        if not isinstance(part, expected):
+            raise RobotError(f"must be a {expected.__name__}", name=f"{kind}[{k}]", value=part)
+        if part.name in by_name:
             raise RobotError("this name is given twice", name=kind, value=part.name)
-        found[part.name] = part
-    if not found and kind == "links":
+        by_name[part.name] = part
+    if not by_name and kind == "links":
         raise RobotError("a robot needs at least one link", name=kind)
-    return found
+    return by_name
 
 
 def _poses_at_zero(joints: Mapping[str, Joint]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Return position and rotation of all links at coordinates zero, in the frame of the base."""
-    found: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    poses: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for joint in joints.values():
         follows = joint.moving and joint.mimic is not None
-        still = _held(joint, joint.mimic.offset if follows and joint.mimic is not None else 0.0)
-        position, rotation = found.setdefault(joint.parent, (np.zeros(3), np.eye(3)))
-        found[joint.child] = (position + rotation @ still.position, rotation @ still.rotation)
-    return found
+        fixed = _fixed_at(joint, joint.mimic.offset if follows and joint.mimic is not None else 0.0)
+        position, rotation = poses.setdefault(joint.parent, (np.zeros(3), np.eye(3)))
+        poses[joint.child] = (position + rotation @ fixed.position, rotation @ fixed.rotation)
+    return poses
 
 
-def _held(joint: Joint, coordinate: float) -> Joint:
+def _fixed_at(joint: Joint, coordinate: float) -> Joint:
     """Return the fixed joint that holds a moving one at a coordinate."""
     position, rotation = joint.position, joint.rotation
     if joint.turning:

@@ -88,14 +88,14 @@ class JointLaws(AbstractJointLaws):
         self, time: Float[Numbers, "1 batch"], q: Float[Numbers, "n batch"], rate: Float[Numbers, "n batch"]
     ) -> Float[Numbers, "n batch"]:
         """Return the forces of the joints, N m or N."""
-        found = jnp.broadcast_to(jnp.asarray(self.constant)[:, None], q.shape)
+        values = jnp.broadcast_to(jnp.asarray(self.constant)[:, None], q.shape)
         if self.whole is not None:
-            return found + self.whole(time[0], q, rate)
+            return values + self.whole(time[0], q, rate)
         rows = {k: law(time[0], q, rate) for k, law in zip(self.columns, self.single, strict=True)}
         if not rows:
-            return found
+            return values
         shape = time[0].shape
-        return jnp.stack([jnp.broadcast_to(rows[k], shape) if k in rows else found[k] for k in range(len(found))])
+        return jnp.stack([jnp.broadcast_to(rows[k], shape) if k in rows else values[k] for k in range(len(values))])
 
 
 GivenLaws = ArrayLike | Callable[..., Any] | Mapping[str, Any] | JointTrajectory | AbstractJointLaws
@@ -165,15 +165,15 @@ def _single(law: Any, names: tuple[str, ...], where: str) -> Any:
     return value
 
 
-def _read(function: Callable[..., Any], count: int, wanted: tuple[int, ...], where: str) -> OfSample:
+def _read(function: Callable[..., Any], count: int, shape: tuple[int, ...], where: str) -> OfSample:
     """Return what a function of a user computes now, checked."""
     state = jnp.zeros(()), jnp.zeros(count), jnp.zeros(count)
     try:
-        found = OfSample.of(function, *state)
+        sampled = OfSample.of(function, *state)
     except TypeError as error:
         message = f"must be a function of time, q and rates, by operations of JAX: {str(error).splitlines()[0]}"
         raise RobotError(message, name=where) from error
-    if found.shape != wanted:
-        noun = f"an array of {count} forces" if wanted else "one number"
-        raise RobotError(f"the function must return {noun}, the shape {wanted}, not {found.shape}", name=where)
-    return found
+    if sampled.shape != shape:
+        noun = f"an array of {count} forces" if shape else "one number"
+        raise RobotError(f"the function must return {noun}, the shape {shape}, not {sampled.shape}", name=where)
+    return sampled

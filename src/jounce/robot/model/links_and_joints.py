@@ -98,17 +98,17 @@ def leaders(mimics: Mapping[str, Mimic]) -> dict[str, Mimic]:
 
     Circles are left as they are, for the robot to refuse.
     """
-    found: dict[str, Mimic] = {}
+    mimic_of: dict[str, Mimic] = {}
     for name in mimics:
         chain: dict[str, Mimic] = {}  # from a follower to the first joint that is known, or leads
-        while name in mimics and name not in found and name not in chain:
+        while name in mimics and name not in mimic_of and name not in chain:
             chain[name] = mimics[name]
             name = mimics[name].joint
         circle = name in chain
         for follower, mimic in reversed(chain.items()):
-            leader = None if circle else found.get(mimic.joint)
-            found[follower] = mimic if leader is None else mimic.after(leader)
-    return found
+            leader = None if circle else mimic_of.get(mimic.joint)
+            mimic_of[follower] = mimic if leader is None else mimic.after(leader)
+    return mimic_of
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -216,13 +216,13 @@ class Joint:
 
 def ranges_at_leader(limits: Limits, followers: Iterable[Joint]) -> list[tuple[float, float]]:
     """Return the range of a joint, and those of the joints that follow it as they bind it; infinite where none is."""
-    found = []
+    ranges = []
     every = [(limits, Mimic("")), *((x.limits, x.mimic) for x in followers if x.mimic and x.mimic.multiplier)]
     for own, mimic in every:
         ends = (-math.inf if own.lower is None else own.lower, math.inf if own.upper is None else own.upper)
         low, high = sorted((x - mimic.offset) / mimic.multiplier + 0.0 for x in ends)  # no -0
-        found.append((low, high))
-    return found
+        ranges.append((low, high))
+    return ranges
 
 
 def common_range(ranges: Iterable[tuple[float, float]]) -> tuple[float, float]:

@@ -9,5 +9,5 @@ def robot_size(robot: AbstractRobot) -> float:
     """Return the size of a robot: the longest way from its base to a centre of mass, along the links; 1 m for none."""
     tree = robot.tree
     arms = np.linalg.norm(tree.position, axis=1)
-    ways = tree.ancestors[:-1] @ arms + np.linalg.norm(tree.center, axis=1)
-    return float(ways.max(initial=0.0)) or 1.0
+    distances = tree.ancestors[:-1] @ arms + np.linalg.norm(tree.center, axis=1)
+    return float(distances.max(initial=0.0)) or 1.0

@@ -118,17 +118,17 @@ def ordered(links: Mapping[str, Link], joints: Mapping[str, Joint]) -> list[Join
     if len(roots) > 1:
         message = "exactly one link must be no joint's child, the base; join the others to it"
         raise RobotError(message, name="links", value=roots)
-    found: list[Joint] = []
+    sorted_joints: list[Joint] = []
     waiting = list(reversed(children[roots[0]]))
     while waiting:
         joint = waiting.pop()
-        found.append(joint)
+        sorted_joints.append(joint)
         waiting += reversed(children[joint.child])
-    if len(found) < len(joints):
-        reached = {joint.name for joint in found}
+    if len(sorted_joints) < len(joints):
+        reached = {joint.name for joint in sorted_joints}
         lost = [name for name in joints if name not in reached]
         raise RobotError("these joints form a loop that the base does not reach", name="joints", value=lost)
-    return found
+    return sorted_joints
 
 
 def arrange(
@@ -140,13 +140,13 @@ def arrange(
     """
     identity, zero = np.eye(3), np.zeros(3)
     frames = {base: Frame(-1, zero, identity)}
-    parents, places, masses, moving = [], [], [], []
+    parents, placements, masses, moving = [], [], [], []
     for joint in joints:
         body, position, rotation = frames[joint.parent]
         position, rotation = position + rotation @ joint.position, rotation @ joint.rotation
         if joint.moving:
             aligned = axes_with_z_along(joint.axis)
-            places.append((position, rotation @ aligned))
+            placements.append((position, rotation @ aligned))
             parents.append(body)
             moving.append(joint)
             masses.append([])
@@ -168,8 +168,8 @@ def arrange(
     }
     turning = np.array([joint.turning for joint in moving], float)
     tree = Tree(
-        rotation=np.array([rotation for _, rotation in places]).reshape(bodies, 3, 3),
-        position=np.array([position for position, _ in places]).reshape(bodies, 3),
+        rotation=np.array([rotation for _, rotation in placements]).reshape(bodies, 3, 3),
+        position=np.array([position for position, _ in placements]).reshape(bodies, 3),
         mass=_array([one.mass for one in whole]),
         center=_array([one.center_of_mass for one in whole]).reshape(bodies, 3),
         inertia=_array([one.tensor for one in whole]).reshape(bodies, 3, 3),
@@ -225,17 +225,17 @@ def quaternion_matrix(quaternion: Float[np.ndarray, " 4"]) -> Float[np.ndarray, 
 def _slots(parents: list[int]) -> tuple[list[int], list[int], int]:
     """Give each body a place for its state, taken over from its parent by the last child, so that few are needed."""
     last = {parent: k for k, parent in enumerate(parents)}
-    place, free, count = {-1: 0}, [], 1
+    slots, free, count = {-1: 0}, [], 1
     for k, parent in enumerate(parents):
         if last[parent] == k:
-            place[k] = place[parent]
+            slots[k] = slots[parent]
         elif free:
-            place[k] = free.pop()
+            slots[k] = free.pop()
         else:
-            place[k], count = count, count + 1
+            slots[k], count = count, count + 1
         if k not in last:
-            free.append(place[k])
-    return [place[k] for k in range(len(parents))], [place[parent] for parent in parents], count
+            free.append(slots[k])
+    return [slots[k] for k in range(len(parents))], [slots[parent] for parent in parents], count
 
 
 def _ancestors(parents: list[int]) -> np.ndarray:

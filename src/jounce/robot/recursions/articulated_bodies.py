@@ -96,7 +96,7 @@ class ArticulatedBodies(Module):
         """
 
         def inward(state: Any, entry: Any) -> tuple[Any, Any]:
-            body, z, r, own, drive, gives_way = entry
+            body, z, r, own, drive, is_free = entry
             about, coupling, mass = (a + b for a, b in zip(own.blocks(), read_slot(tree, state, body[0]), strict=True))
             turned = _product(about, z), _transposed_product(coupling, z)
             slid = _product(coupling, z), _product(mass, z)
@@ -107,7 +107,7 @@ class ArticulatedBodies(Module):
             inertia = jnp.sum(z * (body[2] * moment + (1 - body[2]) * force), axis=0) + drive
             largest = body[2] * _trace(about) + (1 - body[2]) * _trace(mass) + drive
             margin = inertia / largest
-            compliance = jnp.where(margin > LEAST_INERTIA, gives_way / inertia, jnp.where(gives_way > 0, jnp.nan, 0.0))
+            compliance = jnp.where(margin > LEAST_INERTIA, is_free / inertia, jnp.where(is_free > 0, jnp.nan, 0.0))
             moment, force, compliance = materialised((moment, force, compliance))
             by_moment, by_force = (moment * compliance[None])[None], (force * compliance[None])[None]
             about, coupling = about - moment[:, None] * by_moment, coupling - moment[:, None] * by_force
@@ -128,12 +128,12 @@ class ArticulatedBodies(Module):
         nothing = (jnp.zeros((3, 3, axis.shape[-1])),) * 3
         each = (*(jnp.asarray(x) for x in (tree.slot, tree.parent_slot, tree.turning)),)
         bodies = (each, by_body(axis), by_body(arm), jax.tree.map(by_body, inertia), armature, free)
-        state, found = jax.lax.scan(inward, fill_slots(tree, nothing), bodies, reverse=True)
-        moment, force, compliance, margin = found
+        state, bodies_found = jax.lax.scan(inward, fill_slots(tree, nothing), bodies, reverse=True)
+        moment, force, compliance, margin = bodies_found
         factor = None
         if base is not None:
-            carried = state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
-            whole = _six_by_six(*(a + b for a, b in zip(base.blocks(), carried, strict=True)))
+            base_state = state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
+            whole = _six_by_six(*(a + b for a, b in zip(base.blocks(), base_state, strict=True)))
             scale = 1.0 / jnp.sqrt(jnp.stack([whole[k, k] for k in range(6)]))
             factor = DenseFactor.of(whole * scale[:, None] * scale[None]), scale
         moment, force = (jnp.moveaxis(x, 0, 1) for x in (moment, force))
@@ -174,9 +174,9 @@ class ArticulatedBodies(Module):
             (slot, parent_slot, turn), z, r, moment, force, compliance, left = entry
             spin, shift = read_slot(tree, state, parent_slot)
             shift = shift + cross(spin, r)
-            found = compliance * (left - jnp.sum(moment * spin + force * shift, axis=0))
-            spin, shift = spin + z * (turn * found)[None], shift + z * ((1 - turn) * found)[None]
-            return write_slot(tree, state, slot, (spin, shift)), found
+            rate = compliance * (left - jnp.sum(moment * spin + force * shift, axis=0))
+            spin, shift = spin + z * (turn * rate)[None], shift + z * ((1 - turn) * rate)[None]
+            return write_slot(tree, state, slot, (spin, shift)), rate
 
         each = (jnp.asarray(tree.slot), jnp.asarray(tree.parent_slot), turning)
         rows = (jnp.moveaxis(x, 1, 0) for x in (self.axis, self.arm, self.moment, self.force))
@@ -185,12 +185,12 @@ class ArticulatedBodies(Module):
         state, left = jax.lax.scan(inward, fill_slots(tree, (nothing, nothing)), (*bodies, along), reverse=True)
         start, base = (nothing, nothing), None
         if self.base is not None and at_base is not None:
-            carried = state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
+            base_state = state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
             inertia, scale = self.base
-            base = inertia.solve((at_base - jnp.concatenate(carried)) * scale) * scale
+            base = inertia.solve((at_base - jnp.concatenate(base_state)) * scale) * scale
             start = base[:3], base[3:]
-        _, found = jax.lax.scan(outward, fill_slots(tree, start), (*bodies, left))
-        return found, base
+        _, rate = jax.lax.scan(outward, fill_slots(tree, start), (*bodies, left))
+        return rate, base
 
 
 def _product(matrix: Any, vector: Any) -> Any:

@@ -59,20 +59,20 @@ class Batched:
         axes, count = len(lead), math.prod(lead)
         if is_traced((arrays, constants, robot.tree)):
             flat = tuple(jnp.reshape(x, (count, *x.shape[axes:])) for x in arrays)
-            found = self.nested(robot.tree, flat, constants, static)
-            return jax.tree.map(lambda x: jnp.reshape(x, (*lead, *x.shape[1:])), found)
+            result = self.nested(robot.tree, flat, constants, static)
+            return jax.tree.map(lambda x: jnp.reshape(x, (*lead, *x.shape[1:])), result)
         flat = tuple(np.reshape(np.asarray(x), (count, *x.shape[axes:])) for x in arrays)
         program = self.mapped.program((robot.tree, constants), flat, static=static)
-        found = program(flat, max(1, min(thread_count(), count // LEAST_THREADED)))
-        return jax.tree.map(lambda x: np.reshape(x, (*lead, *x.shape[1:])), found)
+        result = program(flat, max(1, min(thread_count(), count // LEAST_THREADED)))
+        return jax.tree.map(lambda x: np.reshape(x, (*lead, *x.shape[1:])), result)
 
     def _sample(self, shared: tuple[Any, Any], arrays: tuple[Any, ...], *, static: tuple[Any, ...]) -> Any:
         """Return plain derivatives for those of samples, which are along the last axis."""
         tree, constants = shared
-        found = self.function(tree, tuple(map(taylor_coefficients, arrays)), constants, *static)
-        return jax.tree.map(plain_derivatives, found)
+        result = self.function(tree, tuple(map(taylor_coefficients, arrays)), constants, *static)
+        return jax.tree.map(plain_derivatives, result)
 
     def _block(self, tree: Any, arrays: tuple[Any, ...], constants: Any, static: tuple[Any, ...]) -> Any:
         last = tuple(jnp.moveaxis(jnp.asarray(x), 0, -1) for x in arrays)
-        found = self._sample((tree, constants), last, static=static)
-        return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), found)
+        result = self._sample((tree, constants), last, static=static)
+        return jax.tree.map(lambda x: jnp.moveaxis(x, -1, 0), result)

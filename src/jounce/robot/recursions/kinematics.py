@@ -39,8 +39,8 @@ def body_frames(tree: Tree, q: Series) -> Frames:
 
     def outward(state: Any, entry: Any) -> tuple[Any, Any]:
         body, coordinate, turn = entry
-        *placed, spin = read_slot(tree, state, body.parent_slot)
-        position, *axes = (Jet(tuple(c)) for c in placed)
+        *frame, spin = read_slot(tree, state, body.parent_slot)
+        position, *axes = (Jet(tuple(c)) for c in frame)
         position = position + _combined(axes, body.position)
         x, y, z = (_combined(axes, body.rotation[:, i]) for i in range(3))
         if tree.shape.turning:
@@ -51,15 +51,15 @@ def body_frames(tree: Tree, q: Series) -> Frames:
                 spin = spin + stacked(z * angle.differentiate())
         if tree.shape.sliding:
             position = position + z * (coordinate * (1 - body.turning))
-        found = (*(stacked(jet) for jet in (position, x, y, z)), spin)
-        return write_slot(tree, state, body.slot, found), found
+        frames = (*(stacked(jet) for jet in (position, x, y, z)), spin)
+        return write_slot(tree, state, body.slot, frames), frames
 
     coordinates = Jet(tuple(joint_coordinates(tree, q)[:, :, None]))
     angles = coordinates * jnp.asarray(tree.turning)[:, None, None] if tree.shape.sliding else coordinates
     # made before the scan, in which XLA would take sine and cosine again for each use of them
     turns = (angles, *sine_cosine(angles)) if tree.shape.turning else None
-    _, found = jax.lax.scan(outward, fill_slots(tree, base), (entries(tree), coordinates, turns))
-    arrays = [jnp.moveaxis(jnp.concatenate([x, fixed[None]]), 0, 2) for x, fixed in zip(found, base, strict=True)]
+    _, frames = jax.lax.scan(outward, fill_slots(tree, base), (entries(tree), coordinates, turns))
+    arrays = [jnp.moveaxis(jnp.concatenate([x, fixed[None]]), 0, 2) for x, fixed in zip(frames, base, strict=True)]
     position, *axes = (Jet(tuple(x)) for x in arrays[:4])
     return Frames(position, tuple(axes), Jet(tuple(arrays[4])) if levels > 1 else None)
 
@@ -68,14 +68,14 @@ def _combined(axes: Any, local: Any) -> Jet:
     return total(axis * part for axis, part in zip(axes, local, strict=True))
 
 
-def link_frame(tree: Tree, q: Series, place: Frame) -> Frames:
+def link_frame(tree: Tree, q: Series, frame_in_body: Frame) -> Frames:
     """Return the frame at a place on a body, the last of which is the base."""
-    frame = body_frames(tree, q).take(place.body)
-    axes = tuple(frame.direction(place.rotation[:, i]) for i in range(3))
-    return Frames(frame.point(place.position), axes, frame.angular_velocity)
+    frame = body_frames(tree, q).take(frame_in_body.body)
+    axes = tuple(frame.direction(frame_in_body.rotation[:, i]) for i in range(3))
+    return Frames(frame.point(frame_in_body.position), axes, frame.angular_velocity)
 
 
-def place_of(robot: AbstractRobot, link: str, point: ArrayLike) -> Frame:
+def frame_at(robot: AbstractRobot, link: str, point: ArrayLike) -> Frame:
     """Return where the frame of a link, moved to a point, is in its body; the base stands after the moving bodies.
 
     Raises
@@ -111,8 +111,8 @@ class FrameMotion:
 
 
 @Batched
-def _frame_motion(tree: Tree, arrays: tuple[Series], place: Frame) -> Any:
-    frame = link_frame(tree, arrays[0], place)
+def _frame_motion(tree: Tree, arrays: tuple[Series], frame_in_body: Frame) -> Any:
+    frame = link_frame(tree, arrays[0], frame_in_body)
     spin = frame.angular_velocity
     rates = jnp.zeros((0, *frame.position.shape)) if spin is None else stacked(spin)
     return stacked(frame.position), stacked(frame.attitude), rates
@@ -154,7 +154,7 @@ def forward_kinematics(
     >>> motion.position.tolist()
     [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [-4.0, 0.0, 0.0]]
     """
-    return FrameMotion(*_frame_motion(robot, (checked_coordinates(robot, q),), place_of(robot, link, point)))
+    return FrameMotion(*_frame_motion(robot, (checked_coordinates(robot, q),), frame_at(robot, link, point)))
 
 
 @Batched

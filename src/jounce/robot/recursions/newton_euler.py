@@ -46,7 +46,7 @@ class Turn:
     use. The matrix is cheaper made than kept.
     """
 
-    still: Any  # the matrix is still + across cosine + quarter sine, each (..., 3, 3, batch or 1)
+    constant: Any  # the matrix is still + across cosine + quarter sine, each (..., 3, 3, batch or 1)
     across: Any = None
     quarter: Any = None
     start: tuple[Any, Any] | None = None  # cosine and sine of the value
@@ -60,7 +60,7 @@ class Turn:
         if not tree.shape.turning:
             return cls(placement[..., None])
         along_z = np.array([0.0, 0.0, 1.0])[None, None, :]
-        still, across, quarter = placement * along_z, placement * (1 - along_z), placement @ QUARTER
+        constant, across, quarter = placement * along_z, placement * (1 - along_z), placement @ QUARTER
         angle = coordinates * jnp.asarray(tree.turning)[:, None, None] if tree.shape.sliding else coordinates
         s, c = [None], [1.0]
         for _ in range(angle.order):
@@ -69,15 +69,15 @@ class Turn:
             c.append(following[1])
         value = angle.coefficients[0][:, None]
         start = (jnp.cos(value), jnp.sin(value))
-        return cls(still[..., None], across[..., None], quarter[..., None], start, Jet(s), Jet([None, *c[1:]]))
+        return cls(constant[..., None], across[..., None], quarter[..., None], start, Jet(s), Jet([None, *c[1:]]))
 
     @property
     def matrix(self) -> Any:
         """The matrix for the value, shape (3, 3, batch)."""
         if self.start is None:
-            return self.still
+            return self.constant
         cosine, sine = self.start
-        return self.still + self.across * cosine + self.quarter * sine
+        return self.constant + self.across * cosine + self.quarter * sine
 
     def outward(self, vector: Jet) -> Jet:
         """Take a vector from the parent's frame to that of the body."""
@@ -188,9 +188,9 @@ def recursive_newton_euler(
             state = (stacked(parent), stacked(about))
         return state, (stacked(along), stacked(force), stacked(moment))
 
-    _, kept = jax.lax.scan(outward, fill_slots(tree, base), bodies)
+    _, by_body = jax.lax.scan(outward, fill_slots(tree, base), bodies)
     nothing = jnp.zeros((order - 1, 3, samples))
-    state, results = jax.lax.scan(inward, fill_slots(tree, (nothing, nothing)), (*bodies[:3], kept), reverse=True)
+    state, results = jax.lax.scan(inward, fill_slots(tree, (nothing, nothing)), (*bodies[:3], by_body), reverse=True)
     along, force, moment = (jnp.moveaxis(x, 0, 1) for x in results)
     return along, force, moment, state if tree.shape.slots == 1 else jax.tree.map(lambda x: x[0], state)
 

@@ -99,7 +99,7 @@ class TreeEquations(Module):
         1 where the acceleration is given in the place of a force, else 0.
     base : BaseBody, optional
         Of a base that moves freely.
-    places : tuple of Frame
+    frames : tuple of Frame
         Where wrenches from outside act, and in which axes of the body they are given.
     global_axes : tuple of bool
         Whether they are in the axes of the scene.
@@ -110,7 +110,7 @@ class TreeEquations(Module):
     tree: Tree
     driven: Any
     base: BaseBody | None = None
-    places: tuple[Frame, ...] = ()
+    frames: tuple[Frame, ...] = ()
     global_axes: tuple[bool, ...] = eqx.field(static=True, default=())
     drives: bool = eqx.field(static=True, default=False)
 
@@ -162,9 +162,9 @@ class TreeEquations(Module):
         units = jnp.broadcast_to(jnp.eye(size)[..., None], (size, size, lanes))
         directions = Unknowns(units[:, :count], None if motion.base is None else units[:, count:])
         matrix = jnp.concatenate([x for x in jax.vmap(slope)(directions) if x is not None], axis=1)
-        gives_way = jnp.concatenate([free, jnp.ones(size - count)])[:, None]
-        matrix = matrix * gives_way[:, None] * gives_way[None]
-        matrix = matrix + jnp.eye(size)[..., None] * (1.0 - gives_way[:, None])
+        is_free = jnp.concatenate([free, jnp.ones(size - count)])[:, None]
+        matrix = matrix * is_free[:, None] * is_free[None]
+        matrix = matrix + jnp.eye(size)[..., None] * (1.0 - is_free[:, None])
         scale = 1.0 / jnp.sqrt(jnp.stack([matrix[k, k] for k in range(size)]))
         return DenseFactor.of(matrix * scale[:, None] * scale[None]), scale
 
@@ -204,19 +204,19 @@ class TreeEquations(Module):
         along = jnp.sum(z * moment, axis=0)
         if tree.shape.sliding:
             along = turning[0] * along + (1 - turning[0]) * jnp.sum(z * force, axis=0)
-        found = to_coordinates(tree, along[None])[0]
+        forces = to_coordinates(tree, along[None])[0]
         if self.drives:
             armature, damping, friction = (
                 jnp.asarray(x)[:, None] for x in (tree.armature, tree.damping, tree.friction)
             )
-            found = found + armature * unknowns.joints + damping * motion.rates + friction * jnp.sign(motion.rates)
+            forces = forces + armature * unknowns.joints + damping * motion.rates + friction * jnp.sign(motion.rates)
         if base is None or self.base is None:
-            return Unknowns(found, None)
+            return Unknowns(forces, None)
         own = _of_inertia(base.axes, dataclasses.astuple(self.base), spin0, spin_rate0, shift0)
         base_force, base_moment = base_force + own[0], base_moment + own[1]
         if pushed is not None:
             base_force, base_moment = base_force - pushed[:3, -1], base_moment - pushed[3:, -1]
-        return Unknowns(found, jnp.concatenate([_local(base.axes, x) for x in (base_force, base_moment)]))
+        return Unknowns(forces, jnp.concatenate([_local(base.axes, x) for x in (base_force, base_moment)]))
 
     def motion_rates(self, motion: TreeState, unknowns: Unknowns) -> TreeState:
         """Return how all that a motion consists of changes."""
@@ -252,9 +252,9 @@ class TreeEquations(Module):
         before = sums_at_parents(tree, turn, spin0)
         shift = cross(before, motion.arm) + z * ((1 - turning) * rates)
         velocity = sums_at_parents(tree, shift, velocity0) + shift
-        place = sums_at_parents(tree, motion.arm, place0) + motion.arm
+        position = sums_at_parents(tree, motion.arm, place0) + motion.arm
         of_bodies = (tree.mass, tree.center, tree.inertia)
-        parts = [_energies(motion.axes, of_bodies, before + turn, velocity, place, tree.gravity)]
+        parts = [_energies(motion.axes, of_bodies, before + turn, velocity, position, tree.gravity)]
         if base is not None and self.base is not None:
             own = dataclasses.astuple(self.base)
             parts.append(_energies(base.axes, own, spin0, velocity0, place0, tree.gravity))
@@ -277,7 +277,7 @@ class TreeEquations(Module):
         last = axes[:, :, :1] if motion.base is None else motion.base.axes[:, :, None]
         axes = jnp.concatenate([axes, last], axis=2)
         whole = jnp.zeros((6, *axes.shape[2:]))
-        for value, (body, point, rotation), in_scene in zip(wrenches, self.places, self.global_axes, strict=True):
+        for value, (body, point, rotation), in_scene in zip(wrenches, self.frames, self.global_axes, strict=True):
             own = jax.lax.dynamic_index_in_dim(axes, body, 2, keepdims=False)
             force, torque = value[:3], value[3:]
             if not in_scene:
@@ -312,8 +312,8 @@ class TreeFactor(Module):
             assert self.dense is not None
             (factor, scale), count = self.dense, len(self.free)
             given = [missing.joints * self.free[:, None]] + ([] if missing.base is None else [missing.base])
-            found = factor.solve(jnp.concatenate(given) * scale) * scale
-            return Unknowns(found[:count] * self.free[:, None], None if missing.base is None else found[count:])
+            solution = factor.solve(jnp.concatenate(given) * scale) * scale
+            return Unknowns(solution[:count] * self.free[:, None], None if missing.base is None else solution[count:])
         if self.base is None or missing.base is None:
             return Unknowns(self.bodies.solve(missing.joints)[0], None)
         axes = self.base.axes
@@ -353,7 +353,7 @@ def _turned_inertia(axes: Any, mass: Any, center: Any, tensor: Any) -> RigidIner
 
 
 def _energies(
-    axes: Any, values: tuple[Any, ...], spin: Any, velocity: Any, place: Any, gravity: Any
+    axes: Any, values: tuple[Any, ...], spin: Any, velocity: Any, position: Any, gravity: Any
 ) -> tuple[Any, Any]:
     """Return the kinetic energy of bodies, or of one, and the potential energy, summed."""
     mass, center, tensor = _columns((values[0], values[1], values[2]), axes.ndim > 3)
@@ -361,7 +361,7 @@ def _energies(
     moved, momentum = velocity + cross(spin, arm), total(tensor[:, k] * w[k : k + 1] for k in range(3))
     down = jnp.reshape(jnp.asarray(gravity), (3,) + (1,) * (arm.ndim - 1))
     kinetic = 0.5 * jnp.sum(mass * moved * moved + w * momentum, axis=0)
-    potential = -jnp.sum(mass * down * (place + arm), axis=0)
+    potential = -jnp.sum(mass * down * (position + arm), axis=0)
     each = [jnp.sum(x.reshape(-1, x.shape[-1]), axis=0) for x in (kinetic, potential)]
     return each[0], each[1]
 

@@ -27,8 +27,8 @@ def sums_at_parents(tree: Tree, own: BodyVectors, base: BaseVector) -> BodyVecto
         return write_slot(tree, state, slot, before + part), before
 
     bodies = (jnp.asarray(tree.slot), jnp.asarray(tree.parent_slot), jnp.moveaxis(own, 1, 0))
-    _, found = jax.lax.scan(outward, fill_slots(tree, base), bodies)
-    return jnp.moveaxis(found, 0, 1)
+    _, sums = jax.lax.scan(outward, fill_slots(tree, base), bodies)
+    return jnp.moveaxis(sums, 0, 1)
 
 
 def totals(tree: Tree, own: BodyVectors, passed: BodyVectors | None = None) -> tuple[BodyVectors, BaseVector]:
@@ -57,5 +57,5 @@ def totals(tree: Tree, own: BodyVectors, passed: BodyVectors | None = None) -> t
 
     bodies = (jnp.asarray(tree.slot), jnp.asarray(tree.parent_slot), *(jnp.moveaxis(x, 1, 0) for x in rows))
     nothing = jnp.zeros((own.shape[0], own.shape[2]))
-    state, found = jax.lax.scan(inward, fill_slots(tree, nothing), bodies, reverse=True)
-    return jnp.moveaxis(found, 0, 1), state if tree.shape.slots == 1 else state[0]
+    state, sums = jax.lax.scan(inward, fill_slots(tree, nothing), bodies, reverse=True)
+    return jnp.moveaxis(sums, 0, 1), state if tree.shape.slots == 1 else state[0]

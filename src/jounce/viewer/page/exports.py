@@ -29,8 +29,8 @@ def file_name(title: str, ending: str) -> str:
     >>> file_name("Planar four-bar: psi", ".csv")
     'planar_four-bar_psi.csv'
     """
-    kept = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else " " for c in title)
-    return ("_".join(kept.lower().split()) or "motion") + ending
+    letters = "".join(c if c.isascii() and (c.isalnum() or c in "-_") else " " for c in title)
+    return ("_".join(letters.lower().split()) or "motion") + ending
 
 
 def table(recording: Recording) -> bytes:
@@ -114,7 +114,7 @@ def animation(overlay: Overlay) -> str:
 def frames_shown(recording: Recording) -> list[int]:
     """Return the frames of an animation: all, or as many as are needed to look smooth."""
     time = recording.time
-    wanted = np.arange(time[0], time[-1] + 0.5 * SMOOTH, SMOOTH)
-    if len(wanted) < 60:  # short motions are shown instant by instant
+    targets = np.arange(time[0], time[-1] + 0.5 * SMOOTH, SMOOTH)
+    if len(targets) < 60:  # short motions are shown instant by instant
         return list(range(len(time)))
-    return sorted({*nearest_instants(time, wanted).tolist(), len(time) - 1})
+    return sorted({*nearest_instants(time, targets).tolist(), len(time) - 1})

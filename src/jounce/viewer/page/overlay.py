@@ -112,7 +112,7 @@ class Overlay:
         force_scale *= options.force_length
         forces = {}
         for kind in options.kinds:
-            pairs = [(load.place, load.force) for load in loads if load.kind == kind and load.force is not None]
+            pairs = [(load.point, load.force) for load in loads if load.kind == kind and load.force is not None]
             forces[kind] = arrows_along(recording, pairs, force_scale)
         paths = coloured_paths(recording, options.traced, options.path_order)
         return cls(recording, options, arrows, scales, *paths, loads, forces, force_scale, largest)

@@ -37,7 +37,7 @@ class Panel(Observer):
 
     def _add_time(self) -> None:
         gui, player = self.gui, self.page.player
-        self.time = gui.add_slider("time (s)", *self._span(), player.start)
+        self.time = gui.add_slider("time (s)", *self._interval(), player.start)
         self.time.on_update(lambda event: self._seek(event))
         self.play = gui.add_button("Play", icon="player-play", hint="Play or pause")
         self.play.on_click(lambda _: self.set_playing(not player.playing))
@@ -48,7 +48,7 @@ class Panel(Observer):
         self.status = gui.add_html("")
         self._say_status()
 
-    def _span(self) -> tuple[float, float, float]:
+    def _interval(self) -> tuple[float, float, float]:
         """Return the ends and the step of the slider of the time, s."""
         player = self.page.player
         return player.start, max(player.stop, player.start + 1e-9), _step(player.stop - player.start)
@@ -137,7 +137,7 @@ class Panel(Observer):
     def on_recording(self, recording: Recording) -> None:
         """Follow a new motion."""
         self.message.visible = False
-        self.time.min, self.time.max, self.time.step = self._span()
+        self.time.min, self.time.max, self.time.step = self._interval()
         self.time.value = self.page.player.now
         for name, number in self._numbers.items():
             if number.disabled and name in recording.values:
@@ -167,7 +167,7 @@ class Panel(Observer):
         self.status.content = status_line(self.page.recording, session.elapsed, self._busy)
 
 
-def _step(span: float) -> float:
+def _step(duration: float) -> float:
     """Return the step of a slider: a power of ten, at least a thousand of them.
 
     Examples
@@ -175,4 +175,4 @@ def _step(span: float) -> float:
     >>> _step(2.0), _step(0.1321)
     (0.001, 0.0001)
     """
-    return float(10.0 ** np.floor(np.log10(span / 1000 * (1 + 1e-9)))) if span > 0 else 1e-3
+    return float(10.0 ** np.floor(np.log10(duration / 1000 * (1 + 1e-9)))) if duration > 0 else 1e-3

@@ -51,11 +51,11 @@ class Player:
         >>> player.advanced(0.5)
         0.5
         """
-        span = self.stop - self.start
+        duration = self.stop - self.start
         then = self.now + elapsed * self.speed
         if then > self.stop or then < self.start:
-            if self.loop and span > 0:
-                return self.start + (then - self.start) % span
+            if self.loop and duration > 0:
+                return self.start + (then - self.start) % duration
             self.playing = False
             return self.stop if then > self.stop else self.start
         return then

@@ -68,8 +68,8 @@ def cleaned(
     >>> cleaned(np.array([0.0, 1.0]), steady, 2).tolist()
     [[0.0], [0.0]]
     """
-    span = float(time[-1] - time[0]) or 1.0
-    sizes = [np.abs(values[:, k]).max(initial=0.0) / span ** (order - k) for k in range(order + 1)]
+    duration = float(time[-1] - time[0]) or 1.0
+    sizes = [np.abs(values[:, k]).max(initial=0.0) / duration ** (order - k) for k in range(order + 1)]
     return values[:, order] if sizes[-1] > 1e-9 * max(sizes) else np.zeros_like(values[:, order])
 
 
@@ -79,8 +79,8 @@ def default_charts(recording: Recording) -> list[tuple[str, int]]:
     if not names:
         return []
     first = names[0]
-    highest = recording.outputs[first].values.shape[1] - 1
-    return [(first, 0), *([(first, min(2, highest))] if highest else [])]
+    max_order = recording.outputs[first].values.shape[1] - 1
+    return [(first, 0), *([(first, min(2, max_order))] if max_order else [])]
 
 
 class Chart:
@@ -185,12 +185,12 @@ class Plots(Observer):
                 self.order.on_update(lambda event: self._solve_to(event))
         for name, order in default_charts(recording):
             self.add(name, order)
-        self._still_until = 0.0
+        self._fixed_until = 0.0
         page.server.on_client_connect(lambda _: self._settle())
 
     def _settle(self) -> None:
         """Let a browser that has just come lay out the plots: data that arrive before leave them without ticks."""
-        self._still_until = time.monotonic() + SETTLING
+        self._fixed_until = time.monotonic() + SETTLING
         time.sleep(SETTLING)
         with self.page.lock:
             for chart in self.charts:
@@ -243,7 +243,7 @@ class Plots(Observer):
 
     def on_frame(self, frame: int) -> None:
         """Move the cursors, and renew the legend."""
-        if time.monotonic() >= self._still_until:
+        if time.monotonic() >= self._fixed_until:
             for chart in self.charts:
                 chart.show(frame)
         self.legend.content = legend(self.page.overlay, frame)

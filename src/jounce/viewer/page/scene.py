@@ -81,7 +81,7 @@ class ViserScene:
         mesh = coil(8, its.radius, 0.16 * its.radius) if spring else cylinder(its.radius, 1.0, center=(0, 0, 0.5))
         handle = self._mesh(f"/connectors/{its.name}", mesh, its.colour)
         ends = zip(its.bodies, its.points, strict=True)
-        start, end = (recording.placed(body, point) + 0.85 * in_front(recording) for body, point in ends)
+        start, end = (recording.global_point(body, point) + 0.85 * in_front(recording) for body, point in ends)
         return handle, start, end
 
     def show(self, overlay: Overlay, frame: int) -> None:
@@ -129,7 +129,7 @@ class ViserScene:
             share = float(np.linalg.norm(torque)) / (overlay.largest_torque or 1.0)
             handle.visible = share > 1e-6
             if handle.visible:
-                handle.position = load.place[frame] + in_front(overlay.recording)
+                handle.position = load.point[frame] + in_front(overlay.recording)
                 handle.wxyz = quaternion_to(torque)
                 handle.scale = ARC_RADIUS * self._size * (0.3 + 0.7 * np.sqrt(share))
 
@@ -168,13 +168,13 @@ class ViserScene:
         camera.position, camera.look_at, camera.up = tuple(target + distance * toward), tuple(target), tuple(up)
         camera.fov, camera.near, camera.far = field, 0.01 * distance, 20.0 * distance
 
-    def _set_grid(self, normal: int, place: Vector, size: float) -> None:
-        """Draw a grid of round cells through a place, across one of the axes."""
+    def _set_grid(self, normal: int, position: Vector, size: float) -> None:
+        """Draw a grid of round cells through a position, across one of the axes."""
         cell = rounded_down(0.12 * size)
         section = 5 * cell
         width = float(np.ceil(2.2 * size / section)) * section
-        corner = np.round(place / section) * section
-        corner[normal] = place[normal]
+        corner = np.round(position / section) * section
+        corner[normal] = position[normal]
         self.scene.add_grid(
             "/ground grid",
             width,
@@ -202,8 +202,8 @@ def quaternion_to(direction: Vector) -> Float[np.ndarray, "4"]:
     x, y, z = direction / np.linalg.norm(direction)
     if z < -1 + 1e-12:
         return np.array([0.0, 1.0, 0.0, 0.0])
-    found = np.array([1.0 + z, -y, x, 0.0])
-    return found / np.linalg.norm(found) + 0.0
+    quaternion = np.array([1.0 + z, -y, x, 0.0])
+    return quaternion / np.linalg.norm(quaternion) + 0.0
 
 
 def _linear(colours: Integer[np.ndarray, "*batch 3"]) -> UInt8[np.ndarray, "*batch 3"]:

@@ -86,7 +86,7 @@ class Session:
         self.error: JounceError | None = None
         self.recording = subject.solve(self.values, order)
         self.solved, self.elapsed = 1, 0.0
-        self._wanted: tuple[dict[str, float], int] | None = None
+        self._requested: tuple[dict[str, float], int] | None = None
         self._jobs: list[Callable[[], object]] = []
         self._closed = self._working = False
         self._news = threading.Condition()
@@ -98,7 +98,7 @@ class Session:
         with self._news:
             self.values.update(values or {})
             self.order = self.order if order is None else order
-            self._wanted = (dict(self.values), self.order)
+            self._requested = (dict(self.values), self.order)
             self._news.notify_all()
 
     def later(self, job: Callable[[], object]) -> None:
@@ -121,7 +121,7 @@ class Session:
 
     @property
     def _pending(self) -> bool:
-        return self._wanted is not None or bool(self._jobs) or self._working
+        return self._requested is not None or bool(self._jobs) or self._working
 
     def _work(self) -> None:
         while True:
@@ -137,12 +137,12 @@ class Session:
                     return
                 self._working = True
                 jobs, self._jobs = self._jobs, []
-                wanted, self._wanted = self._wanted, None
+                requested, self._requested = self._requested, None
             self.on_busy(True)
             for job in jobs:
                 self._guarded(job)
-            if wanted is not None:
-                self._guarded(lambda wanted=wanted: self._solve(*wanted))
+            if requested is not None:
+                self._guarded(lambda requested=requested: self._solve(*requested))
 
     def _guarded(self, job: Callable[[], object]) -> None:
         """Do something; what goes wrong is told, and the worker lives on."""

@@ -37,7 +37,7 @@ class ArrowsTab(Observer):
             self.body = self.gui.add_dropdown("body", recording.bodies, initial_value=recording.bodies[-1])
             step = 10.0 ** round(-3 + math.floor(math.log10(recording.size)))
             add_vector, components = (self.gui.add_vector2, 2) if recording.planar else (self.gui.add_vector3, 3)
-            self.place = add_vector("place (m)", (0.0,) * components, step=step, hint="In the frame of the body")
+            self.own_point = add_vector("place (m)", (0.0,) * components, step=step, hint="In the frame of the body")
             self.gui.add_button("Add", icon="plus").on_click(lambda _: self._add())
         self.point.on_update(lambda _: self._show_own())
         self._show_own()
@@ -50,13 +50,13 @@ class ArrowsTab(Observer):
         return (*(point.name for point in recording.appearance.points), OWN)
 
     def _show_own(self) -> None:
-        self.body.visible = self.place.visible = self.point.value == OWN
+        self.body.visible = self.own_point.visible = self.point.value == OWN
 
-    def _add_lengths(self, highest: int) -> None:
-        names = tuple(derivative_name(k) for k in range(1, max(highest, 1) + 1))
+    def _add_lengths(self, max_order: int) -> None:
+        names = tuple(derivative_name(k) for k in range(1, max(max_order, 1) + 1))
         self.path = self.gui.add_dropdown("path colour", names, initial_value=names[0])
         self.path.on_update(lambda _: self._set(path_order=1 + names.index(self.path.value)))
-        for order, name in enumerate(names[: min(highest, SHOWN)], 1):
+        for order, name in enumerate(names[: min(max_order, SHOWN)], 1):
             hint = "Longer or shorter than the automatic length"
             slider = self.gui.add_slider(f"{name} x", 0.1, 5.0, 0.1, 1.0, hint=hint)
             slider.on_update(lambda event, order=order: self._set_length(order, float(event.target.value)))
@@ -69,9 +69,9 @@ class ArrowsTab(Observer):
 
     def _add(self) -> None:
         if self.point.value == OWN:
-            place = tuple(float(x) for x in self.place.value)
-            words = ", ".join(f"{x:g}" for x in place)
-            self.trace(BodyPoint(self.body.value, place, f"{self.body.value} ({words})"))
+            own_point = tuple(float(x) for x in self.own_point.value)
+            words = ", ".join(f"{x:g}" for x in own_point)
+            self.trace(BodyPoint(self.body.value, own_point, f"{self.body.value} ({words})"))
         else:
             points = self.page.recording.appearance.points
             self.trace(next(point for point in points if point.name == self.point.value))

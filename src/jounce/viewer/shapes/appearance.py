@@ -18,14 +18,14 @@ __all__ = [
     "Colour",
     "ColouredMesh",
     "Connector",
-    "Place",
+    "Position",
     "upward",
 ]
 
 Colour = tuple[int, int, int]
 """Red, green and blue, from 0 to 255."""
 
-Place = Sequence[float | int] | Float[np.ndarray, " components"]
+Position = Sequence[float | int] | Float[np.ndarray, " components"]
 """Two or three components, m."""
 
 DARK, GREY = (70, 74, 82), (150, 155, 163)  # of what belongs to no body
@@ -121,13 +121,13 @@ class Appearance:
 
     def corners(self) -> dict[str, Float[np.ndarray, "8 3"]]:
         """Return the corners of the box around the meshes of each body that has some, in its frame."""
-        found = {}
+        corners = {}
         for body, meshes in self.meshes.items():
             if meshes:
                 bounds = np.stack([coloured.mesh.bounds for coloured in meshes])
                 box = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
-                found[body] = np.stack(np.meshgrid(*np.transpose(box)), axis=-1).reshape(-1, 3)
-        return found
+                corners[body] = np.stack(np.meshgrid(*np.transpose(box)), axis=-1).reshape(-1, 3)
+        return corners
 
 
 def upward(gravity: Float[np.ndarray, " components"]) -> tuple[float, float, float]:

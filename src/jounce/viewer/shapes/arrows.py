@@ -115,13 +115,13 @@ def coloured_paths(
     motions = [recording.motion(each.point) for each in traced if each.path and len(recording.time) > 1]
     if not motions:
         return np.zeros((0, 2, 3)), np.zeros((0, 2, 3), np.uint8), (0.0, 0.0)
-    places = np.stack([motion[:, 0] for motion in motions]) + in_front(recording)
+    points = np.stack([motion[:, 0] for motion in motions]) + in_front(recording)
     sizes = np.linalg.norm([motion[:, order] for motion in motions], axis=-1)
     low, high = float(sizes.min()), float(sizes.max())
     low = 0.0 if low <= 1e-9 * high else low
-    span = high - low if high - low > 1e-9 * high else 1.0
-    colours = path_colours((sizes - low) / span)
-    lines, ends = (np.stack([x[:, :-1], x[:, 1:]], axis=2).reshape(-1, 2, 3) for x in (places, colours))
+    range_ = high - low if high - low > 1e-9 * high else 1.0
+    colours = path_colours((sizes - low) / range_)
+    lines, ends = (np.stack([x[:, :-1], x[:, 1:]], axis=2).reshape(-1, 2, 3) for x in (points, colours))
     return lines, ends, (low, high)
 
 

@@ -75,15 +75,15 @@ def _connectors(seen: Skeleton) -> Iterator[Connector]:
 
 def _points(mechanism: Mechanism, seen: Skeleton) -> list[BodyPoint]:
     """Return the points of outputs, then those where joints are, but for those of the ground."""
-    found = []
+    points = []
     for name, output in mechanism.outputs.items():
         if isinstance(output, PointOutput):
-            place = np.asarray(resolve(output.point, mechanism.parameter_values), float)
-            found.append(BodyPoint(output.bodies[0], tuple(place.tolist()), name))
-    known = {(point.body, point.point) for point in found}
+            position = np.asarray(resolve(output.point, mechanism.parameter_values), float)
+            points.append(BodyPoint(output.bodies[0], tuple(position.tolist()), name))
+    known = {(point.body, point.point) for point in points}
     for body, link in seen.links.items():
-        for place, names in zip(link.points, link.names, strict=True):
-            if body != GROUND and (body, tuple(place.tolist())) not in known:
+        for position, names in zip(link.points, link.names, strict=True):
+            if body != GROUND and (body, tuple(position.tolist())) not in known:
                 words = ", ".join(names) or "centre of mass"
-                found.append(BodyPoint(body, tuple(place.tolist()), f"{body}: {words}"))
-    return found
+                points.append(BodyPoint(body, tuple(position.tolist()), f"{body}: {words}"))
+    return points

@@ -128,8 +128,8 @@ def _turned_to(axis: Point) -> Float[np.ndarray, "3 3"]:
 def _rail(motion: Motion, symbol: Symbol, margin: float) -> tuple[Point, float]:
     """Return middle and length of the line on the first body along which the point on the second travels, m."""
     whole, axis = frames(motion), symbol.axis_on(0) / np.linalg.norm(symbol.axis_on(0))
-    place = points_at(whole[symbol.bodies[1]], symbol.points[1])
-    along = (within(whole[symbol.bodies[0]], place) - symbol.points[0]) @ axis
+    point = points_at(whole[symbol.bodies[1]], symbol.points[1])
+    along = (within(whole[symbol.bodies[0]], point) - symbol.points[0]) @ axis
     low, high = float(np.nanmin(along)), float(np.nanmax(along))
     return symbol.points[0] + axis * 0.5 * (low + high), high - low + 2 * margin
 

@@ -65,8 +65,8 @@ class MeshFiles:
             return None
         if scheme in ("package", "model"):
             folders = self.path.resolve().parents[:-1]  # not in that of the whole system
-            places = [(folder, inner) for folder in folders for inner in (rest, rest.partition("/")[2]) if inner]
-            files = [named_file(inner, folder / "package.xml", error=RobotFileError) for folder, inner in places]
+            candidates = [(folder, inner) for folder in folders for inner in (rest, rest.partition("/")[2]) if inner]
+            files = [named_file(inner, folder / "package.xml", error=RobotFileError) for folder, inner in candidates]
         else:
             files = [named_file(rest, self.path, self.allow, error=RobotFileError)]
         return next((file for file in files if os.path.lexists(file)), None)
@@ -84,7 +84,7 @@ def _colour(part: trimesh.Trimesh) -> Rgba | None:
 def _resolver(file: str) -> Resolver:
     """Return what trimesh asks for the files that a mesh names: materials, pictures."""
 
-    class Beside(Resolver):
+    class AdjacentFiles(Resolver):
         def __init__(self) -> None:
             pass
 
@@ -100,4 +100,4 @@ def _resolver(file: str) -> Resolver:
         def keys(self) -> list[str]:
             return []
 
-    return Beside()
+    return AdjacentFiles()

@@ -16,7 +16,7 @@ from shapely.geometry import MultiPoint, Polygon
 from trimesh import Trimesh, creation
 
 from jounce.plot.geometry import frame_along
-from jounce.viewer.shapes.appearance import Place
+from jounce.viewer.shapes.appearance import Position
 
 __all__ = [
     "arc_arrow",
@@ -26,11 +26,11 @@ __all__ = [
     "cylinder",
     "extruded",
     "merged",
-    "placed",
     "plate",
     "rotation_to",
     "sleeve",
     "sphere",
+    "transformed",
     "tube",
     "wheel",
 ]
@@ -42,7 +42,7 @@ Rotation = Float[np.ndarray, "3 3"]
 FlatPoints = Float[np.ndarray, "points 2"]
 
 
-def rotation_to(axis: Place) -> Rotation:
+def rotation_to(axis: Position) -> Rotation:
     """Return a rotation matrix whose third column is along an axis of any length.
 
     Examples
@@ -53,7 +53,7 @@ def rotation_to(axis: Place) -> Rotation:
     return frame_along(np.asarray(axis, float))[[1, 2, 0]].T
 
 
-def placed(mesh: Trimesh, center: Place = ORIGIN, rotation: Rotation | None = None) -> Trimesh:
+def transformed(mesh: Trimesh, center: Position = ORIGIN, rotation: Rotation | None = None) -> Trimesh:
     """Return a mesh that is turned, then moved."""
     turned = mesh.vertices if rotation is None else mesh.vertices @ rotation.T
     return Trimesh(turned + np.asarray(center), mesh.faces, process=False)
@@ -65,9 +65,9 @@ def merged(meshes: Sequence[Trimesh]) -> Trimesh:
     return Trimesh(vertices, faces, process=False)
 
 
-def cylinder(radius: float, length: float, axis: Place = Z, center: Place = ORIGIN) -> Trimesh:
+def cylinder(radius: float, length: float, axis: Position = Z, center: Position = ORIGIN) -> Trimesh:
     """Return a cylinder about an axis, its middle in a centre."""
-    return placed(_unit_cylinder(), center, rotation_to(axis) * (radius, radius, length))
+    return transformed(_unit_cylinder(), center, rotation_to(axis) * (radius, radius, length))
 
 
 @cache
@@ -75,10 +75,10 @@ def _unit_cylinder() -> Trimesh:
     return _round_walls(creation.cylinder(1.0, 1.0, sections=AROUND))
 
 
-def sleeve(inside: float, outside: float, length: float, axis: Place = Z, center: Place = ORIGIN) -> Trimesh:
+def sleeve(inside: float, outside: float, length: float, axis: Position = Z, center: Position = ORIGIN) -> Trimesh:
     """Return a hollow cylinder about an axis, its middle in a centre."""
     ring = creation.annulus(inside, outside, length, sections=AROUND)
-    return placed(_round_walls(ring), center, rotation_to(axis))
+    return transformed(_round_walls(ring), center, rotation_to(axis))
 
 
 def _round_walls(mesh: Trimesh) -> Trimesh:
@@ -94,9 +94,9 @@ def _flat_walls(mesh: Trimesh) -> Trimesh:
     return mesh
 
 
-def sphere(radius: float, center: Place = ORIGIN) -> Trimesh:
+def sphere(radius: float, center: Position = ORIGIN) -> Trimesh:
     """Return a sphere."""
-    return placed(_unit_sphere(), center, radius * np.eye(3))
+    return transformed(_unit_sphere(), center, radius * np.eye(3))
 
 
 @cache
@@ -104,24 +104,24 @@ def _unit_sphere() -> Trimesh:
     return creation.uv_sphere(1.0, count=(AROUND // 2, AROUND))
 
 
-def capsule(start: Place, end: Place, radius: float) -> Trimesh:
+def capsule(start: Position, end: Position, radius: float) -> Trimesh:
     """Return a round bar between two points, with round ends."""
     start, end = np.asarray(start, float), np.asarray(end, float)
     length = float(np.linalg.norm(end - start))
     if length == 0:
         return sphere(radius, start)
     bar = creation.capsule(length, radius, count=(AROUND // 2, AROUND))
-    return placed(bar, 0.5 * (start + end), rotation_to(end - start))
+    return transformed(bar, 0.5 * (start + end), rotation_to(end - start))
 
 
-def box(size: Place, center: Place = ORIGIN, rotation: Rotation | None = None) -> Trimesh:
+def box(size: Position, center: Position = ORIGIN, rotation: Rotation | None = None) -> Trimesh:
     """Return a box of three edges about a centre."""
-    return _flat_walls(placed(creation.box(np.asarray(size, float)), center, rotation))
+    return _flat_walls(transformed(creation.box(np.asarray(size, float)), center, rotation))
 
 
 def extruded(outline: Polygon, low: float, high: float, *, sharp: bool = True) -> Trimesh:
     """Return a flat shape drawn out along z; its walls meet in sharp edges, or look round."""
-    mesh = placed(creation.extrude_polygon(outline, high - low), (0.0, 0.0, low))
+    mesh = transformed(creation.extrude_polygon(outline, high - low), (0.0, 0.0, low))
     return _flat_walls(mesh) if sharp else _round_walls(mesh)
 
 
@@ -132,7 +132,7 @@ def plate(points: FlatPoints, radius: float, low: float, high: float) -> Trimesh
 
 
 def wheel(
-    radius: float, low: float, high: float, center: Place, *, module: float = 0.0, outside: float = 0.0
+    radius: float, low: float, high: float, center: Position, *, module: float = 0.0, outside: float = 0.0
 ) -> Trimesh:
     """Return a wheel of a pitch radius with teeth of a module, smooth where that is zero; a ring with an outside."""
     middle = np.asarray(center, float)
@@ -172,4 +172,4 @@ def arc_arrow() -> Trimesh:
     line = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     ahead = np.array([-line[-1, 1], line[-1, 0], 0.0])
     head = creation.cone(0.22, 0.55, sections=AROUND)
-    return merged([tube(line, 0.08), placed(_flat_walls(head), line[-1] - 0.05 * ahead, rotation_to(ahead))])
+    return merged([tube(line, 0.08), transformed(_flat_walls(head), line[-1] - 0.05 * ahead, rotation_to(ahead))])

@@ -13,7 +13,7 @@ from xarray import Dataset
 
 from jounce.kinematics import Motion
 from jounce.mechanism.time import nearest_instants
-from jounce.viewer.shapes.appearance import Appearance, BodyPoint, Place
+from jounce.viewer.shapes.appearance import Appearance, BodyPoint, Position
 
 __all__ = ["Load", "Parameter", "Quantity", "Recording", "Vectors", "poses", "rotated", "spatial_vectors"]
 
@@ -76,7 +76,7 @@ class Load:
     ----------
     name : str
     kind : {"reaction", "driver", "applied"}
-    place : numpy.ndarray of shape (time, 3)
+    point : numpy.ndarray of shape (time, 3)
         Where it acts, m.
     force : numpy.ndarray of shape (time, 3) or None
         N, global.
@@ -86,7 +86,7 @@ class Load:
 
     name: str
     kind: str
-    place: Vectors
+    point: Vectors
     force: Vectors | None = None
     torque: Vectors | None = None
 
@@ -133,7 +133,7 @@ class Recording(abc.ABC):
         """Return what is plotted, by name."""
 
     @abc.abstractmethod
-    def derivatives(self, body: str, point: Place) -> Float[np.ndarray, "time derivative 3"]:
+    def derivatives(self, body: str, point: Position) -> Float[np.ndarray, "time derivative 3"]:
         """Return position and derivatives of a point of a body."""
 
     @abc.abstractmethod
@@ -168,7 +168,7 @@ class Recording(abc.ABC):
         """Return the index of the instant nearest to a time."""
         return int(nearest_instants(self.time, np.array([instant]))[0])
 
-    def placed(self, body: str, point: Place) -> Vectors:
+    def global_point(self, body: str, point: Position) -> Vectors:
         """Return where a point of a body is at all instants, m."""
         index = self.bodies.index(body)
         return self.position[:, index] + rotated(self.quaternion[:, index], spatial_vectors(np.asarray(point, float)))
@@ -176,7 +176,7 @@ class Recording(abc.ABC):
     @cached_property
     def box(self) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
         """Corners of the box that holds all that moves, at all instants, m."""
-        corners = [self.placed(body, corner) for body, box in self.appearance.corners().items() for corner in box]
+        corners = [self.global_point(body, corner) for body, box in self.appearance.corners().items() for corner in box]
         every = np.concatenate([self.position.reshape(-1, 3), *corners])
         return every.min(axis=0), every.max(axis=0)
 

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from jounce.robot.closed_loops.mechanism_parts import on_body
 from jounce.robot.robot import Robot
 from jounce.viewer.shapes.appearance import BODY_COLOURS, DARK, GREY, Appearance, BodyPoint, ColouredMesh, upward
-from jounce.viewer.shapes.meshes import box, capsule, cylinder, merged, placed, rotation_to, sphere
+from jounce.viewer.shapes.meshes import box, capsule, cylinder, merged, rotation_to, sphere, transformed
 from jounce.viewer.shapes.robot_shapes import file_shapes
 from jounce.viewer.shapes.shapes import Shapes
 
@@ -45,17 +45,19 @@ def robot_appearance(robot: Robot, path: Path | None = None, allow: Iterable[str
     """
     links = (robot.base, *robot.moving_links)
     size = _size(robot)
-    found: Shapes = {link: [] for link in links}
+    shapes_of_links: Shapes = {link: [] for link in links}
     for link, shapes in (file_shapes(path, allow) if path is not None else {}).items():
         if link in robot.frames:
             body, position, rotation = _body_of(robot, link)
-            found[body] += [dataclasses.replace(each, mesh=placed(each.mesh, position, rotation)) for each in shapes]
+            shapes_of_links[body] += [
+                dataclasses.replace(each, mesh=transformed(each.mesh, position, rotation)) for each in shapes
+            ]
     bars = _bars(robot, size)
-    bare = not any(found.values())
+    bare = not any(shapes_of_links.values())
     for link in links:  # a base without shapes stands on nothing, as in its file, unless all is bars
-        if not found[link] and (bare or link != robot.base):
-            found[link] = bars[link]
-    return Appearance(found, (), list(_points(robot)), size, upward(robot.gravity))
+        if not shapes_of_links[link] and (bare or link != robot.base):
+            shapes_of_links[link] = bars[link]
+    return Appearance(shapes_of_links, (), list(_points(robot)), size, upward(robot.gravity))
 
 
 def _body_of(robot: Robot, link: str) -> tuple[str, Vector, Rotation]:
@@ -95,22 +97,22 @@ def _bars(robot: Robot, size: float) -> Shapes:
     thin = 0.016 * size
     colours = {link: BODY_COLOURS[k % len(BODY_COLOURS)] for k, link in enumerate(robot.moving_links)}
     colours[robot.base] = DARK
-    found: Shapes = {}
+    shapes: Shapes = {}
     for body, ends in _ends(robot).items():
         bars = [capsule(np.zeros(3), end, thin) for end in ends if np.linalg.norm(end) > 1e-3 * size]
-        found[body] = [ColouredMesh(merged(bars), colours[body])] if bars else []
+        shapes[body] = [ColouredMesh(merged(bars), colours[body])] if bars else []
         if body == robot.base:
-            found[body].append(ColouredMesh(cylinder(0.06 * size, 0.02 * size, upward(robot.gravity)), DARK))
+            shapes[body].append(ColouredMesh(cylinder(0.06 * size, 0.02 * size, upward(robot.gravity)), DARK))
         elif not bars:
-            found[body].append(ColouredMesh(sphere(1.4 * thin), colours[body]))
+            shapes[body].append(ColouredMesh(sphere(1.4 * thin), colours[body]))
     for joint in robot.joints.values():
         if joint.moving and joint.turning:
-            found[joint.child].append(ColouredMesh(cylinder(1.35 * thin, 4.2 * thin, joint.axis), DARK))
+            shapes[joint.child].append(ColouredMesh(cylinder(1.35 * thin, 4.2 * thin, joint.axis), DARK))
         elif joint.moving:
             block = box([3 * thin, 3 * thin, 5 * thin], rotation=rotation_to(joint.axis))
-            found[joint.child].append(ColouredMesh(block, DARK))
-            found[joint.child].append(ColouredMesh(cylinder(0.6 * thin, 10 * thin, joint.axis), GREY))
-    return found
+            shapes[joint.child].append(ColouredMesh(block, DARK))
+            shapes[joint.child].append(ColouredMesh(cylinder(0.6 * thin, 10 * thin, joint.axis), GREY))
+    return shapes
 
 
 def _points(robot: Robot) -> Iterator[BodyPoint]:

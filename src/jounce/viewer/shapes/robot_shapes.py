@@ -20,7 +20,7 @@ from jounce.io.robots.mjcf_files import check_assets, included, quiet_mujoco
 from jounce.io.robots.xml_elements import Element, read_markup
 from jounce.viewer.shapes.appearance import ColouredMesh
 from jounce.viewer.shapes.mesh_files import MeshFiles, Rgba
-from jounce.viewer.shapes.meshes import box, cylinder, placed, sphere
+from jounce.viewer.shapes.meshes import box, cylinder, sphere, transformed
 from jounce.viewer.shapes.sdf_shapes import sdf_shapes
 from jounce.viewer.shapes.shapes import Shapes, coloured, upright_capsule, words_as_numbers
 
@@ -51,13 +51,13 @@ def _of_urdf(root: Element, files: MeshFiles) -> Shapes:
     for material in root.every("material"):
         with suppress(ValueError):
             materials[material.attributes.get("name", "")] = _rgba(material)
-    found: Shapes = {}
+    shapes_of_links: Shapes = {}
     for link in root.every("link"):
-        meshes = found.setdefault(link.attributes["name"], [])
+        meshes = shapes_of_links.setdefault(link.attributes["name"], [])
         for visual in link.every("visual"):
             with suppress(KeyError, ValueError):  # words where numbers should be: a bar is shown instead
                 meshes += _visual(visual, materials, files)
-    return found
+    return shapes_of_links
 
 
 def _visual(visual: Element, materials: dict[str, Rgba | None], files: MeshFiles) -> list[ColouredMesh]:
@@ -68,7 +68,9 @@ def _visual(visual: Element, materials: dict[str, Rgba | None], files: MeshFiles
     own = visual.first("material")
     rgba = None if own is None else _rgba(own) or materials.get(own.attributes.get("name", ""))
     position, rotation = _origin(visual.first("origin"))
-    return [coloured(placed(mesh, position, rotation), rgba or colour) for mesh, colour in _urdf_shape(shape, files)]
+    return [
+        coloured(transformed(mesh, position, rotation), rgba or colour) for mesh, colour in _urdf_shape(shape, files)
+    ]
 
 
 def _rgba(material: Element) -> Rgba | None:
@@ -117,7 +119,7 @@ def _of_mjcf(root: Element, path: Path, allow: Iterable[str | PathLike[str]]) ->
         return {}
     except (ValueError, RuntimeError, OSError):  # a mesh is missing: the robot itself could be read without
         return {}
-    names, found = names_of_bodies(model), {}
+    names, shapes_of_links = names_of_bodies(model), {}
     for k in range(model.ngeom):
         mesh = _geom(model, k, mujoco) if model.geom_group[k] <= 2 else None
         if mesh is not None:
@@ -125,9 +127,9 @@ def _of_mjcf(root: Element, path: Path, allow: Iterable[str | PathLike[str]]) ->
             mujoco.mju_quat2Mat(rotation, model.geom_quat[k])
             material = model.geom_matid[k]
             rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[k]
-            shown = coloured(placed(mesh, model.geom_pos[k], rotation.reshape(3, 3)), tuple(rgba.tolist()))
-            found.setdefault(names[model.geom_bodyid[k]], []).append(shown)
-    return found
+            shown = coloured(transformed(mesh, model.geom_pos[k], rotation.reshape(3, 3)), tuple(rgba.tolist()))
+            shapes_of_links.setdefault(names[model.geom_bodyid[k]], []).append(shown)
+    return shapes_of_links
 
 
 def _geom(model: Any, k: int, mujoco: Any) -> Trimesh | None:

@@ -10,11 +10,11 @@ from trimesh import Trimesh
 
 from jounce.errors import RobotFileError
 from jounce.io.robots.sdf import model_frames
-from jounce.io.robots.sdf_poses import Frames, Place, number_of, pose_of, text_of
+from jounce.io.robots.sdf_poses import FramePose, Frames, number_of, pose_of, text_of
 from jounce.io.robots.xml_elements import Element
 from jounce.viewer.shapes.appearance import ColouredMesh
 from jounce.viewer.shapes.mesh_files import MeshFiles, Rgba
-from jounce.viewer.shapes.meshes import box, cylinder, extruded, placed, sphere
+from jounce.viewer.shapes.meshes import box, cylinder, extruded, sphere, transformed
 from jounce.viewer.shapes.shapes import Shapes, coloured, upright_capsule, words_as_numbers
 
 __all__ = ["sdf_shapes"]
@@ -31,30 +31,30 @@ def sdf_shapes(root: Element, files: MeshFiles) -> Shapes:
         Where it lies.
     """
     frames = model_frames(root)[0]
-    found: Shapes = {}
+    shapes_of_links: Shapes = {}
     for name, link in frames.elements.items():
-        shown = found.setdefault(name, []) if link.tag == "link" else []
+        shown = shapes_of_links.setdefault(name, []) if link.tag == "link" else []
         for visual in link.every("visual") if link.tag == "link" else ():
             with suppress(RobotFileError, ValueError):  # words where numbers should be: a bar is shown instead
                 shown += _visual(visual, name, frames, files)
-    return found
+    return shapes_of_links
 
 
 def _visual(visual: Element, link: str, frames: Frames, files: MeshFiles) -> list[ColouredMesh]:
     geometry = visual.first("geometry")
     if geometry is None or len(geometry.children) != 1:
         return []
-    place, rgba = _place(visual, link, frames), _rgba(visual)
-    return [coloured(placed(mesh, *place), rgba or colour) for mesh, colour in _meshes(geometry.children[0], files)]
+    pose, rgba = _pose(visual, link, frames), _rgba(visual)
+    return [coloured(transformed(mesh, *pose), rgba or colour) for mesh, colour in _meshes(geometry.children[0], files)]
 
 
-def _place(visual: Element, link: str, frames: Frames) -> Place:
+def _pose(visual: Element, link: str, frames: Frames) -> FramePose:
     """Return where a visual is in the frame of its link; its pose may be relative to another frame."""
     pose = visual.first("pose")
     reference = "" if pose is None else pose.attributes.get("relative_to", "")
     if reference and reference not in frames.elements:
         raise visual.error("is placed relative to a frame that there is not", "visual", value=reference)
-    return frames.place(reference or link).then(pose_of(visual)).seen_from(frames.place(link))
+    return frames.pose(reference or link).then(pose_of(visual)).seen_from(frames.pose(link))
 
 
 def _rgba(visual: Element) -> Rgba | None:

@@ -59,12 +59,12 @@ def independent(robot: Robot) -> tuple[str, ...]:
     """
     loops = Loops(robot)
     start = loops.closed(np.zeros(len(robot.joint_names)), np.ones(len(robot.joint_names), bool))
-    freedom = len(start) - sum(len(kept) for kept, _ in loops.independent(start))
+    freedom = len(start) - sum(len(chosen_here) for chosen_here, _ in loops.independent(start))
     names = sorted(robot.joint_names, key=lambda name: (robot.limits[name].effort is None, _depth(robot, name)))
     for chosen in islice(combinations(names, freedom), MOST_TRIED):
-        still = {name: float(start[robot.joint_names.index(name)]) for name in chosen}
+        fixed = {name: float(start[robot.joint_names.index(name)]) for name in chosen}
         try:
-            solve(robot.mechanism(start, drivers=still, time=[0.0], drives=False), order=0)
+            solve(robot.mechanism(start, drivers=fixed, time=[0.0], drives=False), order=0)
         except JounceError:
             continue
         return tuple(name for name in robot.joint_names if name in chosen)

@@ -37,16 +37,16 @@ def mechanism_loads(motion: Motion, solved: Bool[np.ndarray, " all"]) -> list[Lo
         raise JounceError("forces need accelerations; set the order to 2 or more", name="order", value=motion.order)
     seen = skeleton(motion.mechanism)
     whole = {body: frame[solved] for body, frame in frames(motion).items()}
-    found = [_reaction(motion, solved, whole, symbol, "reaction") for symbol in seen.symbols]
-    found += [_reaction(motion, solved, whole, symbol, "driver") for symbol in seen.drivers]
+    loads = [_reaction(motion, solved, whole, symbol, "reaction") for symbol in seen.symbols]
+    loads += [_reaction(motion, solved, whole, symbol, "driver") for symbol in seen.drivers]
     for symbol in seen.forces:
         force, size = motion.mechanism.forces[symbol.name], applied_force(motion, symbol.name).values[solved][:, 0]
-        places = [points_at(whole[body], point) for body, point in zip(symbol.bodies, symbol.points, strict=True)]
-        vector = _applied(force, symbol, size, whole, places)
+        points = [points_at(whole[body], point) for body, point in zip(symbol.bodies, symbol.points, strict=True)]
+        vector = _applied(force, symbol, size, whole, points)
         if vector is not None:
             pair = {"force" if force.unit == "N" else "torque": vector}
-            found.append(Load(symbol.name, "applied", spatial_vectors(places[-1]), **pair))
-    return found
+            loads.append(Load(symbol.name, "applied", spatial_vectors(points[-1]), **pair))
+    return loads
 
 
 def _reaction(
@@ -60,8 +60,8 @@ def _reaction(
         torque = _about_z(torque[:, 0])
     else:
         torque = torque[:, 0]
-    place = points_at(whole[symbol.bodies[slot]], symbol.points[slot])
-    return Load(symbol.name, kind, spatial_vectors(place), spatial_vectors(force), torque)
+    point = points_at(whole[symbol.bodies[slot]], symbol.points[slot])
+    return Load(symbol.name, kind, spatial_vectors(point), spatial_vectors(force), torque)
 
 
 def _about_z(size: Float[np.ndarray, " time"]) -> Vectors:
@@ -73,7 +73,7 @@ def _applied(
     symbol: Symbol,
     size: Float[np.ndarray, "time *component"],
     whole: dict[str, Frame],
-    places: list[Float[np.ndarray, "time component"]],
+    points: list[Float[np.ndarray, "time component"]],
 ) -> Vectors | None:
     """Return a force or a torque as a global vector; None for a law of no direction that is known here."""
     if size.ndim == 2:  # by components
@@ -86,8 +86,8 @@ def _applied(
         return spatial_vectors(along) * size[:, None]
     if force.unit != "N":
         return _about_z(size)
-    if len(places) == 2 and hasattr(force, "point_i"):
-        line = places[1] - places[0]
+    if len(points) == 2 and hasattr(force, "point_i"):
+        line = points[1] - points[0]
         length = np.linalg.norm(line, axis=1, keepdims=True)
         return spatial_vectors(line / np.where(length > 0, length, 1.0)) * size[:, None]
     return None

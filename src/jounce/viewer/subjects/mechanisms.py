@@ -17,7 +17,7 @@ from jounce.mechanism import AngularVelocityOutput, Mechanism, time_grid
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot.labels import quantity_word
 from jounce.trajectory import Expression
-from jounce.viewer.shapes.appearance import Appearance, Place
+from jounce.viewer.shapes.appearance import Appearance, Position
 from jounce.viewer.shapes.mechanism_appearance import mechanism_appearance
 from jounce.viewer.shapes.recording import Load, Parameter, Quantity, Recording, poses, spatial_vectors
 from jounce.viewer.subjects.loads import has_loads, mechanism_loads
@@ -114,13 +114,13 @@ class MechanismRecording(Recording):
 
     def quantities(self) -> dict[str, Quantity]:
         """Return all outputs, or how each body turns where there are none."""
-        outputs, found = self.solution.mechanism.outputs, {}
+        outputs, quantities = self.solution.mechanism.outputs, {}
         units = self.solution.mechanism.shown_units
         for name, values in self.solution.outputs.items():
             words = tuple(quantity_word(outputs[name], k) for k in range(values.shape[1]))
             unit, factor = units.of(outputs[name].unit, name)
-            found[name] = self._quantity(unit, values * factor, words, outputs[name].labels)
-        return found or dict(map(self._turning, self.solution.mechanism.bodies))
+            quantities[name] = self._quantity(unit, values * factor, words, outputs[name].labels)
+        return quantities or dict(map(self._turning, self.solution.mechanism.bodies))
 
     def _turning(self, body: str) -> tuple[str, Quantity]:
         rates = [quantity_word(AngularVelocityOutput(body), k) for k in range(self.order + 1)]
@@ -136,7 +136,7 @@ class MechanismRecording(Recording):
         values = values[self.solved]
         return Quantity(unit, values.reshape(*values.shape[:2], -1), words, *labels)
 
-    def derivatives(self, body: str, point: Place) -> Float[np.ndarray, "time derivative 3"]:
+    def derivatives(self, body: str, point: Position) -> Float[np.ndarray, "time derivative 3"]:
         """Return position and derivatives of a point."""
         body = GROUND if body == self.ground else body
         return spatial_vectors(self.solution.point(body, np.asarray(point).tolist()).values[self.solved])

@@ -71,12 +71,12 @@ class ModesSubject:
         modes = linearise(rest).modes
         number = min(max(round(mode), 1), len(modes))
         motion = modes.motion(number, amplitude, duration=SWING)
-        found = recorded(motion, self.appearance, self.title, self.ground)
+        recording = recorded(motion, self.appearance, self.title, self.ground)
         row = modes.rows[number - 1]
         swings = f"{row['frequency']:.4g} Hz, damping ratio {row['damping_ratio']:.3g}"
-        told = swings if row["damped_frequency"] else row["kind"]
-        notice = f"mode {number} of {len(modes)}: {told}; the equilibrium is {rest.stability}"
-        return dataclasses.replace(found, notice=notice, values={**found.values, **values})
+        kind = swings if row["damped_frequency"] else row["kind"]
+        notice = f"mode {number} of {len(modes)}: {kind}; the equilibrium is {rest.stability}"
+        return dataclasses.replace(recording, notice=notice, values={**recording.values, **values})
 
 
 def _unused(taken: Collection[str], name: str) -> str:

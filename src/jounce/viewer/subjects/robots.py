@@ -20,7 +20,7 @@ from jounce.robot.model.links_and_joints import Joint
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory
 from jounce.units.shown_units import time_axes
-from jounce.viewer.shapes.appearance import Appearance, Place
+from jounce.viewer.shapes.appearance import Appearance, Position
 from jounce.viewer.shapes.recording import Load, Parameter, Quantity, Recording, rotated
 
 __all__ = ["RobotRecording", "RobotSubject", "swing_of", "swing_parameters"]
@@ -70,7 +70,7 @@ class RobotRecording(Recording):
                 torques[f"{first} of {name}"] = Quantity(unit, values, (first, *rates[1 : values.shape[1]]))
         return coordinates | torques
 
-    def derivatives(self, body: str, point: Place) -> Float[np.ndarray, "time derivative 3"]:
+    def derivatives(self, body: str, point: Position) -> Float[np.ndarray, "time derivative 3"]:
         """Return position and derivatives of a point."""
         return np.asarray(forward_kinematics(self.robot, self.q, body, np.asarray(point, float)).position)
 
@@ -78,16 +78,16 @@ class RobotRecording(Recording):
         """Return what the joints carry, and what their drives exert."""
         if self.torques is None:
             return []
-        carried = np.asarray(joint_wrenches(self.robot, self.q, frame="base"))[:, 0]
-        found = []
+        wrenches = np.asarray(joint_wrenches(self.robot, self.q, frame="base"))[:, 0]
+        loads = []
         for k, joint in enumerate(joint for joint in self.robot.joints.values() if joint.moving):
-            place = self.position[:, k + 1]
-            found.append(Load(joint.name, "reaction", place, carried[:, k, :3], carried[:, k, 3:]))
+            position = self.position[:, k + 1]
+            loads.append(Load(joint.name, "reaction", position, wrenches[:, k, :3], wrenches[:, k, 3:]))
             if joint.name in self.robot.joint_names:
                 axis = rotated(self.quaternion[:, k + 1], np.asarray(joint.axis, float))
                 effort = axis * self.torques[:, 0, self.robot.joint_names.index(joint.name), None]
-                found.append(Load(joint.name, "driver", place, **{"torque" if joint.turning else "force": effort}))
-        return found
+                loads.append(Load(joint.name, "driver", position, **{"torque" if joint.turning else "force": effort}))
+        return loads
 
     def dataset(self) -> Dataset:
         """Return coordinates and torques, for a table."""
@@ -229,7 +229,7 @@ def coordinates(robot: Robot, trajectory: JointTrajectory, time: Times, order: i
     q = np.zeros((len(time), order + 1, len(robot.joint_names)))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)  # the page shows how rough they are
-        found = trajectory.derivatives(time, order)
+        derivatives = trajectory.derivatives(time, order)
     for k, name in enumerate(trajectory.names):
-        q[..., robot.joint_names.index(name)] = found[..., k]
+        q[..., robot.joint_names.index(name)] = derivatives[..., k]
     return q

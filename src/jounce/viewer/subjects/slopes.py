@@ -91,9 +91,9 @@ def peak_slopes(motion: Motion, name: str, order: int) -> PeakSlopes:
         return sign * jnp.reshape(moved[-1, order], -1)[component].sum()
 
     given = {k: x for k, x in mechanism.parameters.items() if not isinstance(x, str | Expression)}
-    found = jax.grad(height)({name: jnp.asarray(mechanism.parameter_values[name], float) for name in given})
+    gradient = jax.grad(height)({name: jnp.asarray(mechanism.parameter_values[name], float) for name in given})
     unit, factor = mechanism.shown_units.of(its.unit, stem)
-    slopes = {name: float(slope) * factor for name, slope in found.items()}
+    slopes = {name: float(slope) * factor for name, slope in gradient.items()}
     return PeakSlopes(abs(its.minimum if low else its.maximum) * factor, unit, instant, slopes)
 
 
@@ -141,23 +141,23 @@ class SlopesFolder(Observer):
 
         def job() -> None:
             if recording is self.page.recording:
-                self.text.content = told(recording, name, order)
+                self.text.content = slopes_html(recording, name, order)
 
         self.text.content = "<em>finding slopes ...</em>"
         self.page.session.later(job)
 
 
-def told(recording: Any, name: str, order: int) -> str:
+def slopes_html(recording: Any, name: str, order: int) -> str:
     """Return the peak and what a step of each parameter makes of it, as lines of HTML."""
     motion = recording.solution
     try:
-        found = peak_slopes(motion, name, order)
+        slopes = peak_slopes(motion, name, order)
     except JounceError as error:
         return html.escape(f"No slopes: {error}")
-    lines = [f"peak {found.peak:.4g} {found.unit} at {found.instant:.4g} s"]
-    for parameter, slope in found.slopes.items():
+    lines = [f"peak {slopes.peak:.4g} {slopes.unit} at {slopes.instant:.4g} s"]
+    for parameter, slope in slopes.slopes.items():
         allowed = motion.mechanism.dimensions.get(parameter, ())
         percent = 0.01 * float(motion.mechanism.parameter_values[parameter]), "1 %"
         step, words = STEPS.get(allowed[0], percent) if allowed else percent
-        lines.append(f"{parameter} +{words}: {slope * step:+.3g} {found.unit}")
+        lines.append(f"{parameter} +{words}: {slope * step:+.3g} {slopes.unit}")
     return "<br>".join(map(html.escape, lines))
