@@ -179,16 +179,10 @@ class _Writer:
             entries["quantity"] = words[-1]
         return entries | values
 
-<<<<<<< HEAD
-    def _values(self, place: str, element: Any, kind: type[Any] | None = None) -> dict[str, Any]:
+    def _values(self, location: str, element: Any, kind: type[Any] | None = None) -> dict[str, Any]:
         """Return the values of an element by key; those that a file need not give are left out."""
         kind = kind or type(element)
-        found: dict[str, Any] = {}
-=======
-    def _values(self, location: str, element: Any) -> dict[str, Any]:
-        """Return the values of an element by key; those that a file need not give are left out."""
-        kind, entries = type(element), {}
->>>>>>> names
+        entries: dict[str, Any] = {}
         fields = value_fields(kind)
         for key in file_keys(kind):
             values = [getattr(element, field) for field in key.fields]
