@@ -1,5 +1,7 @@
 """How long steps are, and what comes after them, of many designs as of one motion."""
 
+from typing import Any
+
 import jax
 import numpy as np
 import pytest
@@ -18,10 +20,10 @@ from jounce.kinematics.status import Status
 LIMITS = StepLimits(np.asarray(1.0), np.asarray(1e-10))
 
 
-def placed(instant, safe_step, radius=1.0, turnover=0.0):
+def placed(instant: Any, safe_step: Any, turnover: Any = 0.0):
     """Return the control of designs that have come to some places."""
-    place = Place(*(np.array(x, float) for x in np.broadcast_arrays(instant, safe_step, radius, turnover)))
-    return steps_begin(place, place.instant)
+    place = Place(*(np.array(x, float) for x in np.broadcast_arrays(instant, safe_step, 1.0, turnover)))
+    return steps_begin(place, np.array(place.instant))
 
 
 def decided(control, status, there):

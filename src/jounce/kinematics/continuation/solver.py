@@ -65,7 +65,7 @@ class Solver:
             arrival = self.program((needed, step, instant, None, np.zeros(step.shape, bool)))
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
 
-    def still(self, coordinates: Mapping[str, np.ndarray]) -> SolvedState:
+    def still(self, coordinates: Mapping[str, Any]) -> SolvedState:
         """Return what is known of an instant before it is solved: its position."""
         levels, system = self.order + 1, self.model.system
         still = {name: np.zeros((levels, *np.shape(x))) for name, x in coordinates.items()}

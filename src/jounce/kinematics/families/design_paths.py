@@ -125,8 +125,8 @@ class DesignPaths:
                 return found
             away, own = control.target - control.place.instant, self.designs.own(lanes)
             arrival = solver.program((known, away, control.target, own, np.ones(len(lanes), bool)))
-            there = Place(control.target, arrival.safe_step, arrival.radius, arrival.turnover)
-            begins = control.step == 0
+            there: Any = Place(control.target, arrival.safe_step, arrival.radius, arrival.turnover)
+            begins: Any = control.step == 0
             control, taken = decide((control, arrival.status, there))
             unlike = taken & ((arrival.status != Status.OK) | is_spoiled_outside(there, begins, last))
             ended = control.ending != StopReason.UNFINISHED
@@ -188,7 +188,7 @@ class DesignPaths:
         self.apart |= (status != Status.OK).any(axis=1)
         return outputs, status
 
-    def _as_given(self, values: np.ndarray, block: Indices) -> np.ndarray:
+    def _as_given(self, values: Any, block: Indices) -> np.ndarray:
         """Return values of some designs at their instants, (..., designs, time), in the order in which they came."""
         if self._rank is None:
             return values

@@ -301,7 +301,9 @@ class _Family:
             return self._assembled_alone(levels, threads)
         designs = Designs(self.held, model, self.names, self.rows)
         found, every = designs.assembled(first, self.tolerance), np.arange(count)
-        return self._followed(levels, designs, found.coordinates, found.plain & ~designs.unfit(), every, threads)
+        return self._followed(
+            levels, designs, found.coordinates, np.asarray(found.plain) & ~designs.unfit(), every, threads
+        )
 
     def _first_assembled(self, instant: float) -> tuple[Model | None, int]:
         """Return the model of the first design that can be put together, and which it is."""
