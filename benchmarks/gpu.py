@@ -51,7 +51,7 @@ def program(name: str, lanes: int) -> Callable[[], Any]:
     def run() -> Any:
         settings = np.asarray(1e-12), np.asarray(True), np.asarray(4)  # tolerance, refined, highest derivative wanted
         how = ("pose_type", model.pose_type), ("order", 4)
-        arrival = advance_instant.on_xla((model.system, *settings), (*given, np.zeros(lanes, bool)), how)
+        arrival = advance_instant.on_xla((model.system, *settings), (*given, None, np.zeros(lanes, bool)), how)
         return jax.block_until_ready((arrival.outputs[place], arrival.status))
 
     jets, status = run()

@@ -1,4 +1,4 @@
-"""A gradient of one number by a hundred parameters beside the solution that it is of; a family beside a loop."""
+"""A gradient by a hundred parameters beside the solution that it is of; families beside a grid and a loop."""
 
 from typing import Any
 
@@ -36,8 +36,37 @@ def chain(count: int) -> jn.Mechanism:
     )
 
 
+def family_beside_a_grid(quick: bool) -> Case:
+    """Return an instant of many four-bars beside one of a long grid of one of them."""
+    designs, instants = (64, 1025) if quick else (2000, 100_001)
+    four_bar = jn.load(EXAMPLES / "four_bar.yaml")
+    lengths, time = np.linspace(0.13, 0.15, designs), np.linspace(0.0, 2.0, 201)
+    known = jn.solve(four_bar.with_parameters(BC=float(lengths[0])), time).outputs["psi"]
+
+    def family() -> Any:
+        return jn.solve_batch(four_bar, {"BC": lengths}, time, threads=1)["psi"].values
+
+    def error(found: Any) -> float:
+        return float((np.abs(found[0] - known) / np.abs(known).max(axis=0)).max())
+
+    def grid() -> Any:
+        return jn.solve(four_bar, np.linspace(0.0, 2.0, instants), threads=1)
+
+    return Case(
+        f"{designs:,} four-bars to jounce, {len(time)} instants each",
+        [
+            Contestant("a family", ready(family), error),
+            Contestant(f"one of them at {instants:,} instants", ready(grid), count=instants, aim=1.3),
+        ],
+        count=designs * len(time),
+        unit="instant",
+        reference="one of them solved alone, over the largest value of each derivative",
+        rounds=7,
+    )
+
+
 def cases(quick: bool) -> Cases:
-    """Yield the gradient of a chain, and the family of a six-bar."""
+    """Yield the gradient of a chain, and families of four-bars and six-bars."""
     links, instants = (3, 51) if quick else (LINKS, 201)
     mechanism, time = chain(links), np.linspace(0.0, 1.0, instants)
     values = dict(mechanism.parameters)
@@ -55,6 +84,7 @@ def cases(quick: bool) -> Cases:
         ],
         rounds=5,
     )
+    yield family_beside_a_grid(quick)
     designs, count = (8, 51) if quick else (200, 361)
     six_bar = jn.load(EXAMPLES / "six_bar_stephenson.yaml")
     radii, time = np.linspace(0.038, 0.042, designs), np.linspace(0.0, 2.0, count)

@@ -110,12 +110,23 @@ def test_a_change_point_on_the_way_is_passed_as_alone():
 
 @pytest.mark.slow
 def test_more_designs_than_go_side_by_side(monkeypatch):
-    monkeypatch.setattr("jounce.kinematics.families.design_paths.WIDEST", 16)
+    monkeypatch.setattr("jounce.kinematics.families.design_paths.TOGETHER", 16)
     parameters = {"BC": np.linspace(0.125, 0.16, 37)}
     family = jn.solve_batch(FOUR_BAR, parameters, TIME, order=1, threads=1)
     check(FOUR_BAR, parameters, family, TIME, 1)
     again = jn.solve_batch(FOUR_BAR, parameters, TIME, order=1, threads=2)
     assert family.identical(again)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("native", ["0", "1"])
+def test_either_back_end_solves_designs_as_alone(monkeypatch, native):
+    """A parameter on which nothing depends gives lanes that have no values of their own."""
+    monkeypatch.setenv("JOUNCE_NATIVE", native)
+    named = dataclasses.replace(FOUR_BAR, parameters={**FOUR_BAR.parameters, "unused": 1.0})
+    time = np.linspace(0.0, 2.0, 41)
+    for parameters in ({"AB": np.linspace(0.03, 0.05, 11)}, {"unused": np.array([1.0, 2.0])}):
+        check(named, parameters, jn.solve_batch(named, parameters, time, order=3), time, 3)
 
 
 @pytest.mark.slow

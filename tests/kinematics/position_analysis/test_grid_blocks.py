@@ -6,7 +6,7 @@ import pytest
 import jounce as jn
 from jounce.execution.llvm.self_test import is_usable
 from jounce.kinematics import Status
-from jounce.kinematics.position_analysis import grid, grid_blocks, grid_storage
+from jounce.kinematics.position_analysis import grid, grid_storage, rooms
 from jounce.kinematics.position_analysis.grid_blocks import blocks_of, rounds
 from tests.problems.small import four_bar, slider_crank
 
@@ -111,18 +111,18 @@ def test_instants_that_start_from_failures_are_solved_again(monkeypatch):
     """Where it is told that some instants failed, they and what starts from them are solved once more."""
     time, again = np.linspace(0, 2, 3001), []
     expected = jn.solve(four_bar(), time)
-    in_spans, solve = grid.GridSolver._in_blocks, grid_blocks._Room.solve
+    in_spans, solve = grid.GridSolver._in_blocks, rooms.Room.solve
 
     def spoiling(room):
         solve(room)
-        if room._time[0] == 0.0:
+        if room.time[0] == 0.0:
             room.status[64], room.state[0]["angle"][..., 64] = Status.NOT_CONVERGED, np.nan
 
     def told(self, *given):
         again.append(in_spans(self, *given))
         return again[-1]
 
-    monkeypatch.setattr(grid_blocks._Room, "solve", spoiling)
+    monkeypatch.setattr(rooms.Room, "solve", spoiling)
     monkeypatch.setattr(grid.GridSolver, "_in_blocks", told)
     assert_same(jn.solve(four_bar(), time, threads=1), expected)
     np.testing.assert_array_equal(np.flatnonzero(again[0]), np.arange(64, 96))
@@ -164,16 +164,16 @@ def test_a_stretch_in_which_some_instant_fails_is_solved_again(monkeypatch, alwa
     time, told, spoiled = np.linspace(0, 2, 4400), [], []
     monkeypatch.setattr(grid_storage, "STRETCH", 1100)
     expected = jn.solve(four_bar(), time, keep=keep)
-    solve = grid_blocks._Room.solve
+    solve = rooms.Room.solve
 
     def spoiling(room):
         solve(room)
-        if room._time[0] == time[1100] and (always or not spoiled):
+        if room.time[0] == time[1100] and (always or not spoiled):
             room.status[5], room.state[0]["angle"][..., 5] = Status.NOT_CONVERGED, np.nan
             room.state[1][0][..., 5] = 1e308  # 24 times that is no number
             spoiled.append(True)
 
-    monkeypatch.setattr(grid_blocks._Room, "solve", spoiling)
+    monkeypatch.setattr(rooms.Room, "solve", spoiling)
     found = jn.solve(four_bar(), time, threads=1, keep=keep, progress=lambda *x: told.append(x))
     assert len(spoiled) == 1 + always
     assert_same(found, expected)

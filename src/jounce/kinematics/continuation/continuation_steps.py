@@ -1,15 +1,9 @@
 """Many continuation steps of a motion in one compiled program, anchor to anchor, and the instants of a grid between.
 
-Two things limit a step. The Taylor series must carry it: no term moves a body far. And the Jacobian must not come near
-a singular one on the way, where branches meet and a series that looks smooth may lead over to another: `advance` tells
-where its determinant vanishes next, to first order, and a step goes only part of that way. A step that is refused is
-halved until it is not, or is too small to be halved. What is out of the ordinary ends the run and is decided outside.
-
 The first lane of a batch makes the step; the others solve the next instants of the grid up to its end. Those that do
 not fit into it are solved from the same anchor, in more batches, or from the next one if they are few.
 """
 
-import enum
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -20,38 +14,23 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import called
-from jounce.kinematics.continuation.correct_and_differentiate import (
-    SAFE_FRACTION,
-    SolvedState,
-    StepResult,
-    advance,
-    predictor,
-)
+from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult, advance, predictor
 from jounce.kinematics.continuation.instant_program import finds_turnover
 from jounce.kinematics.continuation.singularity_distance import turnover_at
-from jounce.kinematics.status import Status
+from jounce.kinematics.continuation.step_control import (
+    Place,
+    StepControl,
+    StepLimits,
+    StopReason,
+    accepted,
+    after,
+    planned,
+)
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
-LARGEST_TURNOVER = 1.0  # of the Jacobian over a step, seen from its end; from its start, SAFE_FRACTION
-PASSAGE = 3e-3  # of the radius of the series: so near a singular position it is seen whether the motion is smooth there
-CRAWLING = 1e-6  # of what is left of the motion: steps this short, and for so many anchors,
-LONGEST_CRAWL = 300  # are no sharp turn, which takes a few dozen, but a law that grows beyond all bounds
-SLIVER = 0.1  # of a step: the last one takes with it what is no longer than this
-GROWTH = 4.0  # of a step over the last one
-
 Number = Float[Numbers, ""]
-
-
-class StopReason(enum.IntEnum):
-    """Why a run ended."""
-
-    UNFINISHED = 0  # it has made as many steps as it may
-    ARRIVED = 1
-    PASSAGE = 2  # a singular position is just ahead, and may be passed smoothly
-    COLLAPSED = 3  # steps have become too small
-    REFUSED = 4  # no step, however small, is accepted
 
 
 class Settings(NamedTuple):
@@ -63,44 +42,15 @@ class Settings(NamedTuple):
     wanted: Int[Numbers, ""]
 
 
-class Place(NamedTuple):
-    """Where a motion has come to: the instant, s, and how far it may be followed from there; see `StepResult`."""
-
-    instant: Number
-    safe_step: Number
-    radius: Number
-    turnover: Number
-
-    @property
-    def reach(self) -> Any:
-        """Time to or from the nearest singular position, to first order, s."""
-        rate = jnp.abs(self.turnover)
-        return jnp.where(rate > 0, 1 / jnp.where(rate > 0, rate, 1.0), jnp.inf)
-
-
-class StepLimits(NamedTuple):
-    """Where a run goes to, s; what step is too small to be halved, s; and the most batches that it may solve."""
-
-    stop: Number
-    smallest: Number
-    batches: Int[Numbers, ""]
-
-
 class StepState(NamedTuple):
     """How a run stands between two batches."""
 
     known: SolvedState  # what a prediction needs of the last anchor, in all lanes
-    place: Place  # of the last anchor
-    step: Number  # to be tried next, s; zero to solve the first instant itself
+    control: StepControl  # of the step that is tried next
     away: Float[Numbers, " batch"]  # time from the last anchor that each lane is solved at, s
     instant: Float[Numbers, " batch"]  # when that is, s
     planned: Bool[Numbers, ""]  # whether they are decided
-    may_pass: Bool[Numbers, ""]  # whether a singular position just ahead ends the run
     next_up: Int[Numbers, ""]  # among the instants of the grid
-    largest: Number  # step that the last one allows, s
-    crawled: Int[Numbers, ""]  # steps in sequence that were too short
-    refused: Number  # instant at which a law had no permitted value, s; NaN if none
-    ending: Int[Numbers, ""]  # see StopReason
 
 
 class Records(NamedTuple):
@@ -144,6 +94,7 @@ def take_steps(
     grid: Float[Numbers, " time"],
     limits: StepLimits,
     settings: Settings,
+    most: Int[Numbers, ""],
     *,
     pose_type: type[Pose],
     order: int,
@@ -162,6 +113,8 @@ def take_steps(
         The next instants of the grid, s; infinite beyond the last. At least one batch more than can be solved.
     limits, settings
         See there.
+    most : int
+        Batches that it may solve.
     pose_type, order
         PlanarPose or SpatialPose; derivatives wanted.
     batches : int
@@ -174,7 +127,7 @@ def take_steps(
         if native is not None:
             tolerance, refine, survey, wanted = settings
             first = np.arange(len(way.instant)) == 0
-            lanes = way.known, way.away, way.instant, survey & first
+            lanes = way.known, way.away, way.instant, None, survey & first
             arrival = called(native, (system, tolerance, refine, wanted), lanes)
             if finds_turnover(system):
                 return arrival._replace(turnover=arrival.turnover[:1])
@@ -183,7 +136,7 @@ def take_steps(
         return _batch(system, *way.known, way.away, way.instant, *settings, pose_type=pose_type, order=order)
 
     def going(state: TakenSteps) -> Any:
-        return (state.way.ending == int(StopReason.UNFINISHED)) & (state.count < limits.batches)
+        return (state.way.control.ending == int(StopReason.UNFINISHED)) & (state.count < most)
 
     def go_on(state: TakenSteps) -> TakenSteps:
         arrival = _typed(solved(state.way), blank)
@@ -210,30 +163,14 @@ def _typed(values: Any, like: Any) -> Any:
 
 def _planned(way: StepState, grid: Float[Numbers, " time"], limits: StepLimits) -> StepState:
     """Return the way with its next step, or why there is none."""
-    place = way.place
-    left = limits.stop - place.instant
-    step = jnp.minimum(jnp.minimum(place.safe_step, SAFE_FRACTION * place.reach), jnp.minimum(way.largest, left))
-    crawled = jnp.where(step < CRAWLING * left, way.crawled + 1, 0)
-    singular = way.may_pass & (place.turnover < 0) & (place.reach < PASSAGE * place.radius)
-    endings = (
-        ((crawled > LONGEST_CRAWL) | (place.instant + step == place.instant), StopReason.COLLAPSED),
-        (singular, StopReason.PASSAGE),
-        (~(left > 0), StopReason.ARRIVED),
-    )
-    ending = jnp.full((), int(StopReason.UNFINISHED))
-    for happened, why in endings:
-        ending = jnp.where(happened, int(why), ending)
-    step = jnp.where(left - step < SLIVER * step, left, step)
-    target = jnp.where(step == left, limits.stop, place.instant + step)
-    crawled = jnp.where(ending == StopReason.PASSAGE, way.crawled, crawled)  # the step is planned again
-    way = way._replace(ending=ending, crawled=crawled, refused=jnp.full((), jnp.nan))
-    return _aimed(way, step, target, grid)
+    return _aimed(way, planned(way.control, limits), grid)
 
 
-def _aimed(way: StepState, step: Number, target: Number, grid: Float[Numbers, " time"]) -> StepState:
+def _aimed(way: StepState, control: StepControl, grid: Float[Numbers, " time"]) -> StepState:
     """Return the way with a step to try, and in the other lanes the next instants of the grid within it."""
-    instant = jnp.concatenate([target[None], jnp.minimum(_next_up(way, grid), target)])
-    return way._replace(step=step, instant=instant, away=instant - way.place.instant, planned=jnp.ones((), bool))
+    instant = jnp.concatenate([control.target[None], jnp.minimum(_next_up(way, grid), control.target)])
+    away = instant - control.place.instant
+    return way._replace(control=control, instant=instant, away=away, planned=jnp.ones((), bool))
 
 
 def _next_up(way: StepState, grid: Float[Numbers, " time"]) -> Float[Numbers, " lane"]:
@@ -248,31 +185,16 @@ def _after(
     limits: StepLimits,
 ) -> tuple[StepState, Records]:
     """Return how the way stands after a batch, and what is recorded of it; `known` is of the arrival."""
-    target, status, lanes = way.instant[0], arrival.status[0], len(way.instant) - 1
+    control, status, lanes = way.control, arrival.status[0], len(way.instant) - 1
+    target = control.target
     there = Place(target, arrival.safe_step[0], arrival.radius[0], arrival.turnover[0])
-    passable = (status == int(Status.OK)) | (status == int(Status.UNDEFINED))
-    begins = way.step == 0
-    accepted = passable & (begins | (way.step * jnp.abs(there.turnover) <= LARGEST_TURNOVER))
-    within = accepted & (_next_up(way, grid) <= target)
+    good = accepted(control, status, there)
+    within = good & (_next_up(way, grid) <= target)
     lane = jnp.where(within, way.next_up + np.arange(lanes), -1)
     way = way._replace(next_up=way.next_up + jnp.sum(within))
     behind = jnp.sum(_next_up(way, grid) <= target)  # a few are solved from the next anchor, which is near them
-    taken = accepted & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else the same step with those left
-    stuck = ~accepted & ((way.step < limits.smallest) | (target <= way.place.instant))
-    inadmissible = ~accepted & (status == int(Status.INADMISSIBLE)) & jnp.isnan(way.refused)
-    way = way._replace(
-        ending=jnp.where(stuck, int(StopReason.REFUSED), int(StopReason.UNFINISHED)),
-        refused=jnp.where(inadmissible, target, way.refused),
-    )
-    arrived = way._replace(
-        known=jax.tree.map(lambda x: jnp.broadcast_to(x[..., :1], x.shape), known),
-        place=there,
-        may_pass=jnp.ones((), bool),
-        largest=jnp.where(begins, way.largest, GROWTH * way.step),
-    )
-    halved = ~accepted & ~stuck
-    step = jnp.where(halved, 0.5 * way.step, way.step)
-    again = _aimed(way, step, jnp.where(halved, way.place.instant + step, target), grid)
-    after = jax.tree.map(lambda new, old: jnp.where(taken, new, old), _planned(arrived, grid, limits), again)
+    taken = good & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else the same step with those left
+    known = jax.tree.map(lambda new, old: jnp.where(taken, new[..., :1], old), known, way.known)
+    way = _aimed(way._replace(known=known), after(control, status, there, limits, (good, taken)), grid)
     solved = (arrival.coordinates, arrival.outputs, arrival.sign, arrival.status)
-    return after, Records(*solved, jnp.concatenate([jnp.full(1, -1), lane]), there, taken)
+    return way, Records(*solved, jnp.concatenate([jnp.full(1, -1), lane]), there, taken)

@@ -24,6 +24,7 @@ from jounce.shapes import Numbers
 MAX_ITERATIONS = 30
 LARGEST_CONTRACTION = 0.25  # of the first simplified Newton corrections: Deuflhard 2011, section 5.1
 ROUNDING = 4e-15  # rad, or sizes of the mechanism
+NEARLY_ROUNDING = 6e-8  # first correction, after which the next one is rounding
 NEGLIGIBLE = 1e-16  # next correction, as the last ones foretell it
 SLOWEST = 0.03  # of a correction over the one before: three more cost as much as to factor the Jacobian again
 
@@ -63,8 +64,8 @@ def newton_raphson(
     """Return the assembled pose, the factored Jacobian there, and how large the corrections were.
 
     A Jacobian serves several corrections (simplified Newton iteration): it is factored again only where they shrink
-    slowly, and at the end, unless what was factored still solves the equations there (`refactored`). Only fronts are
-    factored at each correction.
+    slowly, and for the last one, unless what was factored still solves the equations there (`refactored`). Only fronts
+    are factored at each correction.
 
     An instant is accepted when its correction is at most the tolerance. With `refine` that correction is still made,
     and others until the next one would be rounding.
@@ -91,7 +92,8 @@ def newton_raphson(
         residual = system.residual(pose, time).coefficients[0]
         on, slow = going(state), ~(rate <= SLOWEST)
         anew = (count == 0) | (count > 1) & jnp.any(on & slow)  # the second correction tells whether they contract
-        moved = anew | ~jnp.any(on)
+        small = (count == 1) & jnp.all(correction.last <= NEARLY_ROUNDING)  # the Jacobian of here serves at the end
+        moved = anew | small | ~jnp.any(on)
         if system.fronts is None:
             factor = jax.lax.cond(moved, lambda: refactored(system, pose, time, before, anew), lambda: before)
         else:  # what goes through a branch is copied, and so many fronts take longer to copy than to factor again

@@ -1,13 +1,17 @@
 """`advance` for one instant, as a program that solves many: machine code side by side, or XLA in arrays."""
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 
 from jounce.execution.device import on_processor
 from jounce.execution.mapped import GPU_WIDTH, mapped
 from jounce.kinematics.continuation.correct_and_differentiate import StepResult, advance, solved_batch
+from jounce.kinematics.continuation.predictor import hidden_by_laws
+from jounce.kinematics.continuation.singularity_distance import turnovers_of
 from jounce.mechanism.system import System
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
@@ -29,11 +33,21 @@ def round_width(system: System) -> int:
 
 
 def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
-    """Solve many instants as `advance_instant` does one; nothing is surveyed."""
-    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, _) = shared, instants
+    """Solve many instants as `advance_instant` does one; those of one motion are not surveyed."""
+    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, own, survey) = shared, instants
+    system = of_design(system, own)
     given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
-    arrival, _, _ = solved_batch(system, *given, pose_type=pose_type, order=order)
-    return arrival._replace(turnover=jnp.zeros_like(step))
+    arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order)
+    nothing = jnp.zeros_like(step)
+    if own is None:
+        return arrival._replace(turnover=nothing)
+
+    def surveyed() -> Any:
+        hidden = hidden_by_laws(system, arrival.status, instant, step, order)
+        return turnovers_of(system, pose_type, reached, factor, instant), hidden
+
+    turnover, status = jax.lax.cond(jnp.any(survey), surveyed, lambda: (nothing, arrival.status))
+    return arrival._replace(turnover=turnover, status=status)
 
 
 @mapped(by_xla=_of_many)
@@ -45,14 +59,15 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
     shared : tuple
         System, tolerance, whether to refine, and the highest derivative that must be finite.
     instants : tuple
-        Coordinates, angles and sign of the neighbour, the time from there, the instant, s, and whether to look for
-        the nearest singular position: each of length one.
+        Coordinates, angles and sign of the neighbour, the time from there, the instant, s, the values of its design,
+        if there are many (see `of_design`), else None, and whether to look for the nearest singular position: each
+        of length one.
     pose_type, order
         As those of `advance`.
     """
-    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, survey) = shared, instants
+    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, own, survey) = shared, instants
     return advance(
-        with_fields(system, reflected=True),
+        with_fields(of_design(system, own), reflected=True),
         coordinates,
         angles,
         sign,
@@ -64,10 +79,18 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
         wanted,
         pose_type=pose_type,
         order=order,
-        with_turnover=finds_turnover(system),
+        with_turnover=own is not None or finds_turnover(system),
     )
 
 
+def of_design(system: System, own: Mapping[int, Any] | None) -> System:
+    """Return the system of a design, whose `own` values have the place of some leaves of another, by index."""
+    if not own:
+        return system
+    leaves, structure = jax.tree.flatten(system)
+    return jax.tree.unflatten(structure, [own.get(k, leaf) for k, leaf in enumerate(leaves)])
+
+
 def finds_turnover(system: System) -> bool:
-    """Tell whether the turnover of an instant is found with it; of many bodies it takes vectors of its own."""
+    """Tell whether the turnover of an instant of one motion is found with it; of many bodies it takes vectors."""
     return system.fronts is None

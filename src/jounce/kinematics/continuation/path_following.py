@@ -10,15 +10,17 @@ import bisect
 import dataclasses
 import itertools
 from functools import partial
+from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from jounce.execution.backends import backend_of
-from jounce.kinematics.continuation.continuation_steps import StepState, StopReason, TakenSteps
+from jounce.kinematics.continuation.continuation_steps import StepState, TakenSteps
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult
 from jounce.kinematics.continuation.solver import NO_GRID, Solver
+from jounce.kinematics.continuation.step_control import Place, StopReason
 from jounce.kinematics.status import Status
 from jounce.mechanism.axis_angles import AttitudeHistory
 
@@ -144,7 +146,7 @@ class FollowedPath:
         """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
         first = self.anchors[0]
         found = self._just_ahead() if self.status == Status.OK else []
-        if first.turnover > 0 and first.reach < NEARBY * first.radius:
+        if _is_left(first):
             found.append(ChangePoint(first.instant - first.reach, first.radius))
         return found
 
@@ -155,10 +157,29 @@ class FollowedPath:
         """
         end, passed = self.anchors[-1].instant, self.change_points[-1].instant if self.change_points else -np.inf
         since = itertools.takewhile(lambda anchor: anchor.instant > passed, reversed(self.anchors))
-        nearing = [x for x in since if x.turnover < 0 and x.reach < NEARBY * x.radius]
-        ahead = [x for x in nearing if end - (x.instant + x.reach) < LEAST_PASSAGE * x.reach]
+        ahead = [x for x in since if _is_just_beyond(x, end)]
         largest = max((x.radius for x in ahead), default=0.0)
         return [ChangePoint(x.instant + x.reach, x.radius) for x in ahead if x.radius >= 0.5 * largest][:1]
+
+
+def _is_left(place: "Anchor | Place") -> Any:
+    """Tell whether a motion leaves a singular position close behind a place."""
+    return (place.turnover > 0) & (place.turnover * place.radius > 1 / NEARBY)
+
+
+def _is_just_beyond(place: "Anchor | Place", end: float) -> Any:
+    """Tell whether a motion nears a singular position close to a place, and comes to its end next to it or before."""
+    near = (place.turnover < 0) & (-place.turnover * place.radius > 1 / NEARBY)
+    return near & ((end - place.instant) * -place.turnover < 1 + LEAST_PASSAGE)
+
+
+def is_spoiled_outside(place: Place, begins: Bool[np.ndarray, " lane"], end: float) -> Bool[np.ndarray, " lane"]:
+    """Tell which motions may be singular just before they begin, at a place, or after their end.
+
+    Those that are followed alone tell by `singular_positions_outside`, which this leaves nothing to.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # of steps that failed
+        return begins & _is_left(place) | _is_just_beyond(place, end)
 
 
 def follow(
@@ -199,18 +220,20 @@ def follow(
             arrival = jax.tree.map(np.asarray, done.last)
             return path.ended(Status(int(arrival.status[0])), float(way.instant[0]), solver.fault(arrival, 0))
         here = path.anchors[-1]
-        ending = int(way.ending)
+        control = way.control
+        ending = int(control.ending)
         first += int(way.next_up)
         if ending == StopReason.PASSAGE:
             passed = _passed(solver, here, stop)
             if passed is None:
                 no = np.zeros((), bool)
-                way = way._replace(planned=no, may_pass=no, ending=np.asarray(int(StopReason.UNFINISHED)))
+                control = control._replace(may_pass=no, ending=np.asarray(int(StopReason.UNFINISHED)))
+                way = way._replace(planned=no, control=control)
                 continue
             far_side, change_point = passed
             path.anchors.append(far_side)
             path.change_points.append(change_point)
-            way = solver.way(far_side.state, far_side.place, float(way.largest), int(way.crawled))
+            way = solver.way(far_side.state, far_side.place, float(control.largest), int(control.crawled))
             first = int(np.searchsorted(grid, far_side.instant, side="right"))
         elif ending == StopReason.COLLAPSED:
             beyond = float(np.nextafter(here.instant, np.inf))
@@ -222,7 +245,7 @@ def follow(
 
 def _ended(solver: Solver, path: FollowedPath, done: TakenSteps, span: float) -> FollowedPath:
     """Return the path that cannot be followed any further: where a law was first refused, if it was."""
-    here, refused = path.anchors[-1], float(done.way.refused)
+    here, refused = path.anchors[-1], float(done.way.control.refused)
     if np.isnan(refused):
         target, arrival = float(done.way.instant[0]), jax.tree.map(np.asarray, done.last)
     else:

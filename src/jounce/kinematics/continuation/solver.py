@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -11,16 +11,10 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped
 
 from jounce.execution.mapped import OnLlvm, OnXla, Rounds
-from jounce.kinematics.continuation.continuation_steps import (
-    Place,
-    Settings,
-    StepLimits,
-    StepState,
-    TakenSteps,
-    take_steps,
-)
+from jounce.kinematics.continuation.continuation_steps import Settings, StepState, TakenSteps, take_steps
 from jounce.kinematics.continuation.correct_and_differentiate import LARGEST_GAP, SolvedState, StepResult, predictor
 from jounce.kinematics.continuation.instant_program import advance_instant, round_width
+from jounce.kinematics.continuation.step_control import Place, StepLimits, steps_begin
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 
@@ -48,6 +42,7 @@ class Solver:
     refine: bool = True
     wanted: int = 0  # highest derivative that must be finite
     hasty: bool = False  # whether machine code is to be there soon rather than fast
+    own: Mapping[int, Any] | None = None  # of one of many designs, see `of_design`
 
     def __call__(
         self,
@@ -64,11 +59,21 @@ class Solver:
         lanes = len(instant)
         if lanes <= SMALL_BATCH:
             known, step, instant = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), (needed, step, instant))
-            way = _way(known, (0.0,) * 4, away=step, instant=instant, planned=True)
-            arrival = self._take_steps(way, NO_GRID, _limits(0.0, 0.0, 1), survey=survey).last
+            way = _way(known, (0.0,) * 4, away=step, instant=instant)
+            arrival = self._take_steps(way, NO_GRID, _limits(0.0, 0.0), 1, survey=survey).last
         else:
-            arrival = self.program((needed, step, instant, np.zeros(step.shape, bool)))
+            arrival = self.program((needed, step, instant, None, np.zeros(step.shape, bool)))
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
+
+    def still(self, coordinates: Mapping[str, Any]) -> SolvedState:
+        """Return what is known of an instant before it is solved: its position."""
+        levels, system = self.order + 1, self.model.system
+        still = {name: np.zeros((levels, *np.shape(x))) for name, x in coordinates.items()}
+        for name, x in coordinates.items():
+            still[name][0] = x
+        lanes = np.shape(coordinates["position"])[-1]
+        outputs = tuple(np.zeros((levels, 1, group.instances, lanes)) for group in system.outputs)
+        return still, outputs, np.zeros(lanes)
 
     def needed(self, known: SolvedState) -> SolvedState:
         """Return what predictions need of solved instants, see `predictor`."""
@@ -81,6 +86,7 @@ class Solver:
         instant: Float[np.ndarray, " time"],
         status: Int[np.ndarray, " time"],
         sources: Int[np.ndarray, " time"],
+        own: Mapping[int, np.ndarray] | None,
     ) -> Rounds:
         """Return what solves instants of a grid in rounds.
 
@@ -94,21 +100,23 @@ class Solver:
             What comes of each.
         sources : array of int, shape (time,)
             From which of the store each instant is predicted.
+        own : dict of int to array
+            The values of the design of each instant, if there are many (see `of_design`), else None.
         """
         coordinates, outputs, sign = store
         nothing: dict[str, Any] = dict.fromkeys(StepResult._fields)
         wanted = {"coordinates": coordinates, "outputs": outputs, "status": status, "sign": sign}
-        lanes = self.needed(store), (step, instant), np.zeros(1, bool)
+        lanes = self.needed(store), (step, instant, own), np.zeros(1, bool)
         return self.program.rounds(lanes, StepResult(**(nothing | wanted)), sources)
 
     def take_steps(self, way: StepState, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> TakenSteps:
         """Go on along a way with the next instants of a grid, as far as they fit; see `continuation_steps`."""
         way = way._replace(next_up=np.zeros((), int))
-        return self._take_steps(way, grid, _limits(stop, smallest, self._batches), survey=True)
+        return self._take_steps(way, grid, _limits(stop, smallest), self._batches, survey=True)
 
     def prepare(self, guess: SolvedState, instant: float) -> None:
         """Have the program of runs compiled; nothing is solved."""
-        self._take_steps(self.beginning(guess, instant), NO_GRID, _limits(instant, 0.0, 0), survey=True)
+        self._take_steps(self.beginning(guess, instant), NO_GRID, _limits(instant, 0.0), 0, survey=True)
 
     def way(self, solved: SolvedState, place: Sequence[float], largest: float, crawled: int = 0) -> StepState:
         """Return the way that begins at a solved instant, the place of an anchor, with a largest first step, s."""
@@ -118,7 +126,7 @@ class Solver:
     def beginning(self, guess: SolvedState, instant: float) -> StepState:
         """Return the way that begins with solving an instant, from a position put together there."""
         known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(guess))
-        return _way(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant), planned=True)
+        return _way(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant))
 
     @property
     def backend(self) -> str:
@@ -152,10 +160,8 @@ class Solver:
     def program(self) -> OnLlvm | OnXla:
         """What solves many instants."""
         system, (tolerance, refine, _, wanted) = self.model.system, self._settings
-        nothing = np.zeros(1)
-        still = {name: np.zeros((self.order + 1, *x.shape)) for name, x in self.model.guess.items()}
-        outputs = tuple(np.zeros((self.order + 1, 1, group.instances, 1)) for group in system.outputs)
-        instants = self.needed((still, outputs, nothing)), nothing, nothing, np.zeros(1, bool)
+        nothing, still = np.zeros(1), self.still(self.model.guess)
+        instants = self.needed(still), nothing, nothing, self.own, np.zeros(1, bool)
         kind = self.model.pose_type
         few = FEW_COLUMNS if system.rank is None else FEW_OF_REDUNDANT_ROWS
         small = system.shape[1] <= few and not self.hasty
@@ -181,7 +187,7 @@ class Solver:
         return Settings(*map(np.asarray, (self.tolerance, self.refine, True, self.wanted)))
 
     def _take_steps(
-        self, way: StepState, grid: Float[np.ndarray, " time"], limits: StepLimits, *, survey: bool
+        self, way: StepState, grid: Float[np.ndarray, " time"], limits: StepLimits, most: int, *, survey: bool
     ) -> TakenSteps:
         room = (self._batches + 1) * (SMALL_BATCH - 1)
         window = np.full(room, np.inf)
@@ -193,6 +199,7 @@ class Solver:
             window,
             limits,
             settings,
+            np.asarray(most),
             pose_type=kind,
             order=self.order,
             batches=self._batches,
@@ -220,28 +227,26 @@ class Solver:
         return f"{', '.join(list(names)[:4])} ({told})"
 
 
-def _way(known: SolvedState, place: Sequence[float], **given: Any) -> StepState:
-    """Return a way that begins; of one type whatever is given, so that it is compiled once."""
-    lanes, nothing, no = np.zeros(SMALL_BATCH), np.zeros(()), np.zeros((), bool)
-    way = StepState(
-        known,
-        Place(*map(np.asarray, place)),
-        step=nothing,
-        away=lanes,
-        instant=lanes,
-        planned=no,
-        may_pass=~no,
-        next_up=np.zeros((), int),
-        largest=np.asarray(np.inf),
-        crawled=np.zeros((), int),
-        refused=np.asarray(np.nan),
-        ending=np.zeros((), int),
-    )
-    return way._replace(**{name: np.asarray(value) for name, value in given.items()})
+def _way(
+    known: SolvedState,
+    place: Sequence[float],
+    *,
+    away: Any = None,
+    instant: Any = None,
+    largest: float = np.inf,
+    crawled: int = 0,
+) -> StepState:
+    """Return a way that begins, with what is solved first, if that is told."""
+    nothing = np.zeros(SMALL_BATCH)
+    here = nothing if instant is None else instant
+    control = steps_begin(Place(*map(np.asarray, place)), np.asarray(here[0]))
+    control = control._replace(largest=np.asarray(largest), crawled=np.asarray(crawled))
+    decided, first = np.asarray(instant is not None), np.zeros((), int)
+    return StepState(known, control, nothing if away is None else away, here, decided, first)
 
 
-def _limits(stop: float, smallest: float, batches: int) -> StepLimits:
-    return StepLimits(*map(np.asarray, (stop, smallest, batches)))
+def _limits(stop: float, smallest: float) -> StepLimits:
+    return StepLimits(np.asarray(stop), np.asarray(smallest))
 
 
 def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int, room: int = 0) -> Shaped[np.ndarray, "*rest room"]:

@@ -1,137 +1,78 @@
 """Many designs followed side by side, each in steps of its own, and all instants of a grid solved from their anchors.
 
-What decides about a step of one design alone decides here too, lane by lane; see `continuation_steps` and `advance`. A
-design that is out of the ordinary, as it comes to a singular position, is left to be solved alone.
+A lane is a design. What solves an instant and decides about a step is what does it for a motion alone; see
+`instant_program` and `step_control`. A design that is out of the ordinary, as it comes to a singular position, is left
+to be solved alone.
 """
 
 import itertools
-from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.execution.compilation import compiled
 from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
-from jounce.kinematics.continuation.continuation_steps import GROWTH, LARGEST_TURNOVER, PASSAGE, SLIVER
-from jounce.kinematics.continuation.correct_and_differentiate import (
-    SAFE_FRACTION,
-    SolvedState,
-    StepResult,
-    predicts_turns,
-    solved_batch,
-)
-from jounce.kinematics.continuation.path_following import PLACES, SMALLEST_STEP, blended_attitudes
-from jounce.kinematics.continuation.predictor import hidden_by_laws
-from jounce.kinematics.continuation.singularity_distance import turnovers_of
+from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
+from jounce.kinematics.continuation.path_following import PLACES, SMALLEST_STEP, blended_attitudes, is_spoiled_outside
 from jounce.kinematics.continuation.solver import Solver
-from jounce.kinematics.families.design_values import Coordinates, Designs
+from jounce.kinematics.continuation.step_control import Place, StepLimits, StopReason, step_on, steps_begin
+from jounce.kinematics.families.design_assembly import Coordinates
+from jounce.kinematics.families.design_values import Designs
+from jounce.kinematics.position_analysis.rooms import Room, solve_in_rooms
 from jounce.kinematics.status import Status
 from jounce.mechanism.axis_angles import measures_angle, raw_angles
-from jounce.mechanism.system import Group, System
 from jounce.mechanism.turn_counting import counted_along
-from jounce.rigid.pose import Pose
-from jounce.shapes import Numbers
 
-ANCHOR_ORDER = 6  # of the series at the anchors, at least: few carry many instants
 MOST_STEPS = 10_000  # of a design; one that needs more is left to be solved alone
-WIDEST = 512  # lanes
-LOTS = 8  # of so many, solved in one call
+TOGETHER = 512  # designs that are followed together
 
 Lanes = Float[np.ndarray, " design"]
 Indices = Int[np.ndarray, " lane"]
 
 
-class Places(NamedTuple):
-    """Where designs have come to, an entry for each; see `continuation_steps.Place`."""
+class Anchors(NamedTuple):
+    """Instants of designs that one step has solved: whose they are, rising, when, s, and their states."""
 
-    instant: Lanes
-    safe_step: Lanes
-    radius: Lanes
-    turnover: Lanes
-    largest: Lanes  # step that the last one allows, s
+    owner: Indices
+    instant: Float[np.ndarray, " lane"]
+    state: SolvedState
 
 
-@compiled("pose_type", "order")
-def advance_designs(
-    system: System,
-    known: Any,
-    step: Float[Numbers, " batch"],
-    instant: Float[Numbers, " batch"],
-    settings: tuple[Any, Any, Any],
-    *,
-    pose_type: type[Pose],
-    order: int,
-) -> StepResult:
-    """Solve an instant of each of many designs from one solved before, and survey all of them; see `advance`."""
-    coordinates, angles, sign = known
-    arrival, factor, reached = solved_batch(
-        system, coordinates, angles, sign, step, instant, *settings, pose_type=pose_type, order=order
-    )
-    status = hidden_by_laws(system, arrival.status, instant, step, order)
-    return arrival._replace(turnover=turnovers_of(system, pose_type, reached, factor, instant), status=status)
+class Group(NamedTuple):
+    """Designs that are followed together, and the anchors that each step has made."""
 
+    designs: Indices
+    steps: list[Anchors]
 
-@compiled("varied", "pose_type", "order")
-def _solve_designs(
-    system: System,
-    known: Any,
-    step: Float[Numbers, " lane"],
-    instant: Float[Numbers, " lane"],
-    settings: tuple[Any, Any, Any],
-    lots: Int[Numbers, ""],
-    *,
-    varied: tuple[int, ...],
-    pose_type: type[Pose],
-    order: int,
-) -> tuple[tuple[Any, ...], Any]:
-    """Solve an instant in each lane, of one design or another, from one solved before: lot after lot of `WIDEST`.
+    def anchors_of(
+        self, designs: Indices
+    ) -> tuple[Indices, Float[np.ndarray, " anchor"], list[list[np.ndarray]], Indices]:
+        """Return the anchors of some of the designs.
 
-    Parameters
-    ----------
-    lots : int
-        Those that are solved; lanes beyond them are left at zero.
-    varied : tuple of int
-        Which leaves of the system have lanes.
-
-    Returns
-    -------
-    tuple of tuple of array of shape (lane, order + 1, components), and array of shape (lane,)
-        Derivatives of the outputs, for each instance of each group, and status.
-    """
-    leaves, structure = jax.tree.flatten(system)
-    width = min(WIDEST, len(step))
-
-    def solved(lot: Any) -> Any:
-        def some(x: Any) -> Any:
-            return jax.lax.dynamic_slice_in_dim(x, lot * width, width, axis=-1)
-
-        own = [some(leaf) if k in varied else leaf for k, leaf in enumerate(leaves)]
-        coordinates, angles, sign = jax.tree.map(some, known)
-        arrival, _, _ = solved_batch(
-            jax.tree.unflatten(structure, own),
-            coordinates,
-            angles,
-            sign,
-            some(step),
-            some(instant),
-            *settings,
-            pose_type=pose_type,
-            order=order,
-        )
-        rows = [jnp.transpose(plain_derivatives(jets), (2, 3, 0, 1)) for jets in arrival.outputs]
-        return tuple(tuple(row) for row in rows), arrival.status
-
-    def go_on(lot: Any, found: Any) -> Any:
-        put = jax.lax.dynamic_update_slice_in_dim
-        return jax.tree.map(lambda whole, part: put(whole, part, lot * width, 0), found, solved(lot))
-
-    blank = jax.tree.map(lambda x: jnp.zeros((len(step), *x.shape[1:]), x.dtype), jax.eval_shape(solved, 0))
-    return jax.lax.fori_loop(0, lots, go_on, blank)
+        Returns
+        -------
+        owner, instant : array
+            Whose they are, among these designs, and when, s.
+        parts : list of list of array
+            The parts of each leaf of their states.
+        order : array of int
+            In which they are sorted by design and instant.
+        """
+        first, last = designs[0], designs[-1]
+        owners, instants, states = [], [], []
+        for owner, instant, state in self.steps:
+            some: Any = slice(*np.searchsorted(owner, (first, last + 1)))
+            if last - first + 1 > len(designs):
+                some = some.start + np.flatnonzero(np.isin(owner[some], designs))
+            owners.append(np.searchsorted(designs, owner[some]))
+            instants.append(instant[some])
+            states.append([leaf[..., some] for leaf in jax.tree.leaves(state)])
+        owner, instant = np.concatenate(owners), np.concatenate(instants)
+        return owner, instant, [*map(list, zip(*states, strict=True))], np.lexsort((instant, owner))
 
 
 class DesignPaths:
@@ -140,7 +81,7 @@ class DesignPaths:
     Parameters
     ----------
     solver : Solver
-        Of the model by which the designs are measured.
+        Of the designs.
     designs : Designs
         What is solved.
     instants : array of shape (designs, time)
@@ -155,44 +96,50 @@ class DesignPaths:
     """
 
     def __init__(self, solver: Solver, designs: Designs, instants: Float[np.ndarray, "design time"], last: float):
-        self.solver, self.designs, self.instants = solver, designs, instants
+        self.solver, self.designs = solver, designs
         self._ends = float(instants[0, 0]), last
-        count = len(designs.rows)
-        self.apart = np.zeros(count, bool)
-        self._settings = tuple(map(np.asarray, (solver.tolerance, solver.refine, solver.wanted)))
-        self._order = max(solver.order, ANCHOR_ORDER)
-        self._width = min(WIDEST, max(16, 1 << (count - 1).bit_length()))
-        self._anchors: list[tuple[Indices, Float[np.ndarray, " lane"], SolvedState]] = []
-        self._turning = [k for k, group in enumerate(solver.model.system.outputs) if predicts_turns(group)]
+        self.apart = np.zeros(len(designs.rows), bool)
+        order = np.argsort(instants, axis=1, kind="stable")
+        self._instants = np.take_along_axis(instants, order, axis=1)
+        self._rank = np.argsort(order, axis=1) if np.any(np.diff(order, axis=1) < 0) else None
+        self._groups: list[Group] = []
 
-    def follow(self, coordinates: Coordinates, plain: Bool[np.ndarray, " design"]) -> None:
+    def follow(self, coordinates: Coordinates, plain: Bool[np.ndarray, " design"], threads: int) -> None:
         """Follow the designs from where they are put together, those that are plain."""
         self.apart |= ~plain
-        first, last = self._ends
-        count = len(plain)
-        known = self._known_at_the_start(coordinates)
-        places = Places(*(np.full(count, x) for x in (first, np.inf, np.inf, 0.0, np.inf)))
-        step, target = np.zeros(count), np.full(count, first)
-        begun = np.zeros(count, bool)
-        active = ~self.apart
+        lanes = np.flatnonzero(plain)
+        groups = [lanes[k : k + TOGETHER] for k in range(0, len(lanes), TOGETHER)]
+        with Threads(threads, compiled=self.solver.is_compiled) as pool:
+            self._groups = list(pool.map(lambda group: self._followed(coordinates, group), groups))
+
+    def _followed(self, coordinates: Coordinates, lanes: Indices) -> Group:
+        """Follow some designs."""
+        solver, (first, last), found = self.solver, self._ends, Group(lanes, [])
+        limits = StepLimits(np.asarray(last), np.asarray(SMALLEST_STEP * (last - first)))
+        known = solver.needed(solver.still({name: x[..., lanes] for name, x in coordinates.items()}))
+        start = np.full(len(lanes), first)
+        control = steps_begin(Place(start, *[np.full(len(lanes), x) for x in (np.inf, np.inf, 0.0)]), start)
+        decide = step_on.program(limits, jax.tree.map(lambda x: x[:1], (control, control.crawled, control.place)))
         for _ in range(MOST_STEPS):
-            lanes = np.flatnonzero(active)
             if not lanes.size:
-                break
-            arrived = self._advanced(known, step, target, lanes)
-            taken = (arrived.status == Status.OK) & (step[lanes] * np.abs(arrived.turnover) <= LARGEST_TURNOVER)
-            hopeless = ~begun[lanes] | (arrived.status == Status.UNDEFINED)
-            stuck = ~taken & (hopeless | (step[lanes] < SMALLEST_STEP * (last - first)))
-            self.apart[lanes[stuck]] = True
-            self._keep(places, known, arrived, (step, target), (lanes[taken], np.flatnonzero(taken)))
-            begun[lanes[taken]] = True
-            halved = lanes[~taken & ~stuck]
-            step[halved] *= 0.5
-            target[halved] = places.instant[halved] + step[halved]
-            onwards = lanes[taken]
-            step[onwards], target[onwards] = self._planned(places, onwards)
-            active = ~self.apart & (places.instant < last) | ~self.apart & ~begun
-        self.apart |= active
+                return found
+            away, own = control.target - control.place.instant, self.designs.own(lanes)
+            arrival = solver.program((known, away, control.target, own, np.ones(len(lanes), bool)))
+            there: Any = Place(control.target, arrival.safe_step, arrival.radius, arrival.turnover)
+            begins: Any = control.step == 0
+            control, taken = decide((control, arrival.status, there))
+            unlike = taken & ((arrival.status != Status.OK) | is_spoiled_outside(there, begins, last))
+            ended = control.ending != StopReason.UNFINISHED
+            self.apart[lanes[unlike | ended & (control.ending != StopReason.ARRIVED)]] = True
+            reached = arrival.state(slice(None) if taken.all() else taken)
+            found.steps.append(Anchors(lanes[taken], there.instant[taken], reached))
+            known = solver.needed(reached) if taken.all() else _replaced(known, taken, solver.needed(reached))
+            if (left := ~(ended | unlike)).all():
+                continue
+            lanes = lanes[left]
+            control, known = jax.tree.map(lambda x, some=left: x[..., some], (control, known))
+        self.apart[lanes] = True
+        return found
 
     def solved(self, threads: int) -> tuple[list[list[np.ndarray]], Int[np.ndarray, "design time"]]:
         """Return the outputs of all designs, and their status.
@@ -200,180 +147,147 @@ class DesignPaths:
         Outputs are arrays of shape (designs, time, order + 1, components), for each instance of each group. A design of
         which an instant is not solved at once is left to be solved alone, too.
         """
-        count, times = self.instants.shape
-        design = np.repeat(np.flatnonzero(~self.apart), times)
-        instant = self.instants[~self.apart].ravel()
-        levels = self.solver.wanted + 1
+        count, times = self._instants.shape
         status = np.full((count, times), int(Status.NOT_REACHED))
-        outputs: list[list[np.ndarray]] = []
-        if not design.size:
-            return outputs, status
-        owners, at, store = self._store()
-        source = _nearest(owners, at, design, instant)
-        away = instant - at[source]
-        order = np.argsort(np.abs(away), kind="stable")  # lanes that take as many iterations go together
-        where = np.tile(np.arange(times), count - int(self.apart.sum()))
-        width = min(WIDEST, max(16, 1 << (len(order) - 1).bit_length()))
-        at_once = width * LOTS if len(order) > width else width
-        parts = [order[k : k + at_once] for k in range(0, len(order), at_once)]
-        varied, kind = self.designs.varied, self.solver.model.pose_type
+        designs = np.flatnonzero(~self.apart)
+        if not designs.size:
+            return [], status
+        levels, width = self.solver.wanted + 1, self.solver.program.width
+        size = min(max(1, self.solver.longest_stride * width // times), len(designs))
+        size -= size % width if size > width else 0
+        items: list[tuple[Group, Indices]] = []
+        for group in self._groups:
+            some = group.designs[~self.apart[group.designs]]
+            items += [(group, some[k : k + size]) for k in range(0, len(some), size)]
+        steps = itertools.chain(*(group.steps for group in self._groups))
+        each = sum((np.bincount(step.owner, minlength=count) for step in steps), np.zeros(count, int))
+        most = max(int(each[block].sum()) for _, block in items)
+        like = self._groups[0].steps[0].state
+        wholes = [np.full((levels, *x.shape[1:-1], count, times), np.nan) for x in like[1]]
 
-        def solve(part: Indices) -> Any:
-            some = _filled(part, at_once)
-            known = jax.tree.map(lambda x: x[..., source[some]], store)
-            system = self.designs.system(design[some])
-            lots = np.asarray(-(-len(part) // width))
-            found = _solve_designs(
-                system,
-                known,
-                away[some],
-                instant[some],
-                self._settings,
-                lots,
-                varied=varied,
-                pose_type=kind,
-                order=self.solver.order,
-            )
-            return jax.tree.map(lambda x: np.asarray(x)[: len(part)], found)
+        def new() -> Room:
+            return Room(self.solver, like, size * times, most)
 
-        with Threads(threads) as pool:
-            for part, (found, outcome) in zip(parts, pool.map(solve, parts), strict=True):
-                if not outputs:
-                    outputs = [[np.full((count, times, levels, x.shape[2]), np.nan) for x in group] for group in found]
-                these = design[part], where[part]
-                status[these] = outcome
-                for into, rows in zip(itertools.chain(*outputs), itertools.chain(*found), strict=True):
-                    into[these] = rows[:, :levels]
-        self._count_turns(outputs, (owners, at, store[0]), (design, where, instant))
+        def put(item: tuple[Group, Indices], state: SolvedState, outcome: Indices) -> None:
+            block = item[1]
+            status[block] = self._as_given(outcome.reshape(len(block), times), block)
+            for whole, found in zip(wholes, state[1], strict=True):
+                with np.errstate(over="ignore"):  # of what failed
+                    derivatives = plain_derivatives(found[:levels])
+                values = derivatives.reshape(*derivatives.shape[:-1], len(block), times)
+                whole[..., block, :] = self._as_given(values, block)
+
+        with Threads(threads, compiled=self.solver.is_compiled) as pool:
+            for _ in solve_in_rooms(new, items, self._begin, put, pool.map):
+                pass
+        outputs = [[np.transpose(x, (2, 3, 0, 1)) for x in np.moveaxis(whole, 2, 0)] for whole in wholes]
+        for group in self._groups:
+            some = group.designs[~self.apart[group.designs]]
+            if some.size:
+                self._count_turns(outputs, group, some)
         self.apart |= (status != Status.OK).any(axis=1)
         return outputs, status
 
-    def _count_turns(
-        self,
-        outputs: list[list[np.ndarray]],
-        anchors: tuple[Int[np.ndarray, " anchor"], Float[np.ndarray, " anchor"], Mapping[str, Any]],
-        lanes: tuple[Indices, Indices, Float[np.ndarray, " lane"]],
-    ) -> None:
-        """Give angles about axes the turns that they make along the anchors; lanes are designs, indices, instants."""
-        (owners, at, coordinates), (design, where, instant) = anchors, lanes
-        pairs = zip(self.designs.system(owners).outputs, outputs, strict=True)
-        measuring = [(group, found) for group, found in pairs if measures_angle(group)]
+    def _as_given(self, values: Any, block: Indices) -> np.ndarray:
+        """Return values of some designs at their instants, (..., designs, time), in the order in which they came."""
+        if self._rank is None:
+            return values
+        rank = self._rank[block]
+        return np.take_along_axis(values, rank.reshape(*[1] * (values.ndim - 2), *rank.shape), axis=-1)
+
+    def _begin(self, room: Room, item: tuple[Group, Indices]) -> int:
+        """Have a room take up all instants of some designs; they start from the one before, or the nearest anchor."""
+        group, block = item
+        instants = self._instants[block]
+        count, times = instants.shape
+        pieces = min(max(1, room.width // count), times)  # of a motion, so that lanes are in use
+        length = -(-times // pieces)
+        owner, at, parts, order = group.anchors_of(block)
+        room.put_anchors(parts)
+        nearest = _nearest(owner[order], at[order], instants, self._ends)
+        to_anchor = instants - at[order][nearest]
+        to_one_before = np.diff(instants, axis=1, prepend=np.inf)
+        to_one_before[:, ::length] = np.inf
+        near = np.abs(to_one_before) <= np.abs(to_anchor)
+        before = np.arange(-1, count * times - 1).reshape(count, times)
+        source = np.where(near, before, room.size + order[nearest])
+        step = np.where(near, to_one_before, to_anchor)
+        own = {k: np.repeat(x, times, axis=-1) for k, x in self.designs.own(block).items()}
+        room.take_up(instants.ravel(), (source.ravel(), step.ravel()), _rounds(count, times, length, room.width), own)
+        return count * times
+
+    def _count_turns(self, outputs: list[list[np.ndarray]], group: Group, designs: Indices) -> None:
+        """Give angles about axes the turns that they make along the anchors of their designs."""
+        owner, at, parts, order = group.anchors_of(designs)
+        owner, at = owner[order], at[order]
+        system = self.designs.system(designs[owner])
+        measuring = [(g, found) for g, found in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
         if not measuring:
             return
+        leaves = [np.concatenate(part, axis=-1)[..., order] for part in parts]
+        coordinates = jax.tree.unflatten(jax.tree.structure(group.steps[0].state), leaves)[0]
         series = np.nan_to_num(coordinates["quaternion"], nan=0.0, posinf=0.0, neginf=0.0)
-        here = np.arange(len(owners))
-        following = np.where(np.append(owners[1:] != owners[:-1], True), here, here + 1)  # or itself, the last one
+        here = np.arange(len(owner))
+        following = np.where(np.append(owner[1:] != owner[:-1], True), here, here + 1)  # or itself, the last one
 
         def instants(anchor: Indices, share: Lanes) -> Lanes:
             return at[anchor] + share * (at[following[anchor]] - at[anchor])
 
-        for group, found in measuring:
+        for counted, found in measuring:
 
-            def measured(anchor: Indices, share: Lanes, group: Group = group) -> Float[np.ndarray, "angle lane"]:
+            def measured(anchor: Indices, share: Lanes, group: Any = counted) -> Float[np.ndarray, "angle lane"]:
                 ends = anchor, following[anchor]
                 attitudes = blended_attitudes(at, series, ends, instants(anchor, share))
                 own = jax.tree.map(lambda leaf: leaf if np.shape(leaf)[-1] == 1 else leaf[..., anchor], group)
                 return raw_angles([own], {"quaternion": attitudes})[0]
 
-            begun = np.broadcast_to(group.element.datum.near, (group.instances, len(owners)))
-            places = counted_along(measured, owners, begun, PLACES)
-            nearest = _nearest(owners[places.path], instants(places.path, places.share), design, instant)
+            begun = np.broadcast_to(counted.element.datum.near, (counted.instances, len(owner)))
+            places = counted_along(measured, owner, begun, PLACES)
+            known = owner[places.path], instants(places.path, places.share)
+            nearest = _nearest(*known, self._instants[designs], self._ends)
             for values, angle in zip(found, places.angle, strict=True):
-                values[design, where, 0, 0] = brought_near(values[design, where, 0, 0], angle[nearest])
+                expected = self._as_given(angle[nearest], designs)
+                values[designs, :, 0, 0] = brought_near(values[designs, :, 0, 0], expected)
 
-    def _known_at_the_start(self, coordinates: Coordinates) -> SolvedState:
-        """Return what the first instant is predicted from: bodies at rest, and the turns that are known of angles."""
-        levels, count = self._order + 1, len(self.apart)
-        names = self.solver.model.pose_type.predictor
-        still = {n: np.stack([coordinates[n], *[np.zeros_like(coordinates[n])] * (levels - 1)]) for n in names}
-        groups = self.solver.model.system.outputs
-        angles = (np.zeros((levels, 1, groups[k].instances, count)) for k in self._turning)
-        return still, tuple(angles), np.zeros(count)
 
-    def _advanced(self, known: SolvedState, step: Lanes, target: Lanes, lanes: Indices) -> StepResult:
-        parts = []
-        for k in range(0, len(lanes), self._width):
-            lot = lanes[k : k + self._width]
-            some = _filled(lot, self._width)
-            kind, order = self.solver.model.pose_type, self._order
-            found = advance_designs(
-                self.designs.system(some),
-                jax.tree.map(lambda x, s=some: x[..., s], known),
-                step[some],
-                target[some],
-                self._settings,
-                pose_type=kind,
-                order=order,
-            )
-            parts.append(jax.tree.map(np.asarray, found))
-        return jax.tree.map(lambda *xs: np.concatenate(xs, axis=-1)[..., : len(lanes)], *parts)
+@lru_cache(maxsize=16)
+def _rounds(count: int, times: int, length: int, width: int) -> Int[np.ndarray, "round lane"]:
+    """Return the instants of designs in the order in which they are solved, by their indices.
 
-    def _keep(
-        self,
-        places: Places,
-        known: SolvedState,
-        arrived: StepResult,
-        tried: tuple[Lanes, Lanes],
-        taken: tuple[Any, Any],
-    ) -> None:
-        """Put designs where their steps led to, which become anchors; `taken` are designs and their lanes."""
-        (step, target), (chosen, some) = tried, taken
-        growth = np.where(step[chosen] > 0, GROWTH * step[chosen], np.inf)
-        found = (target[chosen], *(x[some] for x in (arrived.safe_step, arrived.radius, arrived.turnover)), growth)
-        for into, values in zip(places, found, strict=True):
-            into[chosen] = values
-        names = self.solver.model.pose_type.predictor
-        coordinates = {name: arrived.coordinates[name][..., some] for name in names}
-        state = (coordinates, tuple(arrived.outputs[k][..., some] for k in self._turning), arrived.sign[some])
-
-        def put(whole: np.ndarray, part: np.ndarray) -> None:
-            whole[..., chosen] = part
-
-        jax.tree.map(put, known, state)
-        self._anchors.append((chosen, found[0], state))
-
-    def _planned(self, places: Places, lanes: Indices) -> tuple[Lanes, Lanes]:
-        """Return the next steps of designs and where they lead; see `continuation_steps`."""
-        instant, safe_step, radius, turnover, largest = (part[lanes] for part in places)
-        rate = np.abs(turnover)
-        reach = np.where(rate > 0, 1 / np.where(rate > 0, rate, 1.0), np.inf)
-        first, last = self._ends
-        left = last - instant
-        step = np.minimum(np.minimum(safe_step, SAFE_FRACTION * reach), np.minimum(largest, left))
-        ahead = (turnover < 0) & (reach < PASSAGE * radius)
-        short = (step <= SMALLEST_STEP * (last - first)) & (left > 0)
-        self.apart[lanes[(ahead | short) & (left > 0)]] = True
-        step = np.where(left - step < SLIVER * step, left, step)
-        return step, np.where(step == left, last, instant + step)
-
-    def _store(self) -> tuple[Int[np.ndarray, " anchor"], Float[np.ndarray, " anchor"], SolvedState]:
-        """Return the anchors of all designs, by design and instant: whose they are, when, and their states."""
-        owners = np.concatenate([whose for whose, _, _ in self._anchors])
-        at = np.concatenate([when for _, when, _ in self._anchors])
-        order = np.lexsort((at, owners))
-        state = jax.tree.map(
-            lambda *xs: np.concatenate(xs, axis=-1)[..., order], *(state for _, _, state in self._anchors)
-        )
-        return owners[order], at[order], state
+    A lane takes up a piece of a motion of this length, one instant after another. At its end, and where lanes are left
+    over, the last one is solved again.
+    """
+    first = (np.arange(count)[:, None] * times + np.arange(0, times, length)).ravel()
+    first = first[np.minimum(np.arange(-(-len(first) // width) * width), len(first) - 1)]
+    last = first // times * times + times - 1
+    pieces = np.minimum(first[:, None] + np.arange(length), last[:, None])
+    return np.ascontiguousarray(pieces.reshape(-1, width, length).swapaxes(1, 2).reshape(-1, width))
 
 
 def _nearest(
-    owners: Int[np.ndarray, " anchor"],
+    owner: Int[np.ndarray, " anchor"],
     at: Float[np.ndarray, " anchor"],
-    design: Indices,
-    instant: Float[np.ndarray, " lane"],
-) -> Indices:
-    """Return the anchor of its design that is nearest to each instant, by index; anchors are in order."""
-    begin, end = (np.searchsorted(owners, design, side=side) for side in ("left", "right"))
-    low, high = begin.copy(), end.copy()
-    while (low < high).any():  # bisection, of all at once
-        middle = (low + high) // 2
-        right = (low < high) & (at[np.minimum(middle, len(at) - 1)] < instant)
-        low, high = np.where(right, middle + 1, low), np.where(right | (low >= high), high, middle)
-    before, after = np.maximum(low - 1, begin), np.minimum(low, end - 1)
-    return np.where(instant - at[before] <= at[after] - instant, before, after)
+    instants: Float[np.ndarray, "design time"],
+    ends: tuple[float, float],
+) -> Int[np.ndarray, "design time"]:
+    """Return the anchor of its design that is nearest to each instant, by index; anchors are in order.
+
+    Owners and instants are told by one number, so that all are found in one search.
+    """
+    first, last = ends
+    scale, design = 0.5 / max(last - first, 1e-300), np.arange(len(instants))[:, None]
+    after = np.searchsorted(owner + scale * (at - first), design + scale * (instants - first))
+    begin, end = (np.searchsorted(owner, design, side=side) for side in ("left", "right"))
+    before, after = np.clip(after - 1, begin, end - 1), np.clip(after, begin, end - 1)
+    return np.where(instants - at[before] <= at[after] - instants, before, after)
 
 
-def _filled(lanes: Indices, width: int) -> Int[np.ndarray, " {width}"]:
-    """Return lanes, of which the last is repeated up to a width."""
-    return lanes[np.minimum(np.arange(width), len(lanes) - 1)]
+def _replaced(state: Any, lanes: Any, found: Any) -> Any:
+    """Return a state with that of some lanes in its place."""
+
+    def replaced(whole: np.ndarray, part: np.ndarray) -> np.ndarray:
+        whole = whole.copy()
+        whole[..., lanes] = part
+        return whole
+
+    return jax.tree.map(replaced, state, found)

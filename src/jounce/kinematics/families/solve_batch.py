@@ -15,7 +15,7 @@ from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.families.design_paths import DesignPaths
 from jounce.kinematics.families.design_sides import Sides, sides_of_designs
-from jounce.kinematics.families.design_values import Designs, assemble_from_guess
+from jounce.kinematics.families.design_values import Designs
 from jounce.kinematics.position_analysis.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
@@ -296,23 +296,14 @@ class _Family:
         lost = lost_orders(self.mechanism)
         check_laws(self.design(known), np.array([first, last]), self.order + lost, forces=False)
         levels = max(self.order + lost, LOWEST_ORDER)
-        solver = Solver(model, levels, self.tolerance, refine=True, wanted=self.order)
         system = model.system
         if any(map(measures_angle, (*system.groups, *system.outputs))) or system.shape[0] != system.shape[1]:
-            return self._assembled_alone(solver, threads)
+            return self._assembled_alone(levels, threads)
         designs = Designs(self.held, model, self.names, self.rows)
-        driven = np.array([[name.startswith("drivers.")] for name in model.rows])
-        every = np.arange(count)
-        found = assemble_from_guess(
-            designs.system(every),
-            designs.guess,
-            np.full(count, first),
-            np.asarray(self.tolerance),
-            driven,
-            pose_type=model.pose_type,
+        found, every = designs.assembled(first, self.tolerance), np.arange(count)
+        return self._followed(
+            levels, designs, found.coordinates, np.asarray(found.plain) & ~designs.unfit(), every, threads
         )
-        coordinates = {name: np.asarray(x) for name, x in found.coordinates.items()}
-        return self._followed(solver, designs, coordinates, np.asarray(found.plain) & ~designs.unfit(), every, threads)
 
     def _first_assembled(self, instant: float) -> tuple[Model | None, int]:
         """Return the model of the first design that can be put together, and which it is."""
@@ -325,7 +316,7 @@ class _Family:
                 raise self._located(error, k) from None
         return None, 0
 
-    def _assembled_alone(self, solver: Solver, threads: int) -> Int[np.ndarray, " design"]:
+    def _assembled_alone(self, levels: int, threads: int) -> Int[np.ndarray, " design"]:
         """Put designs together one by one, as those with angles about axes are, and follow them side by side."""
         found, which = [], []
         for k in range(len(self.rows)):
@@ -342,11 +333,11 @@ class _Family:
         coordinates = {
             name: np.concatenate([np.asarray(place[name]) for _, place in found], axis=-1) for name in found[0][1]
         }
-        return self._followed(solver, designs, coordinates, np.ones(len(which), bool), chosen, threads)
+        return self._followed(levels, designs, coordinates, np.ones(len(which), bool), chosen, threads)
 
     def _followed(
         self,
-        solver: Solver,
+        levels: int,
         designs: Designs,
         coordinates: dict[str, Any],
         plain: np.ndarray,
@@ -354,8 +345,11 @@ class _Family:
         threads: int,
     ) -> Int[np.ndarray, " design"]:
         """Follow designs side by side and keep what comes of them; return which are left to be solved alone."""
+        solver = Solver(
+            designs.model, levels, self.tolerance, refine=True, wanted=self.order, own=designs.own(slice(1))
+        )
         paths = DesignPaths(solver, designs, self.all_instants[chosen], float(self.instants[-1]))
-        paths.follow(coordinates, plain)
+        paths.follow(coordinates, plain, threads)
         outputs, status = paths.solved(threads)
         whole = ~paths.apart
         self.status[chosen[whole]] = status[whole]

@@ -7,7 +7,6 @@ round has instants: a vector of machine code, or what XLA solves side by side. T
 memory of a thread, which stays in the cache; what is wanted of them is copied out of it.
 """
 
-import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -16,10 +15,11 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.execution.buffer_pool import acquire, arrays_in, release, room_of
+from jounce.execution.buffer_pool import release
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.path_following import Anchor, FollowedPath
 from jounce.kinematics.continuation.solver import SMALL_BATCH, Solver
+from jounce.kinematics.position_analysis.rooms import Room, solve_in_rooms
 from jounce.mechanism.time import nearest_instants
 
 Indices = Int[np.ndarray, " lane"]
@@ -117,61 +117,16 @@ def _neighbours(count: int, stride: int) -> tuple[Indices, Bool[np.ndarray, " la
     return neighbours(np.arange(count), stride)
 
 
-class _Room:
-    """The memory of a thread, for one block after another, with the anchors that they start from behind them.
-
-    Parameters
-    ----------
-    solver : Solver
-        What solves the instants.
-    like : tuple
-        The state of an anchor.
-    size, anchors : int
-        The most instants and anchors that it is for.
-    """
-
-    def __init__(self, solver: Solver, like: Any, size: int, anchors: int):
-        leaves, form = jax.tree.flatten(like)
-        shapes = [*((*leaf.shape[:-1], size + anchors) for leaf in leaves), *[(size,)] * 4]
-        self.block, self._size = acquire(room_of(shapes)), size
-        kinds = [*[float] * (len(leaves) + 2), *[int] * 2]
-        *state, self._time, self._step, self.status, self._source = arrays_in(self.block, shapes, kinds)
-        self.state = jax.tree.unflatten(form, state)
-        self._source[:] = 0
-        self._width = solver.program.width
-        self._run = solver.rounds(self.state, self._step, self._time, self.status, self._source)
-        self._rounds = rounds(0, 1, self._width)
-
-    def begin(self, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
-        """Take up the instants of a block, s, with the anchors around it."""
-        count = len(time)
-        parts = zip(*(jax.tree.leaves(anchor.state) for anchor in anchors), strict=True)
-        for whole, columns in zip(jax.tree.leaves(self.state), parts, strict=True):
-            np.concatenate(columns, axis=-1, out=whole[..., self._size : self._size + len(anchors)])
-        neighbour, known = _neighbours(count, stride)
-        instants = np.array([anchor.instant for anchor in anchors])
-        nearest = nearest_instants(instants, time)
-        to_neighbour, to_anchor = time - time[neighbour], time - instants[nearest]
-        near = known & (np.abs(to_neighbour) <= np.abs(to_anchor))
-        self._time[:count] = time
-        self._source[:count] = np.where(near, neighbour, self._size + nearest)
-        self._step[:count] = np.where(near, to_neighbour, to_anchor)
-        self._rounds = rounds(count, stride, self._width)
-
-    def rest(self, like: Any, count: int, stride: int) -> None:
-        """Take up so many instants, all at the same time, s, as that of a state."""
-        for whole, part in zip(jax.tree.leaves(self.state), jax.tree.leaves(like), strict=True):
-            whole[..., self._size :] = part
-        self._time[:], self._step[:], self._source[:] = 0.0, 0.0, self._size
-        self._rounds = rounds(count, stride, self._width)
-
-    def solve(self) -> None:
-        """Solve the instants that were taken up last."""
-        self._run(self._rounds)
-
-    def found(self, count: int) -> tuple[Any, Int[np.ndarray, " lane"]]:
-        """Return the states and the outcome of so many of them."""
-        return jax.tree.map(lambda x: x[..., :count], self.state), self.status[:count]
+def _begin(room: Room, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
+    """Have a room take up the instants of a block, s, with the anchors around it."""
+    room.put_anchors(zip(*(jax.tree.leaves(anchor.state) for anchor in anchors), strict=True))
+    neighbour, known = _neighbours(len(time), stride)
+    instants = np.array([anchor.instant for anchor in anchors])
+    nearest = nearest_instants(instants, time)
+    to_neighbour, to_anchor = time - time[neighbour], time - instants[nearest]
+    near = known & (np.abs(to_neighbour) <= np.abs(to_anchor))
+    sources = np.where(near, neighbour, room.size + nearest), np.where(near, to_neighbour, to_anchor)
+    room.take_up(time, sources, rounds(len(time), stride, room.width))
 
 
 def prepare_blocks(solver: Solver, like: SolvedState, count: int) -> None:
@@ -180,8 +135,9 @@ def prepare_blocks(solver: Solver, like: SolvedState, count: int) -> None:
         return
     stride = stride_of(solver, count, count, SMALL_BATCH)  # anchors, which are not known yet
     size = min(count, stride * solver.program.width)
-    room = _Room(solver, like, size, 1)
-    room.rest(like, size, stride)
+    room, nothing = Room(solver, like, size, 1), np.zeros(size)
+    room.put_anchors([leaf] for leaf in jax.tree.leaves(like))
+    room.take_up(nothing, (np.full(size, size), nothing), rounds(size, stride, room.width))
     room.solve()
     release(room.block)
 
@@ -217,20 +173,12 @@ def solve_blocks(
     size = max(block.count for block in blocks) if blocks else 0
     around = {block: path.anchors_around(time[block.first], time[block.first + block.count - 1]) for block in blocks}
     most = max(map(len, around.values()), default=0)
-    rooms: list[_Room] = []  # those of threads that are between two blocks
-    lock = threading.Lock()  # many short operations go faster one thread after another than in turns for Python's lock
 
-    def solve(block: Block) -> int:
-        with lock:
-            room = rooms.pop() if rooms else _Room(solver, path.anchors[0].state, size, most)
-            room.begin(time[block.place], around[block], block.stride)
-        room.solve()
-        put(block.place, *room.found(block.count))
-        rooms.append(room)
+    def begin(room: Room, block: Block) -> int:
+        _begin(room, time[block.place], around[block], block.stride)
         return block.count
 
-    try:
-        yield from each(solve, blocks)
-    finally:
-        while rooms:  # one that a thread still uses is not among them
-            release(rooms.pop().block)
+    def put_block(block: Block, state: Any, status: Indices) -> None:
+        put(block.place, state, status)
+
+    return solve_in_rooms(lambda: Room(solver, path.anchors[0].state, size, most), blocks, begin, put_block, each)

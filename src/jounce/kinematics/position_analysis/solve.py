@@ -240,7 +240,7 @@ def _followed(
                 error.message += f"; the driver {name} follows from the output {motion.output}, which must determine it"
             raise
         solver = dataclasses.replace(solver, model=model)
-        still = _still(solver, coordinates)
+        still = solver.still(coordinates)
         with rehearsed(partial(_prepare, solver, first), wanted=beside and _rank_is_open(guessed)):
             if beside:
                 with tried():
@@ -271,7 +271,7 @@ def _prepare(solver: Solver, instant: float) -> None:
         return
     model = dataclasses.replace(solver.model, system=resident(solver.model.system))
     solver = dataclasses.replace(solver, model=model)
-    solver.prepare(_still(solver, model.guess), instant)
+    solver.prepare(solver.still(model.guess), instant)
 
 
 def _rehearse(mechanism: Mechanism, solver: Solver, still: SolvedState, instants: Instants) -> None:
@@ -307,15 +307,6 @@ def checked_order(order: Any) -> int:
         message = f"the order of derivatives must be a whole number from 0 to {HIGHEST_ORDER}"
         raise MechanismError(message, name="order", value=order)
     return int(order)
-
-
-def _still(solver: Solver, coordinates: dict[str, np.ndarray]) -> SolvedState:
-    """Return what is known of the first instant before it is solved: its position."""
-    levels = solver.order + 1
-    still = {name: np.zeros((levels, *np.shape(x))) for name, x in coordinates.items()}
-    for name, x in coordinates.items():
-        still[name][0] = x
-    return still, tuple(np.zeros((levels, 1, g.instances, 1)) for g in solver.model.system.outputs), np.zeros(1)
 
 
 def _words(status: Status) -> str:

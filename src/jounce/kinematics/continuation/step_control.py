@@ -1,0 +1,152 @@
+"""How long the next continuation step is, and whether the last one is taken: of one motion, or of many designs.
+
+Two things limit a step. The Taylor series must carry it: no term moves a body far. And the Jacobian must not come near
+a singular one on the way, where branches meet and a series that looks smooth may lead over to another: `advance` tells
+where its determinant vanishes next, to first order, and a step goes only part of that way. A step that is refused is
+halved until it is not, or is too small to be halved. What is out of the ordinary ends the steps and is decided outside.
+"""
+
+import enum
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from jounce.execution.mapped import mapped
+from jounce.kinematics.continuation.correct_and_differentiate import SAFE_FRACTION
+from jounce.kinematics.status import Status
+from jounce.shapes import Numbers
+
+LARGEST_TURNOVER = 1.0  # of the Jacobian over a step, seen from its end; from its start, SAFE_FRACTION
+PASSAGE = 3e-3  # of the radius of the series: so near a singular position it is seen whether the motion is smooth there
+CRAWLING = 1e-6  # of what is left of the motion: steps this short, and for so many anchors,
+LONGEST_CRAWL = 300  # are no sharp turn, which takes a few dozen, but a law that grows beyond all bounds
+SLIVER = 0.1  # of a step: the last one takes with it what is no longer than this
+GROWTH = 4.0  # of a step over the last one
+
+Lanes = Float[Numbers, "*batch"]
+Truths = Bool[Numbers, "*batch"]
+
+
+class StopReason(enum.IntEnum):
+    """Why steps ended."""
+
+    UNFINISHED = 0  # they have not
+    ARRIVED = 1
+    PASSAGE = 2  # a singular position is just ahead, and may be passed smoothly
+    COLLAPSED = 3  # steps have become too small
+    REFUSED = 4  # no step, however small, is accepted
+
+
+class Place(NamedTuple):
+    """Where a motion has come to: the instant, s, and how far it may be followed from there; see `StepResult`."""
+
+    instant: Lanes
+    safe_step: Lanes
+    radius: Lanes
+    turnover: Lanes
+
+    @property
+    def reach(self) -> Any:
+        """Time to or from the nearest singular position, to first order, s."""
+        rate = jnp.abs(self.turnover)
+        return jnp.where(rate > 0, 1 / jnp.where(rate > 0, rate, 1.0), jnp.inf)
+
+
+class StepLimits(NamedTuple):
+    """Where steps go to, s, and what step is too small to be halved, s."""
+
+    stop: Lanes
+    smallest: Lanes
+
+
+class StepControl(NamedTuple):
+    """The next step: from where, how long, and what came of those before."""
+
+    place: Place  # of the last anchor
+    step: Lanes  # to be tried next, s; zero to solve the first instant itself
+    target: Lanes  # where it leads to, s
+    may_pass: Truths  # whether a singular position just ahead ends the steps
+    largest: Lanes  # step that the last one allows, s
+    crawled: Int[Numbers, "*batch"]  # steps in sequence that were too short
+    refused: Lanes  # instant at which a law had no permitted value, s; NaN if none
+    ending: Int[Numbers, "*batch"]  # see StopReason
+
+
+def steps_begin(place: Place, target: Float[np.ndarray, "*batch"]) -> StepControl:
+    """Return the step that solves the first instant itself, s; or, at a place that is known, none that is planned."""
+    blank = np.zeros(target.shape)
+    no, none = np.zeros(target.shape, bool), np.zeros(target.shape, int)
+    return StepControl(place, blank, target, ~no, blank + np.inf, none, blank + np.nan, none)
+
+
+def planned(control: StepControl, limits: StepLimits) -> StepControl:
+    """Return the next step from a place, or why there is none."""
+    place = control.place
+    left = limits.stop - place.instant
+    step = jnp.minimum(jnp.minimum(place.safe_step, SAFE_FRACTION * place.reach), jnp.minimum(control.largest, left))
+    crawled = jnp.where(step < CRAWLING * left, control.crawled + 1, 0)
+    singular = control.may_pass & (place.turnover < 0) & (place.reach < PASSAGE * place.radius)
+    endings = (
+        ((crawled > LONGEST_CRAWL) | (place.instant + step == place.instant), StopReason.COLLAPSED),
+        (singular, StopReason.PASSAGE),
+        (~(left > 0), StopReason.ARRIVED),
+    )
+    ending = jnp.full(left.shape, int(StopReason.UNFINISHED))
+    for happened, why in endings:
+        ending = jnp.where(happened, int(why), ending)
+    step = jnp.where(left - step < SLIVER * step, left, step)
+    target = jnp.where(step == left, limits.stop, place.instant + step)
+    crawled = jnp.where(ending == StopReason.PASSAGE, control.crawled, crawled)  # the step is planned again
+    refused = jnp.full(left.shape, jnp.nan)
+    return control._replace(step=step, target=target, ending=ending, crawled=crawled, refused=refused)
+
+
+def accepted(control: StepControl, status: Int[Numbers, "*batch"], there: Place) -> Truths:
+    """Tell whether a step may be taken, of which the status is known, and the place that it led to."""
+    passable = (status == int(Status.OK)) | (status == int(Status.UNDEFINED))
+    return passable & ((control.step == 0) | (control.step * jnp.abs(there.turnover) <= LARGEST_TURNOVER))
+
+
+def after(
+    control: StepControl,
+    status: Int[Numbers, "*batch"],
+    there: Place,
+    limits: StepLimits,
+    chosen: tuple[Truths, Truths],
+) -> StepControl:
+    """Return the step after one, which was `chosen` to be accepted, and to be taken.
+
+    One that was accepted but not taken is made again; see `accepted` for what is known of it.
+    """
+    good, taken = chosen
+    stuck = ~good & ((control.step < limits.smallest) | (control.target <= control.place.instant))
+    inadmissible = ~good & (status == int(Status.INADMISSIBLE)) & jnp.isnan(control.refused)
+    control = control._replace(
+        ending=jnp.where(stuck, int(StopReason.REFUSED), int(StopReason.UNFINISHED)),
+        refused=jnp.where(inadmissible, control.target, control.refused),
+    )
+    largest = jnp.where(control.step == 0, control.largest, GROWTH * control.step)
+    arrived = control._replace(place=there, may_pass=jnp.ones_like(taken), largest=largest)
+    halved = ~good & ~stuck
+    step = jnp.where(halved, 0.5 * control.step, control.step)
+    again = control._replace(step=step, target=jnp.where(halved, control.place.instant + step, control.target))
+    return jax.tree.map(lambda new, old: jnp.where(taken, new, old), planned(arrived, limits), again)
+
+
+@mapped()
+def step_on(limits: StepLimits, lanes: tuple[StepControl, Int[Numbers, " batch"], Place]) -> tuple[StepControl, Any]:
+    """Return the next step of each of many designs, and whether the last one was taken, all of which is decided by it.
+
+    Parameters
+    ----------
+    limits : StepLimits
+        Of all.
+    lanes : tuple
+        Of each the step that was made, its status, and the place that it led to.
+    """
+    control, status, there = lanes
+    good = accepted(control, status, there)
+    return after(control, status, there, limits, (good, good)), good

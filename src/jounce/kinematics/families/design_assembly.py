@@ -1,0 +1,133 @@
+"""Designs put together side by side, as each would be alone: by damped Gauss-Newton from its starting guess."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.execution.mapped import mapped
+from jounce.jet import Jet
+from jounce.kinematics.assembly.gauss_newton import LONGEST_STEP, MAX_STEPS
+from jounce.kinematics.continuation.instant_program import of_design
+from jounce.kinematics.continuation.jacobian_factors import factored
+from jounce.mechanism.builder import pose_at
+from jounce.mechanism.system import System
+from jounce.modules import with_fields
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+HALVINGS = 12
+CLEARLY_REGULAR = 1e-6  # smallest pivot over the largest of a Jacobian that is looked at no closer
+
+Coordinates = dict[str, Float[Numbers, "_ ... _"]]
+
+
+class Trials(NamedTuple):
+    """How designs could be put together, each from its own starting guess.
+
+    Attributes
+    ----------
+    coordinates : dict of str to array
+        Of all bodies, (..., bodies, designs).
+    plain : array of bool, shape (designs,)
+        Whether there is nothing to it but Gauss-Newton: all is closed, no body turned by more than half a turn, and the
+        Jacobian is regular by far. What is not plain is looked at alone.
+    """
+
+    coordinates: Coordinates
+    plain: Bool[Numbers, " design"]
+
+
+def _assembled(
+    system: System,
+    guess: Coordinates,
+    instant: Float[Numbers, " design"],
+    tolerance: Float[Numbers, ""],
+    driven: Bool[Numbers, "row 1"],
+    pose_type: type[Pose],
+) -> Trials:
+    """Put designs together side by side, a lane for each; see `assemble_from_guess`."""
+    time = Jet([instant[None]])
+    unscaled = with_fields(system, row_scale=np.ones(system.row_scale.shape))
+
+    def gaps(pose: Any, scale: Any) -> Any:
+        return jnp.sqrt(jnp.sum((scale * unscaled.residual(pose, time).coefficients[0]) ** 2, axis=0))
+
+    def scale_at(pose: Any) -> Any:
+        entries = jnp.abs(unscaled.entries(pose, time))
+        padded = jnp.concatenate([entries, jnp.zeros((1, entries.shape[-1]))])
+        largest = jnp.max(padded[system.pattern.places], axis=(1, 2))
+        return 1 / jnp.where((largest > 0) & jnp.isfinite(largest), largest, 1.0)
+
+    def going(state: Any) -> Any:
+        return jnp.any(state[1]) & (state[2] < MAX_STEPS)
+
+    def correct(state: Any) -> Any:
+        coordinates, moving, count = state
+        pose = pose_at(coordinates, pose_type)
+        scale = scale_at(pose)
+        step = factored(system, pose, time).solve(-system.residual(pose, time).coefficients[0])
+        size = jnp.max(jnp.abs(step), axis=0)
+        step, now = step * jnp.minimum(1.0, LONGEST_STEP / jnp.maximum(size, 1e-300))[None], gaps(pose, scale)
+
+        def displaced(part: Any) -> Any:
+            return pose.displaced(*system.coordinates(step * part[None], pose.shifts))
+
+        def better(part: Any) -> Any:
+            return (gaps(displaced(part), scale) < now) | (size <= tolerance)
+
+        def halve(state: Any) -> Any:
+            part, good, tried = state
+            part = jnp.where(good, part, 0.5 * part)
+            return part, good | better(part), tried + 1
+
+        whole = jnp.ones_like(size)
+        part, good, _ = jax.lax.while_loop(
+            lambda s: jnp.any(moving & ~s[1]) & (s[2] < HALVINGS), halve, (whole, better(whole), jnp.zeros((), int))
+        )
+        found = {name: jet.coefficients[0] for name, jet in displaced(part).coordinates().items()}
+        take = moving & good
+        coordinates = {name: jnp.where(_wide(take, x), found[name], x) for name, x in coordinates.items()}
+        return coordinates, take & (size > tolerance), count + 1
+
+    lag = jnp.where(driven, jnp.abs(unscaled.residual(pose_at(guess, pose_type), time).coefficients[0]), 0.0)
+    start = (guess, jnp.isfinite(instant), jnp.zeros((), int))
+    coordinates, moving, _ = jax.lax.while_loop(going, correct, start)
+    pose = pose_at(coordinates, pose_type)
+    scale = scale_at(pose)
+    open_by = jnp.max(jnp.abs(scale * unscaled.residual(pose, time).coefficients[0]), axis=0)
+    plain = ~moving & (open_by <= jnp.maximum(1e3 * tolerance, 1e-9)) & (jnp.max(lag, axis=0) < np.pi)
+    plain &= factored(system, pose, time).pivot_ratio() > CLEARLY_REGULAR
+    if "angle" in coordinates:
+        plain &= jnp.max(jnp.abs(coordinates["angle"] - guess["angle"]), axis=0) < np.pi
+    return Trials(coordinates, plain)
+
+
+def _of_many(shared: Any, designs: Any, *, pose_type: type[Pose]) -> Trials:
+    (system, tolerance, driven), (guess, instant, own) = shared, designs
+    return _assembled(of_design(system, own), guess, instant, tolerance, driven, pose_type)
+
+
+@mapped(by_xla=_of_many, made_of=(_assembled,))
+def assemble_from_guess(shared: Any, designs: Any, *, pose_type: type[Pose]) -> Trials:
+    """Put a design together by the steps that it would take alone; see `assembly.gauss_newton.assemble_from_guess`.
+
+    Parameters
+    ----------
+    shared : tuple
+        System; the tolerance of the last correction, rad or sizes of the mechanism; and which rows are those of
+        drivers, shape (rows, 1).
+    designs : tuple
+        Coordinates of all bodies to start from, the instant, s, and the values of the design, see `of_design`.
+    pose_type : type
+        PlanarPose or SpatialPose.
+    """
+    (system, tolerance, driven), (guess, instant, own) = shared, designs
+    system = with_fields(of_design(system, own), reflected=True)
+    return _assembled(system, guess, instant, tolerance, driven, pose_type)
+
+
+def _wide(lanes: Any, values: Any) -> Any:
+    return lanes.reshape(*[1] * (values.ndim - 1), -1)
