@@ -36,7 +36,7 @@ def __getattr__(name: str) -> Any:
     room = None if name.startswith("_") else _offered().get(name)
     if room is None and (name.startswith("_") or importlib.util.find_spec(f"{__name__}.{name}") is None):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    with _importing.lock:
+    with _importing.lock, _importing.uncollected():
         if room in (None, __name__):
             value = importlib.import_module(f"{__name__}.{name}")
         else:
