@@ -48,6 +48,9 @@ BENCHMARKS = {
     "view": Benchmark("view", "From a slider of the web view to a new motion", one_core=False),
     "start": Benchmark("start", "Start-up of the command and the import, beside JAX", one_core=False),
     "first-use": Benchmark("first_use", "Commands in fresh processes, without and with a cache", one_core=False),
+    "first-calls": Benchmark(
+        "first_calls", "First calls in new processes of Python, beside the import", one_core=False
+    ),
     "sweep": Benchmark("sweep", "A sweep: what Dask adds, the whole time, and the memory", one_core=False),
     "memory": Benchmark("memory", "Peak memory of a long grid, beside its outputs", one_core=False),
     "cores": Benchmark("cores", "All cores beside one, and two threads", one_core=False),

@@ -65,6 +65,7 @@ def main() -> int:
 
 def _measure(name: str, quick: bool, file: Path) -> None:
     """Write the rows of one benchmark, line by line as they come."""
+    os.environ["JOUNCE_CACHE_DIR"] = ""  # rows of first calls are of programs that are compiled, unless they say so
     os.environ["JAX_ENABLE_X64"] = "1"  # for what is written in JAX itself: modules of benchmarks import it
     if BENCHMARKS[name].one_core:
         use_one_core()

@@ -1,4 +1,4 @@
-"""Start-up in fresh processes: the command's help, and the import, beside Python and JAX alone."""
+"""Start-up in fresh processes: the command's help, the import and a first name, beside Python and JAX alone."""
 
 import sys
 from collections.abc import Callable
@@ -24,5 +24,13 @@ def cases(quick: bool) -> Cases:
             Contestant("jounce", fresh("-c", "import jounce")),
             Contestant("`import jax, jax.numpy`", fresh("-c", "import jax, jax.numpy")),
             bare,
+        ],
+    )
+    yield Case(
+        "first name after `import jounce`",
+        [
+            Contestant("jounce", fresh("-c", "import jounce; jounce.load")),
+            Contestant("`import jax, jax.numpy, equinox`", fresh("-c", "import jax, jax.numpy, equinox")),
+            Contestant("`import jax, jax.numpy`", fresh("-c", "import jax, jax.numpy")),
         ],
     )

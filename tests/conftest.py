@@ -43,6 +43,7 @@ if not _as_users:
 # memory and ask for the same lock. Tests of threads and of rehearsals ask for two; the examples run with all cores.
 if not _as_users:
     os.environ.setdefault("JOUNCE_THREADS", "1")
+os.environ["JOUNCE_CACHE_DIR"] = ""  # tests leave the folder of the user alone
 # The lines of Python from which each operation comes, which only dumps of programs show, take a twelfth of the time.
 jax.config.update("jax_include_full_tracebacks_in_locations", False)
 jax.config.update("jax_traceback_in_locations_limit", 0)

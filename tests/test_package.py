@@ -56,6 +56,18 @@ for name in "JounceError Jet load load_trajectory".split():
     assert found == [[], [], ["trajectory", "mechanism"], ["trajectory", "mechanism", "robot"]]
 
 
+def test_the_search_for_garbage_is_as_it_was_after_an_import():
+    code = """
+import gc, jounce
+gc.disable()
+jounce.Jet
+print(gc.isenabled())
+gc.enable()
+jounce.load
+print(gc.isenabled(), gc.get_freeze_count())"""
+    assert printed(code).split() == ["False", "True", "0"]
+
+
 def test_rooms_are_there_without_an_import():
     code = "import jounce as jn; print(jn.trajectory.AbstractMotion.__name__, jn.kinematics.__name__, jn.plot.__name__)"
     assert printed(code).split() == "AbstractMotion jounce.kinematics jounce.plot".split()

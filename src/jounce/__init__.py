@@ -16,7 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from jounce import errors as errors, importing as _importing
+from jounce import alterations as _alterations, errors as errors, importing as _importing
 from jounce.display import Displayed as _Displayed, show_by as _show_by
 from jounce.interrupts import end_on_signals as _end_on_signals, is_command as _is_command, mark_forks as _mark_forks
 from jounce.jax_options import OPTIONS as _OPTIONS
@@ -36,7 +36,7 @@ def __getattr__(name: str) -> Any:
     room = None if name.startswith("_") else _offered().get(name)
     if room is None and (name.startswith("_") or importlib.util.find_spec(f"{__name__}.{name}") is None):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    with _importing.lock:
+    with _importing.lock, _importing.uncollected():
         if room in (None, __name__):
             value = importlib.import_module(f"{__name__}.{name}")
         else:

@@ -69,6 +69,7 @@ from jounce.errors import (
     MechanismFileError as MechanismFileError,
     MobilityError as MobilityError,
     OutputError as OutputError,
+    ProgramFolderWarning as ProgramFolderWarning,
     RobotError as RobotError,
     RobotFileError as RobotFileError,
     RobotWarning as RobotWarning,
@@ -80,6 +81,7 @@ from jounce.errors import (
     UnitWarning as UnitWarning,
     UnsupportedError as UnsupportedError,
 )
+from jounce.execution.store import keep_programs as keep_programs
 from jounce.forces import AbstractForce as AbstractForce, Law as Law, Laws as Laws
 from jounce.integrate import (
     Batch as Batch,

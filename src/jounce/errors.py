@@ -364,6 +364,10 @@ class MachineCodeWarning(_BoundedWarning):
     """XLA computes what there is no machine code for: the same results in two to six times the time."""
 
 
+class ProgramFolderWarning(_BoundedWarning):
+    """The folder chosen for compiled programs cannot be used: they are compiled again in each process."""
+
+
 class DamageWarning(_BoundedWarning):
     """Files of a result were lost or changed after they were written; what they held is computed again."""
 

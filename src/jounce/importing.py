@@ -1,6 +1,25 @@
 """Rooms are imported when something of them is first used, by one thread at a time."""
 
+import contextlib
+import gc
 import threading
+from collections.abc import Iterator
 
 lock = threading.RLock()
 """Held while rooms are imported within functions: threads that import several at once may get each other's half."""
+
+
+@contextlib.contextmanager
+def uncollected() -> Iterator[None]:
+    """Leave the search for garbage until later: imports leave none, and look through all of JAX again and again."""
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        if not gc.get_freeze_count():  # what is imported stays: it counts as old without being looked through
+            gc.freeze()
+            gc.unfreeze()
+        gc.enable()

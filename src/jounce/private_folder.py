@@ -42,6 +42,8 @@ class PrivateFolder:
         It belongs to another user, others may write in it or in a folder that it is in, or it cannot be opened.
     """
 
+    SCRATCH = ".part"  # the ending of what is being written
+
     def __init__(self, path: str | Path):
         self.path = Path(os.path.realpath(path))
         try:
@@ -72,7 +74,7 @@ class PrivateFolder:
 
     def write(self, name: str, content: bytes) -> None:
         """Put a file in the place of one of this name, or of a link, in one step; leave it if that fails."""
-        scratch = f".{secrets.token_hex(8)}.part"
+        scratch = f".{secrets.token_hex(8)}{self.SCRATCH}"
         try:
             with open(self._opened(scratch, _WRITE), "wb") as stream:  # noqa: PTH123 - of a descriptor
                 stream.write(content)

@@ -20,6 +20,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jounce import alterations
 from jounce.errors import UnsupportedError
 from jounce.interrupts import left_behind
 from jounce.jax_internals import config, core
@@ -256,6 +257,7 @@ def cover_new_modules() -> None:
         for value in list(vars(sys.modules[name]).values()):
             if inspect.isclass(value) and value.__module__ == name:
                 _compute_under_own_settings(value)
+    alterations.note(_rooms)
 
 
 def _is_open(value: Any, room: str) -> bool:

@@ -10,61 +10,13 @@ import zlib
 
 import pytest
 
-from jounce.cli import compiled_programs
-from jounce.cli.compiled_programs import CheckedEntries, JaxEntries
+from jounce.cli.compiled_programs import JaxEntries
 from jounce.execution import compilation, store
+from jounce.execution.program_folder import ProgramFolder
 from jounce.private_folder import PrivateFolder
+from tests.execution.test_program_folder import DAMAGES, PROGRAM
 
 FOUR_BAR = pathlib.Path(__file__).resolve().parents[2] / "examples" / "four_bar.yaml"
-PROGRAM = bytes(range(256)) * 40
-
-DAMAGES = {
-    "empty": lambda file: file.write_bytes(b""),
-    "cut short": lambda file: file.write_bytes(file.read_bytes()[:-7]),
-    "garbage": lambda file: file.write_bytes(b"no program at all"),
-    "a bit": lambda file: file.write_bytes(bytes([*file.read_bytes()[:99], 1, *file.read_bytes()[100:]])),
-    "unreadable": lambda file: file.chmod(0),
-    "removed": lambda file: file.unlink(),
-}
-
-
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_what_is_damaged_is_absent_and_then_replaced(tmp_path, damage):
-    entries = CheckedEntries(PrivateFolder(tmp_path))
-    assert entries.get("key") is None
-    entries.put("key", PROGRAM)
-    assert entries.get("key") == PROGRAM
-    (file,) = tmp_path.iterdir()
-    DAMAGES[damage](file)
-    if damage != "unreadable" or os.getuid():  # nothing is unreadable to root
-        assert entries.get("key") is None
-    entries.put("key", PROGRAM)
-    assert entries.get("key") == PROGRAM
-    assert list(tmp_path.iterdir()) == [file]
-
-
-def test_an_entry_that_cannot_be_replaced_is_compiled_each_time(tmp_path):
-    entries = CheckedEntries(PrivateFolder(tmp_path))
-    (tmp_path / "key.program").mkdir()
-    entries.put("key", PROGRAM)
-    assert entries.get("key") is None
-    gone = tmp_path / "gone"
-    entries = CheckedEntries(PrivateFolder(gone))
-    gone.rmdir()
-    entries.put("key", PROGRAM)
-    assert entries.get("key") is None
-
-
-def test_those_that_were_not_used_for_longest_go_first(tmp_path, monkeypatch):
-    monkeypatch.setattr(compiled_programs, "LARGEST", 3 * (len(PROGRAM) + 32))
-    for key in "abcde":
-        CheckedEntries(PrivateFolder(tmp_path)).put(key, PROGRAM)
-        for file in tmp_path.iterdir():
-            os.utime(file, (1e9 + "abcde".index(file.stem),) * 2)
-    assert sorted(file.stem for file in tmp_path.iterdir()) == ["c", "d", "e"]
-    assert CheckedEntries(PrivateFolder(tmp_path)).get("c") == PROGRAM
-    CheckedEntries(PrivateFolder(tmp_path)).put("f", PROGRAM)
-    assert sorted(file.stem for file in tmp_path.iterdir()) == ["c", "e", "f"]
 
 
 def test_jax_takes_nothing_from_its_own_store_where_a_program_is_to_be_kept(tmp_path):
@@ -133,4 +85,4 @@ def test_two_commands_with_a_cold_cache_and_one_with_a_damaged_one(tmp_path):
     assert process.returncode == 0
     kept = {file: file.read_bytes() for file in tmp_path.iterdir()}  # but those that compile too fast to be kept
     assert kept
-    assert all(CheckedEntries(PrivateFolder(tmp_path)).get(file.name.removesuffix(".program")) for file in kept)
+    assert all(ProgramFolder(PrivateFolder(tmp_path)).get(file.name.removesuffix(".program")) for file in kept)

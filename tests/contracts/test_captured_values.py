@@ -573,7 +573,7 @@ def test_machine_code_and_kept_programs(monkeypatch, machine_code, folder):
     wave, controller, c = Wave(), Controller(), [0.1]
     torque = jn.forces.Torque(GROUND, lambda x, v, t: -c[0] * v)
     store = Kept() if folder else None
-    programs.keep_programs(store)
+    programs.use_store(store)
     try:
         for again in range(2):
             for wave.amplitude, c[0] in ((1.0, 0.1), (2.0, 0.5)):
@@ -587,7 +587,7 @@ def test_machine_code_and_kept_programs(monkeypatch, machine_code, folder):
             if not again:
                 jax.clear_caches()  # what is found again comes from the store
     finally:
-        programs.keep_programs(None)
+        programs.use_store(None)
     assert store is None or store.entries
 
 

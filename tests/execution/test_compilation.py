@@ -38,9 +38,9 @@ def example(x, y=(), *, times=1):
 def shelf():
     traced.clear()
     store = Shelf()
-    store_.keep_programs(store)
+    store_.use_store(store)
     yield store
-    store_.keep_programs(None)
+    store_.use_store(None)
 
 
 def anew():
@@ -144,6 +144,7 @@ def test_brief_programs_are_not_optimised_for_a_command_about_few_instants(shelf
     options, compile_ = [], jax.stages.Lowered.compile
     monkeypatch.delenv("XLA_FLAGS", raising=False)  # by which tests have all of them compiled so
     monkeypatch.setattr(store_, "_many", False)
+    monkeypatch.setattr(store_, "_soon", True)
     monkeypatch.setattr(
         jax.stages.Lowered, "compile", lambda self, given=None: options.append(given) or compile_(self, given)
     )
@@ -163,7 +164,7 @@ def test_brief_programs_are_not_optimised_for_a_command_about_few_instants(shelf
     assert len(shelf) == 2
 
 
-def test_without_a_store_all_programs_are_optimised():
+def test_all_programs_are_optimised_but_for_a_command(shelf):
     assert not store_.is_wanted_soon()
 
 

@@ -235,12 +235,10 @@ def tell(command: str, result: Callable[[], Mapping[str, Any]], out: Path | None
 
 
 def import_files(paths: Sequence[Path] | None) -> None:
-    """Run Python files with the user's own classes; what is compiled may then be other than this package says."""
+    """Run Python files with the user's own classes."""
     if paths:
-        from jounce.execution.store import keep_programs
         from jounce.io.mechanisms.user_classes import import_file
 
-        keep_programs(None)
         for path in paths:
             import_file(path)
 

@@ -1,8 +1,7 @@
 """How the solver's functions are compiled, and how what was compiled is kept for other processes.
 
-Where a store is given to `keep_programs`, compiled programs go there, and come from there without the functions being
-traced: half of the time of a first use is Python's. Without one, which is how the package is imported, `jax.jit` does
-everything.
+Where there is a store, compiled programs go there, and come from there without the functions being traced: half of the
+time of a first use is Python's. Without one `jax.jit` does everything.
 """
 
 import inspect
@@ -30,6 +29,7 @@ from jounce.settings import check_process, under_own_settings
 LARGE = 32  # numbers of an array that stays in memory in machine code of one instant
 _NOTHING = jax.tree.structure(())
 _thread = threading.local()
+_asked = False  # whether JAX's own store, where it has one, asks `compiles_anew`
 
 
 @contextmanager
@@ -48,6 +48,19 @@ def compiling_anew() -> Iterator[None]:
 def compiles_anew() -> bool:
     """Tell whether this thread is to compile, and takes nothing from JAX's own store."""
     return getattr(_thread, "anew", False)
+
+
+def ask_before_jax() -> None:
+    """Take note that JAX's own store asks `compiles_anew`."""
+    global _asked
+    _asked = True
+
+
+def _store_of_xla() -> Store | None:
+    """Return the store of what XLA compiles; None where JAX has a store of its own, or a device that was chosen."""
+    config: Any = jax.config
+    elsewhere = config.jax_compilation_cache_dir is not None and not _asked
+    return None if elsewhere or config.jax_default_device is not None else current_store()
 
 
 class StoppedError(Exception):
@@ -192,7 +205,7 @@ class Compiled:
         if traced:
             whole = self.jitted if all(map(runs_at_once, traced)) else self._within
             return whole(*arguments, **keywords, **static)
-        if (store := current_store()) is None:
+        if (store := _store_of_xla()) is None:
             return self.jitted(*arguments, **keywords, **static)
         kinds = tuple(map(_kind, leaves))
         if None in kinds:

@@ -1,12 +1,23 @@
-"""Where compiled programs are kept for other processes, and how machine code goes there."""
+"""Where compiled programs are kept for other processes, and how machine code goes there.
+
+That is a folder of the user, unless the environment or `keep_programs` says otherwise.
+"""
 
 import io
+import os
 import pickle
 import sys
+import threading
+import warnings
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
+
+from jounce.errors import OutputError, ProgramFolderWarning
+from jounce.execution.program_folder import VARIABLE, ProgramFolder, chosen_folder
+from jounce.private_folder import PrivateFolder
 
 OURS = ("jounce",)
 LIBRARIES = ("jax", "jaxlib", "numpy")
@@ -31,19 +42,69 @@ class Store(Protocol):
 
 
 FEW = 100_000  # instants of one command: for fewer, faster code takes longer to compile than it saves
-_store: Store | None = None
-_many = False
+_undecided: Any = object()
+_store: Store | None = _undecided
+_soon = _many = False
+_lock = threading.Lock()
 
 
-def keep_programs(store: Store | None) -> None:
+def keep_programs(folder: str | Path | None) -> None:
+    """Keep what is compiled from here on in a folder, and take from there what is needed again; None for neither.
+
+    Unless this is called, the folder is that of the environment variable ``JOUNCE_CACHE_DIR`` (none where it is empty),
+    or one for jounce among the user's caches: a second process then starts with the programs of the first. What is kept
+    does not change results; up to half a gigabyte is, those longest without use go first.
+
+    Parameters
+    ----------
+    folder : str or Path, or None
+        Made if it is not there. Programs run with the rights of who reads them, so nobody else may write in it.
+
+    Raises
+    ------
+    OutputError
+        If it belongs to another user, others may write in it or in a folder that it is in, or it cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import jounce as jn
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     jn.keep_programs(folder)
+    ...     jn.keep_programs(None)  # not any more
+    """
+    use_store(None if folder is None else ProgramFolder(PrivateFolder(folder)))
+
+
+def use_store(store: Store | None) -> None:
     """Keep what is compiled from here on in a store, and take it from there; None for not."""
     global _store
     _store = store
 
 
 def current_store() -> Store | None:
-    """Return the store that programs go to."""
+    """Return the store that programs go to; the first time, the folder is opened that nobody had to choose."""
+    if _store is _undecided:
+        with _lock:
+            if _store is _undecided:
+                use_store(_usual_store())
     return _store
+
+
+def _usual_store() -> Store | None:
+    """Return the programs of the folder chosen by the environment, or of the user's; None where it cannot be used.
+
+    A warning says so only where it was chosen: a home that cannot be written is none of this package's business.
+    """
+    try:
+        folder = chosen_folder()
+        return None if folder is None else ProgramFolder(PrivateFolder(folder))
+    except OutputError as error:
+        if VARIABLE in os.environ:
+            warnings.warn(f"compiled programs are not kept: {error}", ProgramFolderWarning, stacklevel=2)
+    except (RuntimeError, ValueError):  # there is no home, or a name that no file can have
+        pass
+    return None
 
 
 def expect(instants: int) -> None:
@@ -52,9 +113,15 @@ def expect(instants: int) -> None:
     _many = _many or instants > FEW
 
 
+def run_one_command() -> None:
+    """Take note that this process runs one command, whose user waits for it."""
+    global _soon
+    _soon = True
+
+
 def is_wanted_soon() -> bool:
-    """Tell whether code is compiled for one command, whose user waits for it: programs are kept, instants are few."""
-    return _store is not None and not _many
+    """Tell whether code is compiled for one command, whose user waits for it, of few instants."""
+    return _soon and not _many
 
 
 class Descriptions(pickle.Unpickler):

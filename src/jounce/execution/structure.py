@@ -16,17 +16,21 @@ import sys
 import types
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
-from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 
+from jounce.alterations import BEGUN, altered
+from jounce.execution.llvm import machine
 from jounce.jax_internals import is_missing, trace_settings as settings
 
 PACKAGE = Path(__file__).parents[1]
 LIBRARIES = ("equinox", "jax", "jaxlib", "numpy")  # whose releases decide what is traced and compiled
+OPTIONS = ("jax_disable_most_optimizations",)  # of JAX, beside those by which it tells its own programs apart
+MARGIN = 2.0  # s, between the clock of files and that of processes
 CONTAINERS = (tuple, list, dict, type(None))
 
 
@@ -119,8 +123,10 @@ def program_key(
     Raises
     ------
     UndescribedError
-        The structure holds something of a user's own.
+        The structure holds something of a user's own, or this package is not what its files say.
     """
+    if (changed := altered() or _changed_file()) is not None:
+        raise UndescribedError(changed)
     told = [
         description(functions),
         tree_description(tree),
@@ -134,22 +140,37 @@ def program_key(
 
 def _described_settings() -> str:
     told = [repr(x) for x in settings() if type(x).__name__ != "AxisEnv"]  # of arrays that JAX traces: there are none
+    told += [repr(getattr(jax.config, name, None)) for name in OPTIONS]
     if any(" at 0x" in x for x in told):
         raise UndescribedError("a setting of JAX")
     return ", ".join(told)
+
+
+def _files() -> list[Path]:
+    """Return the files that this package consists of."""
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+@lru_cache(maxsize=1)
+def _changed_file() -> str | None:
+    """Return a file that was written after this process had begun, which may have imported another text, or None."""
+    found = {str(file): file.stat() for file in _files()}
+    return next((n for n, x in found.items() if max(x.st_mtime, x.st_ctime) > BEGUN - MARGIN), None)
 
 
 @lru_cache(maxsize=1)
 def _surroundings() -> str:
     """Return what all programs of this process depend on: this package's text, the libraries, the machine."""
     text = hashlib.sha256()
-    for file in sorted(PACKAGE.rglob("*.py")):
+    for file in _files():
         text.update(f"{file.relative_to(PACKAGE).as_posix()} {file.stat().st_size}\n".encode())
         text.update(file.read_bytes())
-    releases = [f"{name} {version(name)}" for name in LIBRARIES]
+    releases = [f"{name} {sys.modules[name].__version__}" for name in LIBRARIES]  # of what is in memory
     flags = [os.environ.get(name, "") for name in ("XLA_FLAGS", "JAX_PLATFORMS")]
     devices = [f"{device.platform} {device.device_kind}" for device in jax.devices()]
-    return "\n".join([text.hexdigest(), sys.version, *releases, *flags, *devices, _processor()])
+    devices.append(getattr(jax.devices()[0].client, "platform_version", ""))
+    compiler = machine.processor() if find_spec("llvmlite") else ()
+    return "\n".join([text.hexdigest(), sys.version, *releases, *flags, *devices, *compiler, _processor()])
 
 
 def _processor() -> str:

@@ -15,7 +15,6 @@ import jax
 import numpy as np
 
 from jounce.execution.backends import is_wanted, tell_missing
-from jounce.execution.llvm import machine
 from jounce.execution.llvm.modules import object_file
 from jounce.execution.llvm.programs import Program, Single
 from jounce.execution.llvm.text.scalars import MOST_LINES
@@ -148,7 +147,7 @@ class Translated:
     def _key(self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: dict[str, Any]) -> str | None:
         """Return the name of a program in other processes, None where it holds something of a user's own."""
         leaves, tree = jax.tree.flatten(given)
-        kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *places.values(), machine.processor()]
+        kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *places.values()]
         with suppress(UndescribedError):
             return program_key(self.made_of, tree, [*kinds, "alone" if self._alone else "side by side"], static)
         return None

@@ -147,11 +147,9 @@ def from_axis_angle(axis: Sequence[float], angle: float) -> Quaternion:
     >>> [round(e, 12) for e in from_axis_angle([0.0, 0.0, 3.0], pi)]
     [0.0, 0.0, 0.0, 1.0]
     """
-    from scipy.spatial.transform import Rotation
-
-    turn = Rotation.from_rotvec(angle * np.array(_unit(axis, "the axis")))
-    e0, e1, e2, e3 = turn.as_quat(scalar_first=True).tolist()
-    return (e0, e1, e2, e3)
+    x, y, z = _unit(axis, "the axis")
+    sine = math.sin(0.5 * angle)
+    return (math.cos(0.5 * angle), sine * x, sine * y, sine * z)
 
 
 def from_rotation_matrices(matrices: Float[np.ndarray, "*batch 3 3"]) -> Float[np.ndarray, "*batch 4"]:

@@ -146,10 +146,8 @@ def _loaded(content: bytes) -> Plan:
     if prepare is not None:
         prepare()
     if user_files:
-        from jounce.execution.store import keep_programs
         from jounce.io.mechanisms.user_classes import import_file
 
-        keep_programs(None)  # what is compiled may be other than this package says
         for path, digest in user_files.items():
             with recording() as files:
                 try:

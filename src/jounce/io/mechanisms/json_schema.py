@@ -34,14 +34,14 @@ def json_schema(*, own_types: bool = True) -> dict[str, Any]:
     from pydantic import Discriminator, TypeAdapter
 
     from jounce.io.mechanisms.schema import file_model
-    from jounce.io.mechanisms.values import DEFINITIONS
+    from jounce.io.mechanisms.values import definitions
 
     models = tuple(file_model(space, own_types=own_types) for space in ("planar", "spatial"))
     union: Any = Annotated[Union[models], Discriminator("space")]  # noqa: UP007
     generated = TypeAdapter(union).json_schema()
     missing = set(_definitions(generated))
     while missing:  # a definition may name others
-        generated["$defs"] |= {name: DEFINITIONS[name] for name in sorted(missing)}
+        generated["$defs"] |= {name: definitions[name] for name in sorted(missing)}
         missing = set(_definitions(generated)) - generated["$defs"].keys()
     head = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

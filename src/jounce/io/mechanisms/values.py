@@ -75,13 +75,13 @@ ANY_VALUE = [{"type": "number"}, {"type": "string", "minLength": 1}]
 """Forms of a value in the JSON Schema."""
 
 
-DEFINITIONS: dict[str, dict[str, Any]] = {}
+definitions: dict[str, dict[str, Any]] = {}
 """Parts of the JSON Schema that stand in it once, by name."""
 
 
 def defined(name: str, schema: dict[str, Any]) -> dict[str, Any]:
     """Return what stands for a part of the JSON Schema until the whole is made: pydantic has references of its own."""
-    DEFINITIONS[name] = schema
+    definitions[name] = schema
     return {"definition": name}
 
 
