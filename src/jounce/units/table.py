@@ -49,8 +49,17 @@ COMPACT: dict[str, tuple[str, ...]] = {
 """Products that are written without a sign between; a power belongs to the last factor, as in ``kgm^2``."""
 
 
+LONG = tuple(
+    f"{prefix}{unit}{ending}"
+    for unit in ("meter", "gram", "second", "newton", "radian", "watt", "pascal")
+    for prefix in ("", "milli", "centi", "micro", "kilo")
+    for ending in ("", "s")
+)
+"""Units written out, which pint knows, for the suggestion of one that is misspelt."""
+
+
 def nearest_unit(name: str) -> str:
     """Suggest the unit of the table that is meant: the one that differs in capitals only, or else the nearest."""
-    names = [*COMMON, *COMPACT]
+    names = [*COMMON, *COMPACT, *LONG]
     same = [known for known in names if known.lower() == name.lower() and known != name]
     return f"did you mean '{same[0]}'?" if same else did_you_mean(name, names, limit=0)

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation, Overflow, localcontext
 from functools import lru_cache
 
-from jounce.errors import ExpressionError, UnitError, show_value
+from jounce.errors import ExpressionError, JounceError, UnitError, show_value
 from jounce.units.dimensions import ANGLE, NUMBER, Dimension, check_dimension, inferred, times
-from jounce.units.expression import FUNCTIONS, MAX_CHARACTERS, Expression
+from jounce.units.expression import CONSTANTS, FUNCTIONS, MAX_CHARACTERS, Expression
 from jounce.units.pint_units import ask_pint
 from jounce.units.table import COMMON, COMPACT, Size, nearest_unit
 
@@ -31,6 +31,9 @@ _GROUP = rf"\(\s*{_TERM}(?:{_SIGN}{_TERM})*\s*\)"
 _WITH_UNIT = re.compile(
     rf"({_NUMBER_PATTERN})\s*((?:1?\s*/\s*(?:{_GROUP}|{_TERM})|{_TERM})(?:{_SIGN}(?:{_GROUP}|{_TERM}))*)"
 )
+MOST_LOOKED_AT = 5  # units within an expression that cannot be read
+_DECIMAL_COMMA = re.compile(rf"([-+]?[0-9]+),([0-9]+)\s*({_TERM}(?:{_SIGN}{_TERM})*)?")
+_UNIT_WITHIN = re.compile(rf"(?<![A-Za-z_0-9.])([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?)\s+({_ATOM})")
 _PIECE = re.compile(rf"({_SIGN})?(?:({_ATOM})({_POWER})|\(([^()]*)\))")
 _TIMES_DEG = re.compile(rf"{_NUMBER_PATTERN}\s*\*\s*deg")
 
@@ -176,12 +179,18 @@ def _parse_text(
 ) -> Value:
     if len(text) > MAX_CHARACTERS:
         raise ExpressionError(f"a value has at most {MAX_CHARACTERS} characters")
+    if comma := _DECIMAL_COMMA.fullmatch(text.strip()):
+        point = f"{comma[1]}.{comma[2]} {comma[3] or ''}".strip()
+        raise UnitError(f"a decimal point is a point, and thousands have no sign: write {point}")
     with_unit = _WITH_UNIT.fullmatch(text.strip())
     if with_unit and not _divided_by_a_name(with_unit[2], known):
-        return _parse_with_unit(*with_unit.groups(), kind=kind, known=known)
+        return _parse_with_unit(*with_unit.groups(), kind=kind, known=known, variables=variables)
     if text.strip().lower() in {".nan", "nan", "inf", ".inf", "-inf", "-.inf", "+inf", "infinity", "-infinity"}:
         raise UnitError("must be a finite number")
-    expression = Expression(text, known)
+    try:
+        expression = Expression(text, known)
+    except ExpressionError as error:
+        raise _with_units_named(error, text, known) from None
     if not expression.names:
         if _TIMES_DEG.fullmatch(expression.text):
             check_dimension(ANGLE, kind, show_value(expression.text))
@@ -196,13 +205,41 @@ def _parse_text(
     return Value(expression, dimension)
 
 
+def _with_units_named(error: ExpressionError, text: str, known: Collection[str]) -> JounceError:
+    """Return an error that says so where a number with a unit stands within an expression, else the error as it is."""
+    for number, unit in _UNIT_WITHIN.findall(text)[:MOST_LOOKED_AT]:
+        if unit in known or unit in CONSTANTS:
+            continue
+        try:
+            parse_unit(unit)
+        except UnitError:
+            continue
+        message = (
+            f"a number with a unit stands alone: '{number} {unit}' cannot be a part of an expression; give it as a "
+            "parameter of its own, and write the name of that here"
+        )
+        return UnitError(message)
+    return error
+
+
 def _divided_by_a_name(unit: str, known: Collection[str]) -> bool:
     """Tell whether what follows a number is a division by a name of an expression: 1/t is no number per tonne."""
     first = re.match(_ATOM, unit.lstrip("/ "))
     return unit.startswith("/") and first is not None and (first.group() in known or first.group() == "pi")
 
 
-def _parse_with_unit(number: str, unit: str, *, kind: str, known: Collection[str]) -> Value:
+def _parse_with_unit(
+    number: str, unit: str, *, kind: str, known: Collection[str], variables: Mapping[str, Dimension | None]
+) -> Value:
+    named = [atom for atom in re.findall(_ATOM, unit)[1:] if atom in variables]
+    if named:  # in a law t is no tonne
+        first = re.match(_ATOM, unit)
+        given = f"{number} {first.group() if first else ''}".strip()
+        message = (
+            f"a number with a unit stands alone, and '{named[0]}' would be a unit, too; give '{given}' as a parameter, "
+            f"such as c: {given}, and write c*{named[0]}"
+        )
+        raise UnitError(message)
     try:
         size, dimension = parse_unit(unit)
         check_dimension(dimension, kind, f"the unit of {show_value(f'{number} {unit}')}")

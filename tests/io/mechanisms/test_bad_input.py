@@ -109,3 +109,13 @@ def test_a_misspelt_key_is_named_rather_than_the_key_that_misses(tmp_path):
     path.write_text("space: planar\nbodies:\n  a: {}\njoints:\n  A:\n    type: double_revolute\n    lenght: 1\n")
     with pytest.raises(MechanismFileError, match=r"line 7, joints.A.lenght: unknown key 'lenght'"):
         load(path)
+
+
+@pytest.mark.parametrize("spaces, beside", [(3, 2), (1, 0)])
+def test_a_line_that_is_indented_otherwise_is_told_with_its_column(tmp_path, spaces, beside):
+    path = tmp_path / "indent.yaml"
+    path.write_text(f"space: planar\nbodies:\n  a: {{position: [0, 0]}}\n{' ' * spaces}b: {{position: [1, 0]}}\n")
+    with pytest.raises(MechanismFileError, match="indented") as error:
+        load(path)
+    assert "line 4: the YAML cannot be read: the line is indented further than the entries" in str(error.value)
+    assert f"({spaces} spaces, not {beside})" in str(error.value)

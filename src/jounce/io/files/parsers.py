@@ -108,6 +108,17 @@ def _yaml_error(path: str, error: Exception) -> MechanismFileError:
     text = f"{context}: {problem}" if context else str(problem)
     if "'\\t'" in text:
         text = "a tab stands where YAML wants spaces"
+    elif (
+        "block mapping" in text
+        and "expected <block end>" in text
+        and start is not None
+        and mark is not None
+        and mark.column > start.column
+    ):
+        text = (
+            f"the line is indented further than the entries that it stands beside ({mark.column} spaces, not "
+            f"{start.column}); entries of one mapping begin in one column"
+        )
     elif "mapping values are not allowed" in text:
         text += " (a second ':' in one line, or a line indented too far)"
     if start is not None and mark is not None and start.line != mark.line:
