@@ -34,22 +34,7 @@ class Operand(NamedTuple):
     component: int
 
 
-class _Facts:
-    """What is known of a derivative by what it is of."""
-
-    @property
-    def unit(self) -> str:
-        """Unit in SI."""
-        of, by = self._operands
-        return quotient_unit(of.output.unit, by.output.unit, int(self.order))
-
-    @property
-    def lost_orders(self) -> int:
-        """Derivatives by which it is shorter than the motion."""
-        return int(self.order) + max(operand.output.lost_orders for operand in self._operands)
-
-
-class DerivativeOutput(_Facts, AbstractMotionOutput):
+class DerivativeOutput(AbstractMotionOutput):
     """Derivative of an output with respect to another along the motion, ``d^n of / d by^n``.
 
     Bump steer is that of a toe angle with respect to the height of the wheel, a motion ratio that of the length of a
@@ -75,21 +60,32 @@ class DerivativeOutput(_Facts, AbstractMotionOutput):
         whole_number("order", self.order, 1, HIGHEST, error=MechanismError)
 
     @property
-    def _operands(self) -> tuple[Operand, Operand]:
+    def operands(self) -> tuple[Operand, Operand]:
+        """The outputs that it is of, in a mechanism."""
         if self.found is None:
             message = "its outputs are found when it is an output of a mechanism, and `evaluate` is given one"
             raise MechanismError(message, name="of", value=self.of)
         return self.found
 
     @property
+    def unit(self) -> str:
+        """Unit in SI."""
+        return _unit(self.operands, int(self.order))
+
+    @property
+    def lost_orders(self) -> int:  # type: ignore[override] - of an instance, as it depends on the order
+        """Derivatives by which it is shorter than the motion."""
+        return int(self.order) + max(operand.output.lost_orders for operand in self.operands)
+
+    @property
     def of_forces(self) -> bool:  # type: ignore[override] - of an instance
         """Whether applied forces bear on it."""
-        return any(operand.output.of_forces for operand in self._operands)
+        return any(operand.output.of_forces for operand in self.operands)
 
     def coefficients(self, motion: Any) -> Numbers:
         """Return the Taylor coefficients of the derivative, (levels, 1, time)."""
-        y, x = (_series(motion, operand) for operand in self._operands)
-        scale = _scale(x, self._operands[1].output.unit, motion.model.length)
+        y, x = (_series(motion, operand) for operand in self.operands)
+        scale = _scale(x, self.operands[1].output.unit, motion.model.length)
         return stacked(derivative_by(y, x, int(self.order), scale))[:, None]
 
     def remark(self, motion: Any, values: Float[np.ndarray, "time derivative"]) -> str:
@@ -102,7 +98,7 @@ class DerivativeOutput(_Facts, AbstractMotionOutput):
         return f"undefined at t = {where}{more}, where '{self.by}' stands still or '{self.of}' is undefined"
 
 
-class PosedDerivativeOutput(_Facts, AbstractOutput):
+class PosedDerivativeOutput(AbstractOutput):
     """A `DerivativeOutput` whose outputs are functions of poses, as a mechanism has it."""
 
     of: str = eqx.field(static=True)
@@ -117,14 +113,30 @@ class PosedDerivativeOutput(_Facts, AbstractOutput):
     rate_names = RATES
 
     @property
-    def _operands(self) -> tuple[Operand, Operand]:
+    def operands(self) -> tuple[Operand, Operand]:
+        """The outputs that it is of."""
         return Operand(self.first, self.components[0]), Operand(self.second, self.components[1])
+
+    @property
+    def unit(self) -> str:
+        """Unit in SI."""
+        return _unit(self.operands, int(self.order))
+
+    @property
+    def lost_orders(self) -> int:  # type: ignore[override] - of an instance, as it depends on the order
+        """Derivatives by which it is shorter than the motion."""
+        return int(self.order) + max(operand.output.lost_orders for operand in self.operands)
 
     def evaluate(self, *bodies: Any) -> Jet:
         y = _component(self.first.evaluate(*bodies[: self.count]), self.components[0])
         x = _component(self.second.evaluate(*bodies[self.count :]), self.components[1])
         reach = [jnp.sqrt(jnp.sum(body.position.coefficients[0] ** 2, axis=0)) for body in bodies]
         return derivative_by(y, x, int(self.order), _scale(x, self.second.unit, jnp.max(jnp.stack(reach), axis=0)))
+
+
+def _unit(operands: tuple[Operand, Operand], order: int) -> str:
+    of, by = operands
+    return quotient_unit(of.output.unit, by.output.unit, order)
 
 
 def derivative_by(y: Jet, x: Jet, order: int, scale: Any) -> Jet:

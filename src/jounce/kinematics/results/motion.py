@@ -314,11 +314,10 @@ class Motion(Displayed):
         self._check_order(given, name)
         if isinstance(given, AbstractMotionOutput):
             return self._labelled(name, self._derivatives(given.coefficients(self)), given)
-        output = given
-        group = output_group(output, self.mechanism, self.model, name)
+        group = output_group(given, self.mechanism, self.model, name)
         values = self._derivatives(self._continued(group, self._coefficients(group))[:, :, 0])
         self._check_finite(values, name)
-        return self._labelled(name, values, output)
+        return self._labelled(name, values, given)
 
     def series(self, output: AbstractQuantity) -> Float[Numbers, "order component time"]:
         """Return the Taylor coefficients of any output, (levels, components, time), angles up to whole turns."""
@@ -329,7 +328,7 @@ class Motion(Displayed):
 
     def _check_order(self, output: AbstractQuantity, name: str) -> None:
         """Raise MechanismError for an output that takes more derivatives than the motion has."""
-        levels = len(self._coordinates["position"])
+        levels = len(self.poses[1]["position"])
         if output.lost_orders >= levels:
             message = f"needs the motion to order {output.lost_orders}, and it was solved to order {levels - 1}"
             raise MechanismError(f"{message}: solve it to a higher order", name=name)
