@@ -265,7 +265,7 @@ def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
 
 def draw_scale(axes: Any, view: View | None = None) -> None:
     """Draw a bar of a round length in the place of the one that is there, and the axes of a view in space."""
-    for artist in axes.findobj(lambda artist_found: artist_found.get_gid() == "scale"):
+    for artist in axes.findobj(lambda each: each.get_gid() == "scale"):
         artist.remove()
     (left, right), (lower, upper) = axes.get_xlim(), axes.get_ylim()
     length = rounded_down(0.22 * (right - left))

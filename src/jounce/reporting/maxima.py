@@ -1,4 +1,4 @@
-"""Where curves are highest that come stretch by stretch, and are not kept."""
+"""Where curves are largest that come stretch by stretch, and are not kept."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ALIKE = 1e-6  # of the largest value of a curve
 
 
 class RunningMaxima:
-    """The highest values and a number of the highest local maxima of curves that come stretch by stretch.
+    """The largest values and a number of the largest local maxima of curves that come stretch by stretch.
 
     A curve is -inf where it is not known.
 

@@ -130,7 +130,7 @@ def peaks(motion: Motion | Stretches, *, refine: bool = True) -> list[Peak]:
     Parameters
     ----------
     motion : Motion or Stretches
-        What was solved; of stretches, those that `looked_at` found; else they are solved for it.
+        What was solved; of stretches, those that `parts_with_peaks` found; else they are solved for it.
     refine : bool, default True
         Find peaks between its instants too: the motion is solved at more instants where it has few, and then, as often
         as it takes, around the highest of them. Otherwise only its own instants count, and both sides of the instants

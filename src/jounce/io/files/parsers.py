@@ -207,7 +207,7 @@ def read_toml(path: str, text: str) -> Source:
     except (RecursionError, ValueError) as error:
         raise MechanismFileError(f"the TOML cannot be read: {error}", path=path) from None
     _check_size(path, data)
-    return Source(path, data, _TomlLines().found(text))
+    return Source(path, data, _TomlLines().lines_of(text))
 
 
 def _toml_tokens(text: str) -> Iterator[tuple[str, int]]:
@@ -260,7 +260,7 @@ class _TomlLines:
         self.parts: list[str] | None = []  # of the key that is read; None within a value
         self.location: Location = ()  # of the value that is read
 
-    def found(self, text: str) -> dict[Location, int]:
+    def lines_of(self, text: str) -> dict[Location, int]:
         """Return the lines."""
         header = 0  # brackets of the header of a table
         for token, line in _toml_tokens(text):

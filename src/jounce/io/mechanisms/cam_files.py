@@ -82,18 +82,22 @@ class _CamFile:
         self.source, self.data = source, source.mapping((), KEYS)
         self.parameters: dict[str, float] = {}
         self.dimensions: dict[str, Dimension] = {}
-        told = assignments(given, "--set", "a parameter is set by NAME=VALUE, such as 'lift=12 mm'", MechanismFileError)
+        assigned = assignments(
+            given, "--set", "a parameter is set by NAME=VALUE, such as 'lift=12 mm'", MechanismFileError
+        )
         known = source.mapping(("parameters",)) if "parameters" in self.data else {}
-        for name in told:
+        for name in assigned:
             check_name("parameter", name, known, MechanismFileError, name="--set")
         for name, raw in known.items():
             at = ("parameters", name)
             check_parameter_name(name, source.error_type, **source.error_fields(at))
-            value = source.value(at, told.get(name, raw), "any", self.parameters, self.dimensions)
+            value = source.value(at, assigned.get(name, raw), "any", self.parameters, self.dimensions)
             if value.dimension is not None:
                 self.dimensions[name] = value.dimension
-            found = value.value
-            self.parameters[name] = float(found.evaluate(self.parameters) if isinstance(found, Expression) else found)
+            number = value.value
+            self.parameters[name] = float(
+                number.evaluate(self.parameters) if isinstance(number, Expression) else number
+            )
 
     def cam(self, count: int | None) -> PlateCam:
         """Return the cam."""
@@ -109,17 +113,17 @@ class _CamFile:
         title = self.data.get("title", "")
         points = body.get("count", 721) if count is None else count
         try:
-            found = plate_cam(law, follower, base, sense=sense, count=points, title=str(title))
+            profile = plate_cam(law, follower, base, sense=sense, count=points, title=str(title))
         except JounceError as error:
             at = {"law": ("law",), "count": ("cam", "count"), "base_radius": ("cam", "base_radius")}
-            place = at.get(str(error.name), ("follower", str(error.name)))
-            raise self.source.error(error.message, place, value=error.value) from None
+            location = at.get(str(error.name), ("follower", str(error.name)))
+            raise self.source.error(error.message, location, value=error.value) from None
         try:
-            found = dataclasses.replace(found, units=self.data.get("units") or {})
-            _ = found.shown_units
+            profile = dataclasses.replace(profile, units=self.data.get("units") or {})
+            _ = profile.shown_units
         except JounceError as error:
             raise self.source.error(error.message, tuple(str(error.name).split(".")), value=error.value) from None
-        return found
+        return profile
 
     def _length(self, at: tuple[str, ...], data: dict[str, Any]) -> float:
         if at[-1] not in data:
@@ -131,8 +135,8 @@ class _CamFile:
         data = self.source.mapping(("follower",))
         kind = data.get("type")
         if kind not in FOLLOWERS:
-            told = did_you_mean(kind, FOLLOWERS)
-            raise self.source.error(f"must be the type of a follower; {told}", ("follower", "type"), value=kind)
+            hint = did_you_mean(kind, FOLLOWERS)
+            raise self.source.error(f"must be the type of a follower; {hint}", ("follower", "type"), value=kind)
         made, keys = FOLLOWERS[kind]
         self.source.mapping(("follower",), ("type", "shape", *keys))
         if "shape" not in data:
@@ -150,17 +154,17 @@ class _CamFile:
         context = {"names": self.parameters, "dimensions": self.dimensions, "uses": {}, "lapse": "angle"}
         check = motion(quantity, {"t": (("angle", 1),)}).__metadata__[0].function
         try:
-            found = check(self.data["law"], SimpleNamespace(context=context, data={}))
+            law = check(self.data["law"], SimpleNamespace(context=context, data={}))
         except PydanticCustomError as error:
             told = error.context or {}
             value = self.data["law"] if told["value"] is ... else told["value"]
             raise self.source.error(told["message"], ("law", *told["at"]), value=value) from None
-        if isinstance(found, Samples):
-            found = self._spline(found, quantity)
-        if not isinstance(found, AbstractMotion | Expression | float | int):
+        if isinstance(law, Samples):
+            law = self._spline(law, quantity)
+        if not isinstance(law, AbstractMotion | Expression | float | int):
             raise self.source.error("a cam has a law of its own angle: an expression, samples, or segments", ("law",))
         try:
-            return resolve_motion(found, self.parameters)
+            return resolve_motion(law, self.parameters)
         except JounceError as error:
             raise self.source.error(error.message, ("law",), value=error.value) from None
 

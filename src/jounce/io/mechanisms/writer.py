@@ -113,28 +113,28 @@ class _Writer:
 
     def data(self) -> tuple[dict[str, Any], dict[str, Any]]:
         mechanism = self.mechanism
-        found: dict[str, Any] = {"title": mechanism.title} if mechanism.title else {}
-        found["space"] = mechanism.space
+        data: dict[str, Any] = {"title": mechanism.title} if mechanism.title else {}
+        data["space"] = mechanism.space
         if mechanism.units:
-            found["units"] = dict(mechanism.units)
+            data["units"] = dict(mechanism.units)
         if mechanism.gravity is not None:
-            found["gravity"] = plain(mechanism.gravity, "gravity")
+            data["gravity"] = plain(mechanism.gravity, "gravity")
         if mechanism.parameters:
-            found["parameters"] = {n: plain(x, f"parameters.{n}") for n, x in mechanism.parameters.items()}
-        found["bodies"] = {name: self._body(name, body) for name, body in mechanism.bodies.items()}
+            data["parameters"] = {n: plain(x, f"parameters.{n}") for n, x in mechanism.parameters.items()}
+        data["bodies"] = {name: self._body(name, body) for name, body in mechanism.bodies.items()}
         if mechanism.assembly is not None:
-            found["assembly"] = mechanism.assembly
+            data["assembly"] = mechanism.assembly
         for section in ROLES:
             elements = getattr(mechanism, section)
             if elements:
-                found[section] = {name: self._element(section, name, x) for name, x in elements.items()}
+                data[section] = {name: self._element(section, name, x) for name, x in elements.items()}
         if mechanism.outputs:
-            found["outputs"] = {name: self._output(name, x) for name, x in mechanism.outputs.items()}
+            data["outputs"] = {name: self._output(name, x) for name, x in mechanism.outputs.items()}
         if mechanism.redundant_reactions != "unique":
-            found["redundant_reactions"] = plain(mechanism.redundant_reactions, "redundant_reactions")
+            data["redundant_reactions"] = plain(mechanism.redundant_reactions, "redundant_reactions")
         if mechanism.time is not None:
-            found["time"] = _time(mechanism.time)
-        return found, self.laws.samples
+            data["time"] = _time(mechanism.time)
+        return data, self.laws.samples
 
     def _body(self, name: str, body: Body) -> dict[str, Any]:
         location = f"bodies.{name}"
@@ -156,10 +156,10 @@ class _Writer:
         if catalogue(self.mechanism.space, ROLES[section]).get(kind.type_name) is not kind:
             message = f"the class {kind.__name__} has no type by which a file could name it"
             raise MechanismError(message, name=location)
-        found: dict[str, Any] = {"type": kind.type_name}
+        entries: dict[str, Any] = {"type": kind.type_name}
         single = kind.body_count == 1
-        found |= {"body": element.bodies[0]} if single else {"bodies": list(element.bodies)}
-        return found | self._values(location, element)
+        entries |= {"body": element.bodies[0]} if single else {"bodies": list(element.bodies)}
+        return entries | self._values(location, element)
 
     def _output(self, name: str, output: Any) -> dict[str, Any]:
         location, kind = f"outputs.{name}", form_of(output)

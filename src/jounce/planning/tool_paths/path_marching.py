@@ -12,7 +12,7 @@ from jounce.execution.compilation import compiled
 from jounce.planning.tool_paths.path_equations import PathEquations
 
 ORDER = 6  # of the series from node to node
-PLACES = 8  # in an interval that are looked at
+POINTS_IN_STEP = 8  # in an interval that are looked at
 FIRST = 32  # intervals to begin with
 BLOCK = 64  # nodes that are compiled for
 CHANGE = 0.5  # of the Jacobian over an interval, by its inverse at the beginning: less, and it cannot become singular
@@ -66,7 +66,7 @@ def march(equations: PathEquations, start: Any, steps: Any, targets: Any, inner:
         What happens in the interval after it: the change of the Jacobian, the distance from the series, and the change
         of the Jacobian over that distance.
     """
-    shares = jnp.arange(1.0, PLACES + 1) / PLACES
+    shares = jnp.arange(1.0, POINTS_IN_STEP + 1) / POINTS_IN_STEP
 
     def node(guess: Any, entry: Any) -> Any:
         step, target, within = entry
@@ -134,10 +134,10 @@ def _marched(equations: PathEquations, start: Any, time: Any, target: Any, order
     steps = np.append(np.diff(filled), 0.0)
     series = {kind: _filled(array, ORDER) for kind, array in target(filled, min(order, ORDER)).items()}
     targets = {kind: np.moveaxis(array, -1, 0)[..., None] for kind, array in series.items()}
-    shares = np.arange(1, PLACES + 1) / PLACES
+    shares = np.arange(1, POINTS_IN_STEP + 1) / POINTS_IN_STEP
     instants = np.minimum((filled[:, None] + shares * steps[:, None]).ravel(), time[-1])
     inner = {
-        kind: np.moveaxis(array.reshape(*array.shape[:-1], count, PLACES), -2, 0)
+        kind: np.moveaxis(array.reshape(*array.shape[:-1], count, POINTS_IN_STEP), -2, 0)
         for kind, array in target(instants, 0).items()
     }
     guess, parts = np.asarray(start)[:, None], []
