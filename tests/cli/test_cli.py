@@ -389,9 +389,12 @@ def test_python_m_jounce_keeps_compiled_programs_for_the_next_call(tmp_path):
 @pytest.mark.slow
 def test_a_cache_that_cannot_be_made_does_no_harm(tmp_path):
     (tmp_path / "file").write_text("")
-    done = process("run", "none.yaml", cwd=tmp_path, JOUNCE_CACHE_DIR=str(tmp_path / "file" / "cache"))
+    folder = tmp_path / "file" / "cache"
+    done = process("run", "none.yaml", cwd=tmp_path, JOUNCE_CACHE_DIR=str(folder))
     assert done.returncode == 2
-    assert done.stderr == "error: none.yaml: file not found\n"
+    told, error = done.stderr.splitlines()
+    assert told == f"compiled programs are not kept: {folder}: cannot be used: Not a directory"
+    assert error == "error: none.yaml: file not found"
 
 
 @pytest.mark.parametrize("rehearsing", [False, True])
