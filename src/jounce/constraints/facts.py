@@ -14,7 +14,15 @@ from typing import Any
 from jounce.errors import MechanismError, no_such
 from jounce.units.dimensions import KINDS
 
-WORDS = ("Scalar", "Vector", "Law", "Laws", "Wrenches", "Whole")  # annotations that say what kind of value a field has
+WORDS = (
+    "Scalar",
+    "Vector",
+    "Law",
+    "Laws",
+    "Wrenches",
+    "Whole",
+    "Curve",
+)  # annotations that say what kind of value a field has
 BODY_ENDINGS = ("_i", "_j", "_m")  # of fields, by the body that they are fixed in
 
 USUAL_DIMENSIONS: Mapping[str, str] = MappingProxyType(
@@ -52,8 +60,19 @@ SIGNS: Mapping[str, str] = MappingProxyType(
 """Signs that values may have to have, and what is said of a value that has another."""
 
 _MACHINES = {
-    "planar": ("revolute", "rod", "slot", "prismatic", "coordinate", "gear", "rolling"),
-    "spatial": ("spherical", "rod", "plane", "universal", "revolute", "cylindrical", "prismatic", "screw"),
+    "planar": ("revolute", "rod", "slot", "prismatic", "coordinate", "gear", "rolling", "curve"),
+    "spatial": (
+        "spherical",
+        "rod",
+        "plane",
+        "universal",
+        "revolute",
+        "cylindrical",
+        "prismatic",
+        "screw",
+        "curve",
+        "surface",
+    ),
 }
 _DRIVES = ("coordinate", "slide", "distance", "rotation")
 _LOADS = ("spring", "slide spring", "slide", "distance", "rotation", "spiral", "point force")
@@ -209,7 +228,7 @@ def symbols(kind: type[Any]) -> tuple[str, ...]:
     >>> from jounce import planar
     >>> from jounce.constraints.facts import symbols
     >>> symbols(planar.Revolute)
-    ('revolute', 'rod', 'slot', 'prismatic', 'coordinate', 'gear', 'rolling')
+    ('revolute', 'rod', 'slot', 'prismatic', 'coordinate', 'gear', 'rolling', 'curve')
     """
     if kind.role in ("driver", "force"):
         return _DRIVES if kind.role == "driver" else _LOADS
@@ -276,7 +295,7 @@ def field_kinds(kind: type[Any]) -> Mapping[str, str]:
 
 
 def field_kind(field: dataclasses.Field) -> str:
-    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole`` or ``text``."""
+    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``curve`` or ``text``."""
     if isinstance(field.type, str):  # under ``from __future__ import annotations``
         word = field.type.rpartition(".")[2].strip()
         return "motion" if word == "MotionLaw" else word.lower() if word in WORDS else "text"

@@ -6,6 +6,7 @@ from jounce.trajectory.composed import (
     OutputMotion as OutputMotion,
     PiecewiseMotion as PiecewiseMotion,
 )
+from jounce.trajectory.curves import ParametricCurve as ParametricCurve, SampledCurve as SampledCurve
 from jounce.trajectory.hermite import HermiteMotion as HermiteMotion
 from jounce.trajectory.joint_trajectory import JointTrajectory as JointTrajectory
 from jounce.trajectory.measured import MeasuredMotion as MeasuredMotion

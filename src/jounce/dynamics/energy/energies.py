@@ -224,9 +224,12 @@ def energies_of(
         if q is not None:
             raise MechanismError("a motion has its coordinates already", name="q", value=q)
         _check_known(system, order, system.order)
-        bodies = tuple(system.mechanism.bodies)
+        bodies = tuple(system.mechanism.rigid_bodies)
         found = energy_coefficients(system, order, function)
-        parts = tuple(labelled(system, x[: system.order - order, 1:], energy_unit(order), body=bodies) for x in found)
+        parts = tuple(
+            labelled(system, x[: system.order - order, 1 : 1 + len(bodies)], energy_unit(order), body=bodies)
+            for x in found
+        )
         return *parts, bodies, order
     leading = tuple(k for k, joint in enumerate(system.moving_joints) if joint.mimic is None) if drives else ()
     parts = _of_robot(system, (checked_coordinates(system, q, order + 1),), (), (order, function, leading))

@@ -22,6 +22,8 @@ OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
     ("euler_angles", mechanism.EulerAnglesOutput),
     ("euler_angles", mechanism.RelativeEulerAnglesOutput),
     ("slide", SlideOutput),
+    ("parameter", mechanism.ParameterOutput),
+    ("parameters", mechanism.ParametersOutput),
     ("angle", mechanism.DriverAngleOutput),
     ("displacement", mechanism.DriverDisplacementOutput),
     ("force", dynamics.DriverForceOutput),
