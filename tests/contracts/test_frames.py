@@ -263,6 +263,34 @@ def couplings():
     )
 
 
+def tracks():
+    """A rotor with a curve and a surface, on which a bead and a puck are moved that keep their attitudes to it."""
+    x, y, z = np.eye(3).tolist()
+    held = {
+        f"{body}_{k}": spatial.Dot1(("rotor", body), a, b)
+        for body in ("bead", "puck")
+        for k, (a, b) in enumerate(((x, y), (y, z), (z, x)))
+    }
+    curve, surface = ["0.6*cos(s)", "0.5*sin(s)", "0.3*s"], ["0.4*u", "0.5*v", "1 + 0.2*u**2 - 0.1*u*v"]
+    return in_space(
+        10,
+        {"rotor": [0, 0, 0], "bead": [0.5, 0.2, 0.1], "puck": [0.2, 0.2, 1]},
+        joints={
+            "axle": spatial.Revolute(("ground", "rotor"), ZERO, ZERO, Z, Z),
+            "groove": spatial.SpatialCurve(("rotor", "bead"), curve, [0.1, 0.05, 0.0], start=0.5),
+            "bowl": spatial.Surface(("rotor", "puck"), surface, [0.0, 0.05, 0.1], start_u=0.5, start_v=0.4),
+            **held,
+        },
+        drivers={
+            "spin": drivers.RotationDriver(("ground", "rotor"), Z, wave(0.1, 0.7, 0.4, 2.0)),
+            "up": drivers.SpatialSlideDriver(("rotor", "bead"), ZERO, ZERO, z, wave(0.15, 0.1, 0.05, 2.0)),
+            "along": drivers.SpatialSlideDriver(("rotor", "puck"), ZERO, ZERO, x, wave(0.2, 0.1, 0.05, 2.0)),
+            "across": drivers.SpatialSlideDriver(("rotor", "puck"), ZERO, ZERO, y, wave(0.2, 0.1, 0.05, 1.0)),
+        },
+        outputs={"place": jn.ParameterOutput("groove"), "places": jn.ParametersOutput("bowl")},
+    )
+
+
 def all_in_the_plane():
     """The same in the plane."""
     o, x, y = [0.0, 0.0], [1.0, 0.1], [-0.1, 1.0]
@@ -285,6 +313,7 @@ def all_in_the_plane():
             "wheel": body([5.0, 1.0], 0.4),
             "second": body([6.0, 1.0], 0.3),
             "plate": body([7.0, 1.4], 0.7),
+            "bead": body([0.53, 0.38], 0.2),
         },
         joints={
             "A": planar.Revolute(("ground", "crank"), o, o),
@@ -302,6 +331,7 @@ def all_in_the_plane():
             "axle": planar.Revolute(("disc", "wheel"), [2.0, 0], o),
             "W": planar.Revolute(("wheel", "second"), [1.0, 0], o),
             "weld": planar.Fixed(("second", "plate"), x, [-0.1, 0.2]),
+            "track": planar.PlanarCurve(("crank", "bead"), ["0.3*cos(s) + 0.5", "0.2*sin(s)"], [0.1, 0.05], start=0.5),
         },
         drivers={
             "turn": drivers.CoordinateDriver(("ground", "crank"), "angle", LAW),
@@ -310,6 +340,8 @@ def all_in_the_plane():
             "roll": drivers.SlideDriver(("ground", "disc"), [0, 0.7], o, x, "3 + 0.5*t"),
             "swing": drivers.CoordinateDriver(("disc", "wheel"), "angle", "0.3*t**2"),
             "fold": drivers.CoordinateDriver(("wheel", "second"), "angle", "sin(t)", 0.5),
+            "tilt": drivers.CoordinateDriver(("ground", "bead"), "angle", "0.2 + 0.3*t"),
+            "along": drivers.SlideDriver(("crank", "bead"), o, [0.1, 0.05], [1.0, 0.0], "0.76 - 0.1*t"),
         },
         forces={
             "spring": forces.Spring(("crank", "pin"), x, o, 10.0, 0.5, 0.2),
@@ -329,6 +361,7 @@ def all_in_the_plane():
             "slide": SlideOutput(("planet", "pin"), x, y, y),
             "rate": jn.AngularVelocityOutput("rocker"),
             "own_rate": jn.AngularVelocityOutput("rocker", "body"),
+            "place": jn.ParameterOutput("track"),
         },
     )
 
@@ -378,6 +411,7 @@ MECHANISMS = {
     "linkage": linkage,
     "screw": screw,
     "couplings": couplings,
+    "tracks": tracks,
 }
 
 

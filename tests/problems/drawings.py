@@ -62,7 +62,7 @@ class Drawing:
 def as_drawn(mechanism):
     """Return the frames of all bodies, by name, as they are."""
     size = 2 if mechanism.space == "planar" else 3
-    return {name: Drawing(np.zeros(size), np.eye(size)) for name in ("ground", *mechanism.bodies)}
+    return {name: Drawing(np.zeros(size), np.eye(size)) for name in ("ground", *mechanism.rigid_bodies)}
 
 
 def random_drawings(mechanism, random):
@@ -152,6 +152,8 @@ def redrawn(mechanism, drawings, moved):
                 drawing = drawings[_holder(mechanism, it, key)]
                 convert = drawing.point if key.partition("_")[0] in POINTS else drawing.direction
                 changed[key] = convert(resolve(value, values))
+            if field_kind(field) == "curve":
+                changed[key] = redrawn_curve(value, drawings[it.bodies[0]])
         if hasattr(it, "wrenches"):  # of a closure, and the attitude in which it is closed
             first, second = (drawings[body].axes for body in it.bodies)
             changed["wrenches"] = (np.asarray(it.wrenches) @ np.kron(np.eye(2), first)).tolist()
@@ -178,10 +180,16 @@ def redrawn(mechanism, drawings, moved):
     gravity = None if mechanism.gravity is None else world.direction(resolve(mechanism.gravity, values))
     return dataclasses.replace(
         mechanism,
-        bodies={name: _body(body, drawings[name], world, values) for name, body in mechanism.bodies.items()},
+        bodies={name: _body(body, drawings[name], world, values) for name, body in mechanism.rigid_bodies.items()},
         gravity=gravity,
         **{kind: {name: element(name, it) for name, it in getattr(mechanism, kind).items()} for kind in kinds},
     )
+
+
+def redrawn_curve(expressions, drawing):
+    """Return the expressions of a curve in another frame."""
+    shifted = [f"({text}) - ({float(shift)!r})" for text, shift in zip(expressions, drawing.origin, strict=True)]
+    return [" + ".join(f"({float(a)!r})*({x})" for a, x in zip(axis, shifted, strict=True)) for axis in drawing.axes.T]
 
 
 def _holder(mechanism, it, key):
@@ -302,7 +310,7 @@ def with_all_outputs(mechanism):
     """Return a mechanism of which everything is asked: points, reactions, forces of drivers, applied forces."""
     point = [0.3, -0.2, 0.4][: 2 if mechanism.space == "planar" else 3]
     outputs = dict(mechanism.outputs)
-    for name in mechanism.bodies:
+    for name in mechanism.rigid_bodies:
         outputs[f"point_{name}"] = jn.PointOutput(name, point)
     for name, joint in {**mechanism.joints, **mechanism.drivers}.items():
         outputs[f"force_{name}"] = JointForceOutput(name)
@@ -321,12 +329,12 @@ def with_all_outputs(mechanism):
             outputs[f"force_{name}_on_{force.bodies[0]}"] = JointForceOutput(name, force.bodies[0], force.bodies[1])
             outputs[f"moment_{name}_on_{force.bodies[1]}"] = JointTorqueOutput(name, point=point)
     outputs |= {"ground": GroundForceOutput(), "ground_torque": GroundTorqueOutput(point)}
-    body = next(iter(mechanism.bodies))
+    body = next(iter(mechanism.rigid_bodies))
     outputs |= {f"{kind.__name__}": kind() for kind in ENERGIES} | {
         f"{kind.__name__}": kind(body=body) for kind in ENERGIES_OF_A_BODY
     }
     if mechanism.space == "spatial":
-        pair = ([*mechanism.bodies][-1], body) if len(mechanism.bodies) > 1 else (body, "ground")
+        pair = ([*mechanism.rigid_bodies][-1], body) if len(mechanism.bodies) > 1 else (body, "ground")
         outputs |= {
             "parameters": jn.EulerParametersOutput(body),
             "parameters_between": jn.RelativeEulerParametersOutput(pair),
@@ -401,7 +409,9 @@ def matrices(output, values):
 def weight(mechanism, alone):
     """Return the weight of one body, or of all, N, which is what potential energy changes by with the origin."""
     values = mechanism.parameter_values
-    masses = [body.mass for name, body in mechanism.bodies.items() if alone in (None, name) and body.mass is not None]
+    masses = [
+        body.mass for name, body in mechanism.rigid_bodies.items() if alone in (None, name) and body.mass is not None
+    ]
     return sum(resolve(mass, values) for mass in masses) * np.asarray(resolve(mechanism.gravity, values))
 
 

@@ -124,7 +124,7 @@ def _robot(
     begin: dict[str, Any] = assigned(robot, start or (), "--start", law=False)
     with errors_about(source):
         mechanism = robot_mechanism(robot, begin, laws, hold=hold, drives=drives)
-        for name, body in mechanism.bodies.items():
+        for name, body in mechanism.rigid_bodies.items():
             body_mass(name, body, {}, 3)  # mechanism files hold bodies as real ones only
         data, _ = mechanism_data(mechanism, target.stem)
     _put(dumped(data, target.suffix.lower(), str(target)), target, (), True)

@@ -29,6 +29,7 @@ MotionLaw = Annotated[Any, "motion"]
 Wrenches = Annotated[Any, "wrenches"]
 Whole = Annotated[int, "whole"]
 Nested = Annotated[Any, "nested"]  # an element within another
+Curve = Annotated[Any, "curve"]
 
 SPACES = ("planar", "spatial")
 ROLES = ("joint", "driver", "force")
@@ -122,6 +123,7 @@ class AbstractConstraint(Module):
     type_name: ClassVar[str] = ""
     body_count: ClassVar[int] = 2
     body_counts: ClassVar[tuple[int, ...]] = ()  # where more than one number is right
+    hidden: ClassVar[tuple[str, ...]] = ()  # coordinates besides those of bodies, which a carriage of its own has
     periodic: ClassVar[bool] = False  # whether its residual forgets whole turns, which the law must not skip then
     law_apart: ClassVar[bool] = False  # of the class that defines `residual`: a function of bodies less one of the law
     dimensions: ClassVar[Mapping[str, str]] = USUAL_DIMENSIONS

@@ -22,6 +22,7 @@ WORDS = (
     "Wrenches",
     "Whole",
     "Nested",
+    "Curve",
 )  # annotations that say what kind of value a field has
 BODY_ENDINGS = ("_i", "_j", "_m")  # of fields, by the body that they are fixed in
 
@@ -60,8 +61,19 @@ SIGNS: Mapping[str, str] = MappingProxyType(
 """Signs that values may have to have, and what is said of a value that has another."""
 
 _MACHINES = {
-    "planar": ("revolute", "rod", "slot", "prismatic", "coordinate", "gear", "rolling"),
-    "spatial": ("spherical", "rod", "plane", "universal", "revolute", "cylindrical", "prismatic", "screw"),
+    "planar": ("revolute", "rod", "slot", "prismatic", "coordinate", "gear", "rolling", "curve"),
+    "spatial": (
+        "spherical",
+        "rod",
+        "plane",
+        "universal",
+        "revolute",
+        "cylindrical",
+        "prismatic",
+        "screw",
+        "curve",
+        "surface",
+    ),
 }
 _DRIVES = ("coordinate", "slide", "distance", "rotation")
 _LOADS = ("spring", "slide spring", "slide", "distance", "rotation", "spiral", "point force")
@@ -217,7 +229,7 @@ def symbols(kind: type[Any]) -> tuple[str, ...]:
     >>> from jounce import planar
     >>> from jounce.constraints.facts import symbols
     >>> symbols(planar.Revolute)
-    ('revolute', 'rod', 'slot', 'prismatic', 'coordinate', 'gear', 'rolling')
+    ('revolute', 'rod', 'slot', 'prismatic', 'coordinate', 'gear', 'rolling', 'curve')
     """
     if kind.role in ("driver", "force"):
         return _DRIVES if kind.role == "driver" else _LOADS
@@ -284,7 +296,9 @@ def field_kinds(kind: type[Any]) -> Mapping[str, str]:
 
 
 def field_kind(field: dataclasses.Field) -> str:
-    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``nested`` or ``text``."""
+    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``nested``,
+    ``curve`` or ``text``.
+    """
     if isinstance(field.type, str):  # under ``from __future__ import annotations``
         word = field.type.rpartition(".")[2].strip()
         return "motion" if word == "MotionLaw" else word.lower() if word in WORDS else "text"

@@ -7,7 +7,7 @@ a body, seen in the global frame. ``cross(a, b)`` is the paper's ``a^T R^T b``.
 import equinox as eqx
 from jaxtyping import Float
 
-from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
+from jounce.constraints.base import AbstractConstraint, Curve, Scalar, Vector, rows
 from jounce.jet import Jet, cross, dot, sqrt
 from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
@@ -119,6 +119,27 @@ class Fixed(AbstractConstraint, type="fixed", space="planar"):
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return rows(d, body_j.angle - body_i.angle - self.offset)
+
+
+class PlanarCurve(AbstractConstraint, type="curve", space="planar"):
+    """Point on a curve: a point of body j stays on a curve of body i, as a pin in a track, or a roller in a cam groove.
+
+    The parameter of the curve is a coordinate of its own, that of a carriage without mass beside the bodies; what the
+    curve exerts is along its normal.
+    """
+
+    curve: Curve  # of s, m, in the frame of body i
+    point_j: Vector  # m, in the frame of body j
+    start: Scalar = None  # of the parameter, as a guess; where the curve is nearest to the guess of the bodies else
+
+    hidden = ("s",)
+    dimensions = {"curve": "length", "start": "any"}
+    symbol = "curve"
+
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, carriage: PlanarPose, time: Jet) -> Jet:
+        along, unit = carriage.position
+        d = body_j.point(self.point_j) - body_i.point(self.curve(along / self.curve.unit))
+        return rows(d, unit - self.curve.unit, carriage.angle)
 
 
 class Coordinate(AbstractConstraint, type="coordinate", space="planar"):

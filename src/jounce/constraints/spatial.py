@@ -6,9 +6,10 @@ In each, ``d = r_j^P - r_i^P`` leads from the joint's point on body i to that on
 from typing import Any
 
 import jax.numpy as jnp
+import numpy as np
 
 from jounce.constraints.angles import Vectors, coaxial, perpendiculars, relative_angle
-from jounce.constraints.base import AbstractConstraint, Scalar, Vector, rows
+from jounce.constraints.base import AbstractConstraint, Curve, Scalar, Vector, rows
 from jounce.constraints.planar import length_of, slide
 from jounce.jet import Jet, cross, dot, wrap
 from jounce.rigid import SpatialPose
@@ -168,6 +169,50 @@ class Fixed(AbstractConstraint, type="fixed", space="spatial"):
         return rows(d, *_parallel(body_i, body_j, self.axis_i, self.axis_j), level)
 
 
+class SpatialCurve(AbstractConstraint, type="curve", space="spatial"):
+    """Point on a curve: a point of body j stays on a curve of body i, as a roller in the groove of a barrel cam.
+
+    The parameter of the curve is a coordinate of its own, that of a carriage without mass beside the bodies; what the
+    curve exerts is across its tangent.
+    """
+
+    curve: Curve  # of s, m, in the frame of body i
+    point_j: Vector  # m, in the frame of body j
+    start: Scalar = None  # of the parameter, as a guess; where the curve is nearest to the guess of the bodies else
+
+    hidden = ("s",)
+    dimensions = {"curve": "length", "start": "any"}
+    symbol = "curve"
+
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, carriage: SpatialPose, time: Jet) -> Jet:
+        along, aside, unit = carriage.position
+        d = body_j.point(self.point_j) - body_i.point(self.curve(along / self.curve.unit))
+        return rows(d, aside, unit - self.curve.unit, *_upright(carriage))
+
+
+class Surface(AbstractConstraint, type="surface", space="spatial"):
+    """Point on a surface: a point of body j stays on a surface of body i.
+
+    The parameters of the surface are coordinates of their own, those of a carriage without mass beside the bodies; what
+    the surface exerts is along its normal.
+    """
+
+    surface: Curve  # of u and v, m, in the frame of body i
+    point_j: Vector  # m, in the frame of body j
+    start_u: Scalar = None  # of the parameters, as a guess
+    start_v: Scalar = None
+
+    hidden = ("u", "v")
+    dimensions = {"surface": "length", "start": "any"}
+    symbol = "surface"
+
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, carriage: SpatialPose, time: Jet) -> Jet:
+        along, aside, unit = carriage.position
+        point = self.surface(along / self.surface.unit, aside / self.surface.unit)
+        d = body_j.point(self.point_j) - body_i.point(point)
+        return rows(d, unit - self.surface.unit, *_upright(carriage))
+
+
 class Screw(AbstractConstraint, type="screw", space="spatial"):
     """Nut j on a screw i: cylindrical, and an advance of one lead per turn. Sommer 2024, section 5.
 
@@ -267,6 +312,12 @@ class Oldham(AbstractConstraint, type="oldham", space="spatial"):
         second, _ = _frame_of(self.axis_j, self.vector_j)
         turned = body_i.direction(first).dot(body_j.direction(second))
         return rows(apart, *_parallel(body_i, body_j, self.axis_i, self.axis_j), turned)
+
+
+def _upright(body: SpatialPose) -> list[Jet]:
+    """Return the three rows that keep the axes of a body along those of the ground."""
+    x, y = (body.direction(unit[:, None, None]) for unit in np.eye(3)[:2])
+    return [x[1], x[2], y[2]]
 
 
 def _parallel(body_i: SpatialPose, body_j: SpatialPose, axis_i: Vectors, axis_j: Vectors) -> list[Jet]:

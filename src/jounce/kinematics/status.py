@@ -17,6 +17,7 @@ class Status(enum.IntEnum):
     UNDEFINED = 8
     INCONSISTENT = 9
     UNBALANCED = 10
+    END_OF_CURVE = 11
 
     @property
     def advice(self) -> str:
@@ -46,5 +47,7 @@ _ADVICE = {
     Status.UNBALANCED: "the energy of the motion would change here, though nothing takes or gives any: a joint has a "
     "kink or a jump, at which velocities would have to jump, too, or a feature too narrow for the steps; make its "
     "residual smooth, or ask for a `longest_step` as short as the feature",
+    Status.END_OF_CURVE: "a point has come to an end of the curve that it is held on, and there is no curve beyond; "
+    "ask for a shorter motion, or give a longer curve, or a closed one",
     Status.NOT_REACHED: "not computed, because the motion could not be followed up to here",
 }

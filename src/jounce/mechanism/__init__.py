@@ -30,6 +30,8 @@ from jounce.mechanism.outputs import (
     AngleOutput as AngleOutput,
     AngularVelocityOutput as AngularVelocityOutput,
     DistanceOutput as DistanceOutput,
+    ParameterOutput as ParameterOutput,
+    ParametersOutput as ParametersOutput,
     PlanarRelativeAngleOutput as PlanarRelativeAngleOutput,
     PointOutput as PointOutput,
     RelativeAngleOutput as RelativeAngleOutput,

@@ -12,7 +12,7 @@ from jax.core import Tracer
 from jaxtyping import Float
 
 from jounce.constraints.facts import facts_of, field_kinds, value_fields
-from jounce.errors import JounceError
+from jounce.errors import JounceError, MechanismError
 from jounce.jet import Jet
 from jounce.linear_algebra.fronts import Fronts, elimination
 from jounce.linear_algebra.pattern import Pattern
@@ -26,9 +26,10 @@ from jounce.mechanism.axis_angles import (
     with_datum_of,
     with_datums,
 )
-from jounce.mechanism.mechanism import GROUND, Mechanism
+from jounce.mechanism.carriages import ENDING, carriage_guess, curve_in, joint_of
+from jounce.mechanism.mechanism import GROUND, Carriage, Mechanism
 from jounce.mechanism.outputs import AbstractMotionOutput
-from jounce.mechanism.resolve import along_instances, resolve, resolved
+from jounce.mechanism.resolve import along_instances, resolve, resolve_element, resolved
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, group_elements, holding, law_left_out
 from jounce.modules import unchecked, with_fields
 from jounce.rigid import PlanarPose, SpatialPose
@@ -36,6 +37,7 @@ from jounce.rigid.euler_parameters import euler_parameters
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
+from jounce.trajectory.curves import CurveLaw
 
 Grouped = tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]
 """Groups, and the names of the elements of each, with their kinds before them."""
@@ -130,7 +132,7 @@ def build(mechanism: Mechanism, like: Model | None = None, *, initial: bool = Fa
     guess = starting_guess(mechanism, parameters, components)
     groups = tuple(with_sense(with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
     groups, forces, outputs = (with_datums(part, guess) for part in (groups, forces, outputs))
-    length = _size(groups, guess)
+    length = _size(groups, guess["position"][:, : 1 + len(mechanism.rigid_bodies)])
     history = AttitudeHistory(guess["quaternion"], np.zeros(1)) if components == 3 else None
     parts = ((groups, names), (forces, force_names), (outputs, output_names))
     return model_of(tuple(mechanism.bodies), parts, guess, length, history)
@@ -149,7 +151,9 @@ def released(model: Model) -> Model:
             groups.append(group)
             names.append(tuple(its[k] for k in kept))
     parts = ((tuple(groups), tuple(names)), ((), ()), ((), ()))
-    bare = model_of(model.bodies, parts, model.guess, _size(tuple(groups), model.guess), model.history)
+    own = sum(not name.endswith(ENDING) for name in model.bodies) + 1  # carriages follow the bodies
+    length = _size(tuple(groups), model.guess["position"][:, :own])
+    bare = model_of(model.bodies, parts, model.guess, length, model.history)
     system = with_fields(bare.system, forces=system.forces, outputs=system.outputs)
     return dataclasses.replace(bare, system=system, forces=model.forces, outputs=model.outputs)
 
@@ -280,8 +284,14 @@ def _plain(names: tuple[tuple[str, ...], ...]) -> tuple[tuple[str, ...], ...]:
 def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components: int) -> dict[str, Any]:
     """Return the coordinates of all bodies at the starting guess, the ground first."""
     positions, attitudes = [np.zeros(components)], [np.zeros(()) if components == 2 else np.array([1.0, 0, 0, 0])]
+    whole = (GROUND, *mechanism.rigid_bodies)
     for name, body in mechanism.bodies.items():
         place = f"bodies.{name}"
+        if isinstance(body, Carriage):
+            poses = dict(zip(whole, zip(positions, attitudes, strict=False), strict=False))
+            positions.append(_carried(mechanism, name, body, poses, parameters, components))
+            attitudes.append(attitudes[0])
+            continue
         positions.append(resolved(body.position, f"{place}.position", "vector", components, parameters))
         if components == 2:
             attitudes.append(resolved(body.angle, f"{place}.angle", "scalar", components, parameters))
@@ -289,6 +299,28 @@ def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components:
             attitudes.append(_attitude(body.orientation, f"{place}.orientation", parameters))
     attitude = "angle" if components == 2 else "quaternion"
     return {"position": along_instances(*positions), attitude: along_instances(*attitudes)}
+
+
+def _carried(
+    mechanism: Mechanism, name: str, body: Carriage, poses: Any, parameters: dict[str, Any], components: int
+) -> Any:
+    """Return the starting guess of the place of a carriage, from the poses of the bodies before it."""
+    if body.position is not None:
+        return np.asarray(body.position, float)
+    joint = joint_of(name)
+    element = mechanism.joints[joint]
+    values = resolve_element(element, parameters, components, f"joints.{joint}")
+    start = [x for key, x in values.items() if key.startswith("start")]
+    pose_type, key = (PlanarPose, "angle") if components == 2 else (SpatialPose, "quaternion")
+    body_i, body_j = (
+        pose_at({"position": position, key: attitude}, pose_type)
+        for position, attitude in (poses[its] for its in element.bodies)
+    )
+    place = body_i.to_body(body_j.point(values["point_j"]) - body_i.position).coefficients[0]
+    try:
+        return carriage_guess(curve_in(values), None if any(x is None for x in start) else start, place)
+    except MechanismError as error:
+        raise MechanismError(error.message, name=f"joints.{joint}.{error.name}", value=error.value) from None
 
 
 def _attitude(orientation: Any, name: str, parameters: dict[str, Any]) -> np.ndarray:
@@ -380,13 +412,16 @@ def _with_found_of(group: Group, known: Group) -> Group:
     return holding(group, "offset", known.element.offset)
 
 
-def _size(groups: tuple[Group, ...], guess: dict[str, Any]) -> float:
+def _size(groups: tuple[Group, ...], places: Float[Numbers, "component body 1"]) -> float:
     """Return the largest distance among the points of the joints and the bodies of the guess, 1 if there is none."""
-    points, sizes = [guess["position"][..., 0]], []
+    points, sizes = [places[..., 0]], []
     for group in groups:
         facts = facts_of(type(group.element))
         for name, kind in field_kinds(type(group.element)).items():
-            value = getattr(group.element, name)
+            value: Any = getattr(group.element, name)
+            if isinstance(value, CurveLaw):
+                sizes += [] if isinstance(value.unit, Tracer) else [np.max(value.unit)]
+                continue
             if value is None or facts.dimensions[name] != "length" or isinstance(value, Tracer):
                 continue
             if kind == "vector" and name.startswith("point"):

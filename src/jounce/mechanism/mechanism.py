@@ -10,6 +10,7 @@ from jounce.constraints import AbstractConstraint
 from jounce.display import Displayed
 from jounce.errors import ExpressionError, JounceError, MechanismError, check_choice, check_name
 from jounce.forces import AbstractForce
+from jounce.mechanism.carriages import with_carriages
 from jounce.mechanism.derivative_outputs import bound
 from jounce.mechanism.outputs import AbstractQuantity
 from jounce.mechanism.redundant_reactions import RedundantReactions, check_redundant_reactions
@@ -31,6 +32,7 @@ RESERVED_OUTPUTS = (  # the axes of a result
     "euler_angle",
     "row_axis",
     "column_axis",
+    "parameter",
 )
 NEAREST = "nearest"
 SIDES = {"above": (-1, 1), "below": (-1, -1), "right": (0, 1), "left": (0, -1)}
@@ -90,6 +92,10 @@ class Body:
             found = {"mass": whole.mass, "center_of_mass": whole.center_of_mass[: 2 if planar else 3]}
             for name, value in {**found, "inertia": tensor}.items():
                 object.__setattr__(self, name, value)
+
+
+class Carriage(Body):
+    """What has the hidden coordinates of a joint, such as the parameter of a curve: see `carriages`."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -174,6 +180,8 @@ class Mechanism(Displayed):
     def __post_init__(self):
         if self.space not in ("planar", "spatial"):
             raise MechanismError("space is planar or spatial", name="space", value=self.space)
+        if isinstance(self.bodies, Mapping) and isinstance(self.joints, Mapping):
+            object.__setattr__(self, "bodies", with_carriages(self.bodies, self.joints, Carriage))
         if not self.bodies:
             raise MechanismError("a mechanism needs at least one moving body", name="bodies", value=dict(self.bodies))
         self._check_names()
@@ -187,9 +195,14 @@ class Mechanism(Displayed):
         _ = self.shown_units
 
     def __repr__(self) -> str:
-        kinds = {"bodies": self.bodies, **self.elements}
+        kinds = {"bodies": self.rigid_bodies, **self.elements}
         counts = ", ".join(f"{kind} {len(found)}" for kind, found in kinds.items() if found)
         return f"<Mechanism {self.title}{': ' if self.title else ''}{self.space}; {counts}>"
+
+    @property
+    def rigid_bodies(self) -> dict[str, Body]:
+        """The moving bodies but for the carriages by which joints count their hidden coordinates."""
+        return {name: body for name, body in self.bodies.items() if not isinstance(body, Carriage)}
 
     @property
     def shown_units(self) -> ShownUnits:

@@ -11,8 +11,10 @@ from jounce.constraints.angles import relative_angle
 from jounce.constraints.base import Vector, check_bodies, check_words
 from jounce.constraints.facts import USUAL_DIMENSIONS, USUAL_SIGNS
 from jounce.constraints.planar import length_of
+from jounce.errors import MechanismError, check_name
 from jounce.jet import Jet, sqrt
 from jounce.jet.rounding import told_in_plane
+from jounce.mechanism.carriages import carriage_of
 from jounce.modules import Module
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.orientation import FRAMES
@@ -82,7 +84,8 @@ class AbstractOutput(AbstractQuantity):
     may_repeat: ClassVar[bool] = False  # whether a body may be named more than once
 
     def __check_init__(self):
-        check_bodies(self, (self.body_count,), "takes", "be of")
+        if self.body_count:  # else the output knows its bodies
+            check_bodies(self, (self.body_count,), "takes", "be of")
         check_words(self)
 
     @abc.abstractmethod
@@ -101,6 +104,50 @@ class PointOutput(AbstractOutput):
 
     def evaluate(self, body: Pose) -> Jet:
         return body.point(self.point)
+
+
+class ParameterOutput(AbstractOutput):
+    """Parameter of the curve on which a joint holds a point, in the unit that it has there.
+
+    Parameters
+    ----------
+    joint : str
+        Name of the joint.
+    """
+
+    bodies: Any = eqx.field(static=True, init=False)
+    joint: str = eqx.field(static=True)
+
+    unit = "1"
+    body_count = 0
+    source = "joint"
+    count: ClassVar[int] = 1
+
+    def __post_init__(self) -> None:
+        self.bodies = (carriage_of(self.joint),)
+
+    def check(self, mechanism: Any) -> None:
+        """Raise MechanismError unless the joint holds a point on a curve, or on a surface."""
+        check_name("joint", self.joint, mechanism.joints, MechanismError, name="joint")
+        found = len(mechanism.joints[self.joint].hidden)
+        if found != self.count:
+            words = {0: "nothing with a parameter", 1: "a curve, of one parameter", 2: "a surface, of parameters"}
+            raise MechanismError(f"this joint has {words[found]}", name="quantity")
+
+    def evaluate(self, carriage: Pose) -> Jet:
+        return carriage.position[0] / carriage.position[-1]
+
+
+class ParametersOutput(ParameterOutput):
+    """Parameters u and v of the surface on which a joint holds a point, in the units that they have there."""
+
+    space = "spatial"
+    count = 2
+    labels = ("u", "v")
+    axes = (("parameter", ("u", "v")),)
+
+    def evaluate(self, carriage: Pose) -> Jet:
+        return carriage.position[:2] / carriage.position[2][None]
 
 
 class AngleOutput(AbstractOutput):

@@ -20,6 +20,7 @@ from jounce.jet import Jet
 from jounce.modules import Module, is_ours, unchecked
 from jounce.shapes import real_numbers
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FunctionMotion, SplineMotion
+from jounce.trajectory.curves import resolve_curve
 from jounce.trajectory.user_laws import read_laws
 
 Element = Module
@@ -237,6 +238,14 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
         except JounceError as error:
             raise error.located(name=f"{name}.{field_name}") from None
         values[field_name] = value
+    for field_name in (name for name, kind in kinds.items() if kind == "curve"):  # last, as they know their start
+        try:
+            start = [values[name] for name in values if name.startswith("start")]
+            start = None if any(x is None for x in start) else start
+            values[field_name] = resolve_curve(values[field_name], element.hidden, components, start, parameters)
+        except JounceError as error:
+            key = f"{field_name}.{error.name}" if error.name else field_name
+            raise MechanismError(error.message, name=f"{name}.{key}", value=error.value) from None
     _check_directions(values, facts.never_parallel, name)
     return values
 

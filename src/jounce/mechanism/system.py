@@ -13,6 +13,7 @@ from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
 from jounce.linear_algebra.fronts import Fronts
 from jounce.linear_algebra.pattern import Pattern
+from jounce.mechanism.carriages import carriages
 from jounce.mechanism.resolve import along_instances, group_key, resolve_element, stack_elements
 from jounce.mechanism.user_code import READINGS, readings_of, users_class, with_readings
 from jounce.modules import Module, unchecked, with_fields
@@ -184,7 +185,8 @@ def group_elements(
     groups, names = [], []
     for members in found.values():
         instance_names, instances, values = zip(*members, strict=True)
-        slots = zip(*([body_index[b] for b in e.bodies] for e in instances), strict=True)
+        named = zip(instance_names, instances, strict=True)
+        slots = zip(*([body_index[b] for b in (*e.bodies, *carriages(n, e))] for n, e in named), strict=True)
         groups.append(unchecked(Group, {"element": _stacked(instances, values), "bodies": tuple(slots)}))
         names.append(instance_names)
     return tuple(groups), tuple(names)

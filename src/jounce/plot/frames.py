@@ -83,7 +83,7 @@ def frames(motion: Motion) -> dict[str, Frame]:
 
 
 def _by_body(mechanism: Mechanism, whole: Any) -> dict[str, Frame]:
-    by_time, names = np.moveaxis(np.asarray(whole), -1, 0), (GROUND, *mechanism.bodies)
+    by_time, names = np.moveaxis(np.asarray(whole), -1, 0), (GROUND, *mechanism.rigid_bodies)
     return {body: by_time[..., k] for k, body in enumerate(names)}
 
 

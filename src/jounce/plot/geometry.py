@@ -23,6 +23,7 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND, check_mechanism
 from jounce.mechanism.resolve import check_value, resolve
 from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.plot.curve_lines import NONE, CurveLines, curve_lines
 from jounce.plot.frames import guessed, points_at
 from jounce.plot.gears import pitch_radii
 
@@ -81,6 +82,8 @@ class Symbol:
         Pitch radii of gears, the radius of a wheel, of each body, m.
     internal : bool, default False
         Of gears: whether the smaller one turns inside the larger one.
+    curve : CurveLines
+        Lines on the first body that the point on the second stays on.
     """
 
     name: str
@@ -90,6 +93,7 @@ class Symbol:
     axes: tuple[Point | None, ...]
     radii: tuple[float | None, ...]
     internal: bool = False
+    curve: CurveLines = NONE
 
     @property
     def moving_slot(self) -> int:
@@ -224,6 +228,10 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
     touching = [touch for kind, values in kinds.items() for touch in _touched(mechanism.elements[kind], values)]
     start = guessed(mechanism)
     everywhere = [points_at(start[body], local)[0] for _, body, local in touching]
+    curves = {name: curve_lines(mechanism, name) for name, joint in mechanism.joints.items() if joint.hidden}
+    for name, curve in curves.items():
+        lines = curve.lines if curve.whole else ()
+        everywhere += [point for x in lines for point in points_at(start[mechanism.joints[name].bodies[0]], x)[0]]
     size = float(np.linalg.norm(np.ptp(everywhere or [[0.0]], axis=0)))
     if not size:
         size = 2 * _largest([local for _, _, local in touching], mechanism, kinds) or 1.0
@@ -240,7 +248,7 @@ def skeleton(mechanism: Mechanism) -> Skeleton:
         links[body] = DrawnLink(body, positions, tuple(map(tuple, points.names)), bars)
     joints, drivers, forces = (
         tuple(
-            _symbol(mechanism, name, element, kinds[kind][name], components)
+            _symbol(mechanism, name, element, kinds[kind][name], components, curves.get(name))
             for name, element in mechanism.elements[kind].items()
         )
         for kind in ("joints", "drivers", "forces")
@@ -330,7 +338,12 @@ def _bars(points: Points, near: float, is_held: list[bool]) -> tuple[tuple[int, 
 
 
 def _symbol(
-    mechanism: Mechanism, name: str, element: Element, values: Mapping[str, np.ndarray], components: int
+    mechanism: Mechanism,
+    name: str,
+    element: Element,
+    values: Mapping[str, np.ndarray],
+    components: int,
+    curve: CurveLines | None,
 ) -> Symbol:
     bodies, facts = element.bodies, facts_of(type(element))
     points: list[np.ndarray] = [np.zeros(components)] * len(bodies)
@@ -348,6 +361,8 @@ def _symbol(
     if coordinate != "angle":
         axes[0] = np.array([1.0, 0.0]) if coordinate == "x" else np.array([0.0, 1.0])
     symbol = Symbol(name, facts.symbol, bodies, tuple(points), tuple(axes), tuple(radii))
+    if curve is not None:
+        symbol = replace(symbol, curve=curve)
     if element.role == "joint" and facts.symbol in ("gear", "coordinate"):
         return _geared(mechanism, symbol, coordinate, float(values.get("ratio", 1.0)))
     return symbol

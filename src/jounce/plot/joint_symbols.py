@@ -11,6 +11,7 @@ from jaxtyping import Float
 from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot import symbol_parts as parts
+from jounce.plot.curve_lines import shown
 from jounce.plot.drawing import BARS, GUIDES, INK, MARKS, SYMBOLS, WHEELS, Drawing, Flat, tinted
 from jounce.plot.driver_symbols import DRIVERS_AND_FORCES
 from jounce.plot.geometry import Symbol, Wheel, frame_along
@@ -96,6 +97,20 @@ def _pin_in_slot(drawing: Drawing, symbol: Symbol) -> None:
     pin_point = drawing.global_point(symbol, 1)
     parts.rail(drawing, symbol.bodies[0], pin_point, symbol.axis_on(0), start=symbol.points[0])
     parts.pin(drawing, drawing.flat(pin_point))
+
+
+def _curve(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw the curve of a body as a groove, or the lines of a surface, and what is held on it."""
+    body, held = symbol.bodies[0], drawing.global_place(symbol, 1)
+    colour = "#888888" if body == GROUND else drawing.colours.get(body, INK)
+    for line in shown(symbol.curve, drawing.within(body, held), 4 * drawing.unit):
+        flat = drawing.flat(drawing.at(body, line))
+        if symbol.kind == "curve":
+            drawing.curve(flat, stroke=colour, width=5.0, layer=GUIDES)
+            drawing.curve(flat, stroke=parts.PAPER, width=3.2, layer=GUIDES)
+        else:
+            drawing.curve(flat, stroke=tinted(colour, 0.6), width=0.6, layer=GUIDES - 1)
+    (parts.pin if drawing.planar else parts.ball)(drawing, drawing.flat(held))
 
 
 def _coordinate(drawing: Drawing, symbol: Symbol) -> None:
@@ -217,6 +232,7 @@ _PLANAR: dict[str, Callable[[Drawing, Symbol], None]] = {
     "gear": _nothing,
     "rack": _rack,
     "rolling": _rolling,
+    "curve": _curve,
     "none": _nothing,
 }
 _SPATIAL: dict[str, Callable[[Drawing, Symbol], None]] = {
@@ -228,5 +244,7 @@ _SPATIAL: dict[str, Callable[[Drawing, Symbol], None]] = {
     "cylindrical": _sleeve,
     "prismatic": _slider,
     "screw": _sleeve,
+    "curve": _curve,
+    "surface": _curve,
     "none": _nothing,
 }

@@ -202,7 +202,7 @@ def _messages(motion: Motion) -> list[str]:
 
 def _bodies(mechanism: Mechanism) -> list[dict[str, Any]]:
     parameters, rows = mechanism.parameter_values, []
-    for k, (name, body) in enumerate(mechanism.bodies.items()):
+    for k, (name, body) in enumerate(mechanism.rigid_bodies.items()):
         position = ", ".join(f"{value:.6g}" for value in np.asarray(resolve(body.position, parameters), float))
         mass = None if body.mass is None else _number(np.asarray(resolve(body.mass, parameters), float))
         colour = BODY_COLOURS[k % len(BODY_COLOURS)]

@@ -119,7 +119,7 @@ def _written(value: Any) -> str:
 
 
 def _mechanism(mechanism: Mechanism) -> list[str]:
-    bodies = count(len(mechanism.bodies), "moving body", "moving bodies")
+    bodies = count(len(mechanism.rigid_bodies), "moving body", "moving bodies")
     joints = count(len(mechanism.joints), "joint")
     title = _title(mechanism.title or "Mechanism", f"{mechanism.space}: {bodies}, {joints}")
     attitude = "angle" if mechanism.space == "planar" else "orientation"
@@ -128,7 +128,7 @@ def _mechanism(mechanism: Mechanism) -> list[str]:
         ("body", "position/m", "angle/rad" if attitude == "angle" else attitude, "mass/kg"),
         [
             [n, _written(b.position), _written(getattr(b, attitude)), "" if b.mass is None else _written(b.mass)]
-            for n, b in mechanism.bodies.items()
+            for n, b in mechanism.rigid_bodies.items()
         ],
     )
     try:

@@ -156,6 +156,9 @@ def _dimensions(subject: Subject, element: Any, motion: Motion) -> None:
         value = getattr(element, name)
         dimension = dimension_of_field(element, name)
         stretched = dimension in ("length", "length per angle", "direction")
+        if kind == "curve" and dimension == "length":
+            changed[name] = tuple(f"{STRETCH}*({entry})" for entry in value)
+            continue
         if kind not in ("scalar", "vector", "motion") or (value is None and not stretched):
             continue
         if value is None or not (stretched or dimension in ("angle", "ratio")):

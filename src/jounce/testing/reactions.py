@@ -66,12 +66,20 @@ def acting(
         forces=roles["force"],
     )
     model = build(mechanism)
-    pose = pose_of(random_motion(random, space, rates + 2, degree=3))
+    series = random_motion(random, space, rates + 2, degree=3)
+    pose = pose_of({name: _with_carriages(x, len(mechanism.bodies) - len(BODIES) + 1) for name, x in series.items()})
     coordinates = {name: np.stack(jet.dense().coefficients) for name, jet in pose.coordinates().items()}
     motion = Motion(mechanism, model, np.array([INSTANT]), rates + 2, (coordinates, ()), np.zeros(1, int), {})
     found = MotionForces(motion)
     found.__dict__["multipliers"] = random.normal(size=(rates + 1, len(model.rows), 1))
     return pose, found
+
+
+def _with_carriages(series: np.ndarray, count: int) -> np.ndarray:
+    """Return the motion of bodies with that of carriages, which rest where the last body begins."""
+    still = np.zeros_like(series[..., -1:, :])
+    still[0] = series[0, ..., -1:, :]
+    return np.concatenate([series, *[still] * count], axis=-2)
 
 
 def spins_of(pose: Any) -> np.ndarray:

@@ -134,7 +134,11 @@ def frames(subject: Subject) -> None:
     random = subject.random()
     group = group_of([subject.samples.element(random)], subject.space)
     motion = random_motion(random, subject.space, 2)
-    here, there = residual(group, motion), residual(group, moved_together(motion, random, 2))
+    moved = moved_together(motion, random, 2)
+    if subject.samples.kind.hidden:  # its coordinates, those of the last body, are no place that moves
+        for name, series in moved.items():
+            series[..., -1, :] = motion[name][..., -1, :]
+    here, there = residual(group, motion), residual(group, moved)
     words = "the residual changes where all bodies are moved together; is it between places in the global frame?"
     if period := subject.period_of(group):
         subject.same(here[1:], there[1:], 1e-11, words)

@@ -10,11 +10,17 @@ import numpy as np
 from jounce.constraints.facts import facts_of, field_kinds, value_fields
 from jounce.errors import MechanismError
 from jounce.jet import Jet, sqrt, stack
+from jounce.mechanism.carriages import carriage_of
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements
 from jounce.rigid import PlanarPose, SpatialPose
 
 BODIES = ("ground", "one", "two", "three", "four")
 INDEX = {name: k for k, name in enumerate(BODIES)}
+CURVES = {  # by the space and the number of parameters: text is no number, so that it is always the same
+    ("planar", 1): ("0.8*cos(s) + 0.1*s", "0.6*sin(s) - 0.2"),
+    ("spatial", 1): ("0.8*cos(s) + 0.1*s", "0.6*sin(s) - 0.2", "0.3*s + 0.1*sin(2*s)"),
+    ("spatial", 2): ("0.8*cos(u) + 0.1*v", "0.6*sin(u) - 0.1*v**2", "0.7*v + 0.1*u"),
+}
 LAW = "0.9 + 0.4*sin(1.3*t + 0.2) + 0.1*t**2"
 INSTANT = 0.3
 
@@ -70,6 +76,8 @@ class Samples:
         kind, facts = field_kinds(self.kind)[name], facts_of(self.kind)
         if kind == "motion":
             return LAW
+        if kind == "curve":
+            return CURVES[self.space, len(self.kind.hidden)]
         if kind == "vector":
             return random.uniform(0.2, 1.0, POSITION_COMPONENTS[self.space]).tolist()
         if kind == "scalar":
@@ -81,9 +89,10 @@ class Samples:
 
 
 def group_of(elements: Sequence[Any], space: str, parameters: Mapping[str, Any] | None = None) -> Group:
-    """Return the one group that joints of one kind are stacked in."""
+    """Return the one group that joints of one kind are stacked in; the last body has hidden coordinates of theirs."""
     named = {f"joints.{k}": e for k, e in enumerate(elements)}
-    (group,), _ = group_elements(named, parameters or {}, INDEX, POSITION_COMPONENTS[space])
+    carriage = {carriage_of(str(k)): len(BODIES) - 1 for k in range(len(elements))}
+    (group,), _ = group_elements(named, parameters or {}, {**INDEX, **carriage}, POSITION_COMPONENTS[space])
     return group
 
 

@@ -5,6 +5,7 @@ from jounce.trajectory.composed import (
     FollowingMotion as FollowingMotion,
     OutputMotion as OutputMotion,
 )
+from jounce.trajectory.curves import ParametricCurve as ParametricCurve, SampledCurve as SampledCurve
 from jounce.trajectory.hermite import HermiteMotion as HermiteMotion
 from jounce.trajectory.integrated import IntegratedMotion as IntegratedMotion
 from jounce.trajectory.joint_trajectory import JointTrajectory as JointTrajectory

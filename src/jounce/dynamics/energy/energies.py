@@ -224,10 +224,11 @@ def energies_of(
         if q is not None:
             raise MechanismError("a motion has its coordinates already", name="q", value=q)
         _check_known(system, order, system.order)
-        bodies = tuple(system.mechanism.bodies)
+        bodies = tuple(system.mechanism.rigid_bodies)
         coefficients = energy_coefficients(system, order, function)
         parts = tuple(
-            labelled(system, x[: system.order - order, 1:], energy_unit(order), body=bodies) for x in coefficients
+            labelled(system, x[: system.order - order, 1 : 1 + len(bodies)], energy_unit(order), body=bodies)
+            for x in coefficients
         )
         return *parts, bodies, order
     leading = tuple(k for k, joint in enumerate(system.moving_joints) if joint.mimic is None) if drives else ()

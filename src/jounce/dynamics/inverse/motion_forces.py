@@ -226,7 +226,8 @@ class MotionForces:
         tuple of two arrays of shape (levels, components, time)
             Taylor coefficients.
         """
-        joined = enumerate(self._bodies_of(name))
+        whole = self._bodies_of(name)  # the carriage of a joint, which has a hidden coordinate, is no body
+        joined = enumerate(whole[: len(whole) - bool(getattr(self._member(name)[0].element, "hidden", ()))])
         if body:
             work = total(self._wrench(name, slot) for slot, its in joined if its == body)
             return self._expressed(work, body, frame, point)

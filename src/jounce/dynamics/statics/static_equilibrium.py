@@ -18,6 +18,7 @@ from jounce.dynamics.statics.stability import Verdict, judged
 from jounce.errors import MechanismError, RobotError, SolveError, check_choice, check_name, flag
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly.assemble import assemble, freely_moving
+from jounce.kinematics.position_analysis.curve_ends import beyond_end
 from jounce.kinematics.results.pose_outputs import output_values
 from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.law_checks import check_laws
@@ -138,6 +139,11 @@ class Equilibrium(Displayed):
     @cached_property
     def poses(self) -> dict[str, dict[str, Any]]:
         """Poses of the moving bodies, by name: position, m, and angle, rad, or Euler parameters."""
+        return {name: pose for name, pose in self._all_poses.items() if name in self.mechanism.rigid_bodies}
+
+    @cached_property
+    def _all_poses(self) -> dict[str, dict[str, Any]]:
+        """Those of carriages, too."""
         poses = {}
         for k, name in enumerate(self.point.model.bodies, 1):
             position, attitude = (self.point.coordinates[key][0, ..., k, 0] for key in self._keys)
@@ -148,7 +154,7 @@ class Equilibrium(Displayed):
     @property
     def placed(self) -> Mechanism:
         """The mechanism with its bodies guessed where they stand: a simulation starts from there."""
-        bodies = {name: _posed(self.mechanism.bodies[name], pose) for name, pose in self.poses.items()}
+        bodies = {name: _posed(self.mechanism.bodies[name], pose) for name, pose in self._all_poses.items()}
         return dataclasses.replace(self.mechanism, bodies=bodies, initial={})
 
     @property
@@ -319,4 +325,8 @@ def _instant(mechanism: Mechanism, time: Any) -> float:
 def equilibrium_of(result: SearchResult, start: OperatingPoint, *, of_robot: bool = False) -> Equilibrium:
     """Return the result; a position in which the constraints hold less than they do elsewhere is singular."""
     singular = result.point.free.shape[1] > start.free.shape[1]
+    coordinates = {"position": result.point.coordinates["position"][0]}
+    if beyond := beyond_end(result.point.model, coordinates):
+        message = f"bodies would come to rest only beyond an end of a curve, {beyond}: {Status.END_OF_CURVE.advice}"
+        raise SolveError(message, status=Status.END_OF_CURVE)
     return Equilibrium(result.point, singular, of_robot=of_robot)

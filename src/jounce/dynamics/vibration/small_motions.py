@@ -195,7 +195,9 @@ def _check(reduction: Reduction) -> None:
         moving = (reduction.basis / even) @ vectors[:, 0]
         shares = np.abs(moving).reshape(len(point.model.bodies), -1)
         lacking = [
-            k for k, body in enumerate(point.mechanism.bodies.values()) if body.mass is None or body.inertia is None
+            k
+            for k, body in enumerate(point.mechanism.rigid_bodies.values())
+            if body.mass is None or body.inertia is None
         ]
         chosen = max(lacking or range(len(shares)), key=lambda k: shares[k].max())
         body = point.model.bodies[chosen]

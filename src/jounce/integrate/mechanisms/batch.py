@@ -30,6 +30,7 @@ from jounce.kinematics.results.pose_outputs import output_series
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
 from jounce.mechanism.axis_angles import measures_angle, raw_angles, with_turns
 from jounce.mechanism.builder import with_reference
+from jounce.mechanism.carriages import check_without_ends
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.turn_counting import counted_along
@@ -119,6 +120,7 @@ def simulate_batch(
     (3, 2, 5)
     """
     check_mechanism(mechanism)
+    check_without_ends(mechanism, "a batch of simulations")
     values = checked_values(mechanism, parameters, "run")
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     first = mechanism.with_parameters(**dict(zip(names, rows[0].tolist(), strict=True)))

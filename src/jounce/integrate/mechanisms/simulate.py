@@ -29,8 +29,9 @@ from jounce.integrate.steps.methods import AbstractMethod, evaluated
 from jounce.integrate.steps.options import checked_options, instants_of
 from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
+from jounce.kinematics.position_analysis.curve_ends import beyond_end, ends_of
 from jounce.kinematics.results.motion import check_output, output_group
-from jounce.mechanism import Mechanism, check_mechanism
+from jounce.mechanism import Mechanism, ParameterOutput, ParametersOutput, check_mechanism
 from jounce.mechanism.element_indices import force_names
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete_or
@@ -189,11 +190,14 @@ def simulate(
     with ProgramsAhead(mechanism, instants, order, method, float(tolerance), float(longest_step)) as ahead:
         start = consistent_start(mechanism, first, ahead.begin)
         _check_forces(start, first)
-        detectors = [_detector_of(event, mechanism, start) for event in events]
+        _check_ends(start, first)
+        watched = [*events, *_events_at_ends(start)]
+        detectors = [_detector_of(event, mechanism, start) for event in watched]
         ahead.go_on(start)
     run = _Run(start, method, float(tolerance), float(longest_step), detectors)
     run.go(instants, progress)
-    outcome = run.ending, run.events.happened, joined(run.backends)
+    run.note_ends(len(events))
+    outcome = run.ending, run.events.happened[: len(events)], joined(run.backends)
     simulation = Simulation(mechanism, start, run.dense_output, instants, order, *outcome)
     if strict and run.events.stopped_at is None:
         raise_for_status(simulation)
@@ -229,6 +233,24 @@ def _detector_of(event: Event, mechanism: Mechanism, start: ConsistentStart) -> 
         message = f"the output has {components} component{'s' if components > 1 else ''}, counted from 0"
         raise MechanismError(message, name="events.component", value=event.component)
     return EventDetector(event, group, start.model.pose_type)
+
+
+def _events_at_ends(start: ConsistentStart) -> list[Event]:
+    """Return events that end a run where a point comes to an end of its curve: two for each parameter with ends."""
+    found = []
+    for ends in ends_of(start.model):
+        output = (ParameterOutput if ends.alone else ParametersOutput)(ends.joint)
+        for value, direction in ((ends.low - ends.slack, -1), (ends.high + ends.slack, 1)):
+            found.append(Event(output, value, 0, ends.component, direction, terminal=True))
+    return found
+
+
+def _check_ends(start: ConsistentStart, instant: float) -> None:
+    """Raise SolveError where a point starts beyond an end of its curve."""
+    beyond = beyond_end(start.model, pose_coordinates(start.state))
+    if beyond:
+        status = Status.END_OF_CURVE
+        raise SolveError(f"t = {instant:g} s, {beyond}: end of curve: {status.advice}", status=status)
 
 
 def _check_forces(start: ConsistentStart, instant: float) -> None:
@@ -331,6 +353,14 @@ class _Run:
             self._stand(current)
         if current.outcome.item() in (Outcome.COLLAPSED, Outcome.LOST, Outcome.UNBALANCED):
             self.ending = self._explained(current)
+
+    def note_ends(self, first: int) -> None:
+        """Tell that the run ended at an end of a curve, if one of the events from the first on happened."""
+        for k, ends in enumerate(ends_of(self.start.model)):
+            for beyond_high in (False, True):
+                for instant in self.events.happened[first + 2 * k + beyond_high]:
+                    self.ending = Status.END_OF_CURVE, f"{ends.words(beyond_high)} at t = {instant:g} s"
+                    self.events.stopped_at = None
 
     def _stand(self, current: IntegratorState) -> None:
         """Keep the start as a step of no length."""

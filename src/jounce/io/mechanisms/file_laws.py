@@ -7,7 +7,15 @@ from typing import Any
 
 from jounce.io.files.located_data import Location
 from jounce.io.files.source import Source
-from jounce.trajectory import AbstractMotion, Expression, FollowingMotion, MeasuredMotion, OutputMotion, SplineMotion
+from jounce.trajectory import (
+    AbstractMotion,
+    Expression,
+    FollowingMotion,
+    MeasuredMotion,
+    OutputMotion,
+    SampledCurve,
+    SplineMotion,
+)
 
 
 class FileLaws:
@@ -40,6 +48,8 @@ class FileLaws:
             return tuple(self.law((*location, index), entry, following) for index, entry in enumerate(value))
         if isinstance(value, AbstractMotion):
             return value
+        if hasattr(value, "file"):
+            return self._curve(location, value)
         if hasattr(value, "held"):
             fixed = self.law((*location, "law"), value.held, following)
             return OutputMotion(value.output, fixed if isinstance(fixed, AbstractMotion | Expression) else repr(fixed))
@@ -52,6 +62,14 @@ class FileLaws:
         if by is None:
             return law
         return FollowingMotion(law, self._leader(location, by, following) if isinstance(by, str) else by)
+
+    def _curve(self, location: Location, given: Any) -> SampledCurve:
+        from jounce.io.files.samples import read_points
+
+        def through(path: str) -> SampledCurve:
+            return SampledCurve(read_points(path)[1], given.closed, given.degree)
+
+        return self.source.read_named(given.file, location, through)
 
     def _leader(self, location: Location, name: str, following: tuple[str, ...]) -> AbstractMotion | Expression:
         """Return the law of a driver by its name."""

@@ -31,7 +31,7 @@ class FileKey:
     fields : tuple of str
         Fields of the class that it fills; more than one when the key holds a list with an entry for each body.
     kind : str
-        ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole`` or ``text``.
+        ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``curve`` or ``text``.
     quantity : str
         Kind of unit that the class states: one of ``units.KINDS``; or ``direction`` (any unit, the same in all
         components), or ``of coordinate`` and ``per angle``, which follow the key ``coordinate`` beside it.

@@ -248,7 +248,7 @@ def _check_values(mechanism: Mechanism) -> None:
         for name, element in elements.items():
             resolve_element(element, parameters, components, f"{kind}.{name}")
     starting_guess(mechanism, parameters, components)
-    for name, body in mechanism.bodies.items():
+    for name, body in mechanism.rigid_bodies.items():
         body_mass(name, body, parameters, components)
     try:
         resolve(mechanism.gravity, parameters)

@@ -28,6 +28,8 @@ OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
     ("roll_center", mechanism.RollCenterOutput),
     ("roll_center", mechanism.SymmetricRollCenterOutput),
     ("derivative", mechanism.DerivativeOutput),
+    ("parameter", mechanism.ParameterOutput),
+    ("parameters", mechanism.ParametersOutput),
     ("angle", mechanism.DriverAngleOutput),
     ("displacement", mechanism.DriverDisplacementOutput),
     ("force", dynamics.DriverForceOutput),

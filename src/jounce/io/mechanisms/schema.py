@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, create_mo
 from jounce.constraints import catalogue
 from jounce.constraints.facts import facts_of
 from jounce.errors import JounceError, MechanismFileError, no_such
+from jounce.io.mechanisms.curve_values import curve
 from jounce.io.mechanisms.inertia_forms import inertia
 from jounce.io.mechanisms.keys import FileKey, file_keys
 from jounce.io.mechanisms.motion_values import laws, motion
@@ -161,6 +162,8 @@ def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
             return vectors(len(key.fields), size, key.quantity)
         case "wrenches":
             return wrenches()
+        case "curve":
+            return curve(kind.hidden, size)
         case "whole":
             return Annotated[Any, Checked(_whole, {"type": "integer", "minimum": 0})]
     choices = facts_of(kind).choices.get(key.fields[0])

@@ -66,10 +66,10 @@ def write_mechanism(mechanism: Mechanism, path: str | PathLike[str], *, overwrit
     tables = {Path(path).parent / name: columns for name, columns in samples.items()}
     for table_file in tables:  # all, before the first is replaced
         check_target(table_file, overwrite=overwrite)
-    for table_file, (times, values) in tables.items():
-        rows = "".join(f"{t!r},{x!r}\n" for t, x in zip(times, values, strict=True))
+    for table_file, columns in tables.items():
+        rows = "".join(f"{','.join(map(repr, row))}\n" for row in zip(*columns.values(), strict=True))
         with replacing(table_file, overwrite=overwrite) as scratch:
-            scratch.write_text(f"time,value\n{rows}", encoding="utf-8")
+            scratch.write_text(f"{','.join(columns)}\n{rows}", encoding="utf-8")
     with replacing(path, overwrite=overwrite) as scratch:
         scratch.write_text(text, encoding="utf-8")
 
@@ -88,8 +88,8 @@ def mechanism_data(mechanism: Mechanism, stem: str = "mechanism") -> tuple[dict[
     -------
     data : dict
         Mappings, lists, numbers and text by the keys of the schema.
-    samples : dict of str to tuple of list
-        Times, s, and values of splines by the name of their CSV file.
+    samples : dict of str to dict of str to list
+        Columns by name, by the name of their CSV file: times, s, and values of splines, or coordinates of points, m.
 
     Raises
     ------
@@ -121,7 +121,7 @@ class _Writer:
             data["gravity"] = plain(mechanism.gravity, "gravity")
         if mechanism.parameters:
             data["parameters"] = {n: plain(x, f"parameters.{n}") for n, x in mechanism.parameters.items()}
-        data["bodies"] = {name: self._body(name, body) for name, body in mechanism.bodies.items()}
+        data["bodies"] = {name: self._body(name, body) for name, body in mechanism.rigid_bodies.items()}
         if mechanism.assembly is not None:
             data["assembly"] = mechanism.assembly
         for section in ROLES:
@@ -191,6 +191,8 @@ class _Writer:
             where = f"{location}.{key.key}"
             if key.kind in ("motion", "law", "laws"):
                 written: list[Any] = [self.laws.written(where, x, element) for x in values]
+            elif key.kind == "curve":
+                written = [self.laws.curve(where, x) for x in values]
             else:
                 written = [plain(value, where) for value in values]
             entries[key.key] = written[0] if len(written) == 1 else written

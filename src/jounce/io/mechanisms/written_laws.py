@@ -21,7 +21,9 @@ from jounce.trajectory import (
     IntegratedMotion,
     MeasuredMotion,
     OutputMotion,
+    ParametricCurve,
     PiecewiseMotion,
+    SampledCurve,
     SegmentedMotion,
     SplineMotion,
     TrapezoidalMotion,
@@ -43,13 +45,13 @@ class WrittenLaws:
 
     Attributes
     ----------
-    samples : dict of str to tuple of list
-        Times, s, and values of splines by the name of their CSV file.
+    samples : dict of str to dict of str to list
+        Columns by name of their CSV file: times, s, and values of splines, or coordinates of points, m.
     """
 
     def __init__(self, stem: str, drivers: Mapping[str, Any]):
         self.stem, self.drivers = stem, drivers
-        self.samples: dict[str, tuple[list[float], list[float]]] = {}
+        self.samples: dict[str, dict[str, list[float]]] = {}
 
     def written(self, place: str, law: Any, element: Any) -> Any:
         """Return a law of motion, or of a force, as a file holds it."""
@@ -86,9 +88,9 @@ class WrittenLaws:
         if isinstance(law, HermiteMotion):
             message = "a law through derivatives has no form in a file; write its values as samples, or another law"
             raise MechanismError(message, name=place)
-        name = f"{self.stem}_{re.sub(r'[^A-Za-z0-9_]+', '_', place)}.csv"
+        name = self._file_of(place)
         times, values = law.samples.value or _samples_of(law)
-        self.samples[name] = (np.asarray(times).tolist(), np.asarray(values).tolist())
+        self.samples[name] = {"time": np.asarray(times).tolist(), "value": np.asarray(values).tolist()}
         beyond = "hold" if isinstance(law, TrapezoidalMotion) else law.beyond
         if beyond == "continue":
             message = "a law that goes on beyond its data has no form in a file; choose hold, or more data"
@@ -117,6 +119,23 @@ class WrittenLaws:
             raise MechanismError(message, name=place, value=found.get("start", 0.0))
         found |= {"derivative": law.derivative, "initial": values}
         return found if plain(start, place) == 0.0 else found | {"start": plain(start, place)}
+
+    def curve(self, place: str, given: Any) -> Any:
+        """Return a curve or a surface as a file holds it."""
+        if isinstance(given, SampledCurve):
+            name = self._file_of(place)
+            self.samples[name] = {letter: x.tolist() for letter, x in zip("xyz", given.points.T, strict=False)}
+            return {"samples": name, "closed": given.closed, "degree": given.degree}
+        if not isinstance(given, ParametricCurve):
+            return plain(given, place)
+        expressions = plain(given.expressions, place)
+        if given.range is None:
+            return expressions
+        found = {"expressions": expressions, "range": plain(given.range, f"{place}.range")}
+        return found | {"closed": True} if given.closed else found
+
+    def _file_of(self, place: str) -> str:
+        return f"{self.stem}_{re.sub(r'[^A-Za-z0-9_]+', '_', place)}.csv"
 
     def _following(self, place: str, law: FollowingMotion, element: Any) -> dict[str, Any]:
         """Return a law of the coordinate of a driver, by its name, or of an expression of t."""

@@ -24,6 +24,7 @@ from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
 from jounce.mechanism.builder import group_rows, with_reference
+from jounce.mechanism.carriages import ENDING
 from jounce.modules import with_fields
 from jounce.trajectory import AbstractMotion
 
@@ -314,7 +315,8 @@ def check_mobility(model: Model, found: Redundancy, *, free: bool = False) -> No
 def freely_moving(model: Model, directions: Float[np.ndarray, "direction column"]) -> str:
     """Name the bodies that move along directions of the coordinates, shape (directions, columns)."""
     sizes = np.linalg.norm(directions.reshape(len(directions), len(model.bodies), -1), axis=(0, 2))
-    return _concerned(sizes, model.bodies)
+    own = [k for k, name in enumerate(model.bodies) if not name.endswith(ENDING)]  # carriages move with the bodies
+    return _concerned(sizes[own], tuple(model.bodies[k] for k in own))
 
 
 def _concerned(weights: Float[np.ndarray, " name"], names: tuple[str, ...]) -> str:

@@ -282,21 +282,21 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePo
 
 def attitudes_between(
     times: Float[np.ndarray, " anchor"],
-    series: Float[np.ndarray, "order 4 bodies anchor"],
+    series: Float[np.ndarray, "order component bodies anchor"],
     instants: Float[np.ndarray, " time"],
-) -> Float[np.ndarray, "4 bodies time"]:
-    """Return attitudes at instants between anchors in order of time, by their series."""
+) -> Float[np.ndarray, "component bodies time"]:
+    """Return attitudes, or places, at instants between anchors in order of time, by their series."""
     after = np.clip(np.searchsorted(times, instants, side="right"), 1, max(len(times) - 1, 1))
     return blended_attitudes(times, series, (after - 1, np.minimum(after, len(times) - 1)), instants)
 
 
 def blended_attitudes(
     times: Float[np.ndarray, " anchor"],
-    series: Float[np.ndarray, "order 4 bodies anchor"],
+    series: Float[np.ndarray, "order component bodies anchor"],
     neighbours: tuple[Int[np.ndarray, " time"], Int[np.ndarray, " time"]],
     instants: Float[np.ndarray, " time"],
-) -> Float[np.ndarray, "4 bodies time"]:
-    """Return attitudes at instants by the series of the anchors before and after each, by index.
+) -> Float[np.ndarray, "component bodies time"]:
+    """Return attitudes, or places, at instants by the series of the anchors before and after each, by index.
 
     A share s of the way from one to the other, their errors are as s^n and (1 - s)^n, and so are the weights of the
     other one.

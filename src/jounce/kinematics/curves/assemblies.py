@@ -24,6 +24,7 @@ from jounce.kinematics.curves.starts import assemble_side_by_side
 from jounce.kinematics.curves.tracing import check_number, traced
 from jounce.kinematics.curves.walker import Walker
 from jounce.mechanism import Mechanism, build, check_mechanism
+from jounce.mechanism.carriages import check_without_ends
 from jounce.mechanism.preconditions import concrete
 from jounce.modules import with_fields
 from jounce.shapes import Real
@@ -187,6 +188,7 @@ def assemblies(
     [(1, 1), (2, 1)]
     """
     check_mechanism(mechanism)
+    check_without_ends(mechanism, "a search for assemblies")
     check_number("count", count, 1, 10**7, whole=True)
     check_number("seed", seed, 0, 2**63 - 1, whole=True)
     if time is not None:

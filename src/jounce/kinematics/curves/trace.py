@@ -7,6 +7,7 @@ from jounce.kinematics.curves.curve import Curve
 from jounce.kinematics.curves.start import first_instant
 from jounce.kinematics.curves.tracing import check_number, traced
 from jounce.mechanism import Mechanism, check_mechanism
+from jounce.mechanism.carriages import check_without_ends
 from jounce.mechanism.preconditions import concrete
 from jounce.shapes import Real
 
@@ -67,6 +68,7 @@ def trace(
     (True, [...])
     """
     check_mechanism(mechanism)
+    check_without_ends(mechanism, "a trace")
     check_number("order", order, 0, HIGHEST_ORDER, whole=True)
     check_number("count", count, 2, 10**7, whole=True)
     check_number("length", length, 1e-6, 1e6)

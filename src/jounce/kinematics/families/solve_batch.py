@@ -29,6 +29,7 @@ from jounce.mechanism import (
     with_outputs_held,
 )
 from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.carriages import has_ends
 from jounce.mechanism.law_breaks import laws_may_break, laws_of
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
@@ -232,6 +233,7 @@ class _Family:
         """Solve all designs: most side by side, the others alone, if they are wanted."""
         count = len(self.rows)
         apart = self.mechanism.assembly is not None or self._of_whole_motions() or self._pieces_vary()
+        apart = apart or has_ends(self.mechanism)  # which are found in whole motions
         left = np.arange(count) if apart else self._side_by_side(threads)
         if not (alone or apart):
             return

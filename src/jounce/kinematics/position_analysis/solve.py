@@ -21,6 +21,7 @@ from jounce.kinematics.continuation.path_following import FollowedPath, follow
 from jounce.kinematics.continuation.solver import NO_GRID, Solver
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.position_analysis.chunked_motion import Stretches
+from jounce.kinematics.position_analysis.curve_ends import beyond_end, cut_at_ends
 from jounce.kinematics.position_analysis.forces_at_rest import ask_forces_at_rest
 from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, prepare_blocks
 from jounce.kinematics.position_analysis.grid_storage import solve_grid
@@ -239,6 +240,9 @@ def _followed(
             for name, motion in led_outputs(mechanism).items():
                 error.message += f"; the driver {name} follows from the output {motion.output}, which must determine it"
             raise
+        if beyond := beyond_end(model, coordinates):
+            message = f"t = {first:g} s, {beyond}: end of curve: {Status.END_OF_CURVE.advice}"
+            raise SolveError(message, status=Status.END_OF_CURVE)
         solver = dataclasses.replace(solver, model=model)
         still = solver.still(coordinates)
         with rehearsed(partial(_prepare, solver, first), wanted=beside and _rank_is_open(guessed)):
@@ -248,7 +252,9 @@ def _followed(
     start = solver.beginning(still, first)
     on_the_way = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
     path = follow(solver, start, last, last - first, grid=on_the_way)
-    if not path.anchors:
+    if path.anchors:
+        path = cut_at_ends(path, model, on_the_way)
+    else:
         where = f"t = {first:g} s, {path.fault}"
         raise SolveError(f"{where}: {_words(path.status)}: {path.status.advice}", status=path.status)
     return solver, path

@@ -16,7 +16,7 @@ from jounce.errors import JounceError
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.output_types import OUTPUTS, output_holder
 from jounce.kinematics.curves.choice import chosen
-from jounce.mechanism import Mechanism, Model, build, time_grid, with_outputs_held
+from jounce.mechanism import Mechanism, Model, ParameterOutput, build, time_grid, with_outputs_held
 from jounce.mechanism.derivative_outputs import form_of
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve
@@ -261,7 +261,7 @@ def _power(base: str, power: int | Fraction) -> str:
 def _bodies(mechanism: Mechanism, model: Model, coordinates: dict[str, Any] | None) -> list[dict[str, Any]]:
     components, rows = POSITION_COMPONENTS[mechanism.space], []
     attitude = "angle" if components == 2 else "quaternion"
-    for k, (name, body) in enumerate(mechanism.bodies.items(), start=1):
+    for k, (name, body) in enumerate(mechanism.rigid_bodies.items(), start=1):
         mass, center, inertia = body_mass(name, body, mechanism.parameter_values, components, solid=False)
         given = body.mass is not None
         guess = _pose(model.guess, k, attitude)
@@ -323,7 +323,7 @@ def _law_words(law: Any) -> str:
 def _output(name: str, output: Any) -> dict[str, Any]:
     form = form_of(output)
     words, holder = [word for word, kind in OUTPUTS if kind is form], output_holder(form)
-    of = list(output.bodies) if form.body_count else []
-    of = of or [getattr(output, holder, holder)]  # an energy may be that of the mechanism
+    own = list(output.bodies) if form.body_count and not isinstance(output, ParameterOutput) else []  # or a carriage
+    of = own or [getattr(output, holder, holder)]  # an energy may be that of the mechanism
     quantity = (words[-1] if words else type(output).__name__) or "point"
     return {"name": name, "quantity": quantity, "unit": output.unit, "of": of}

@@ -100,7 +100,7 @@ def motion_facts(motion: Motion | Stretches) -> dict[str, Any]:
     facts = {
         "title": mechanism.title,
         "space": mechanism.space,
-        "bodies": list(mechanism.bodies),
+        "bodies": list(mechanism.rigid_bodies),
         "joints": list(mechanism.joints),
         "drivers": list(mechanism.drivers),
         "forces": list(mechanism.forces),

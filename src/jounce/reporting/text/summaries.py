@@ -39,6 +39,7 @@ def motion_summary(facts: Facts, file: str) -> str:
         lines = [title, head, facts["mobility"], taken, *_conservation_lines(facts), *facts["remarks"]]
         return "\n".join(wrapped(line) for line in lines)
     equations, drives = facts["equations_of_joints"], facts["equations_of_drivers"]
+    bodies = _with_carriages(bodies, facts, facts["coordinates"])
     bodies, joints = f"{bodies} ({facts['coordinates']} coordinates)", f"{joints} ({count(equations, 'equation')})"
     lines = [title, f"{facts['space']}: {bodies}, {joints}", freedom_words(drives, facts["drivers"])]
     lines.append(f"{instants} {interval}, {order}")
@@ -48,6 +49,12 @@ def motion_summary(facts: Facts, file: str) -> str:
         lines.append(f"passes a change point, where another motion could branch off, at t = {passed}{more}")
     lines += [wrapped(remark) for remark in facts["remarks"]]
     return "\n".join(lines)
+
+
+def _with_carriages(words: str, facts: Facts, coordinates: int) -> str:
+    """Word how many bodies there are, and how many carriages, which have the parameters of curves."""
+    carriages = coordinates // (3 if facts["space"] == "planar" else 6) - len(facts["bodies"])
+    return f"{words} and {count(carriages, 'carriage on a curve', 'carriages on curves')}" if carriages else words
 
 
 def _conservation_lines(facts: Facts) -> list[str]:
@@ -90,6 +97,7 @@ def start_heading(facts: Facts) -> str:
 def _mechanism_start(facts: Facts) -> list[str]:
     freedom, assembly, time = facts["freedom"], facts["assembly"], facts["time"]
     bodies = count(len(facts["bodies"]), "moving body", "moving bodies")
+    bodies = _with_carriages(bodies, facts, facts["freedom"]["coordinates"])
     lines = [
         "Degrees of freedom",
         f"  {bodies}: {count(freedom['coordinates'], 'coordinate')}",

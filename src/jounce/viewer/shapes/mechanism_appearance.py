@@ -46,7 +46,9 @@ def mechanism_appearance(motion: Motion) -> Appearance:
     """
     mechanism = motion.mechanism
     seen, planar = skeleton(mechanism), mechanism.space == "planar"
-    colours = {body: BODY_COLOURS[k % len(BODY_COLOURS)] for k, body in enumerate(mechanism.bodies)} | {GROUND: DARK}
+    colours = {body: BODY_COLOURS[k % len(BODY_COLOURS)] for k, body in enumerate(mechanism.rigid_bodies)} | {
+        GROUND: DARK
+    }
     meshes: dict[str, list[ColouredMesh]] = {body: [] for body in seen.links}
     for body, mesh, colour in (planar_meshes if planar else spatial_meshes)(motion, seen, colours):
         meshes[body].append(ColouredMesh(mesh, colour))

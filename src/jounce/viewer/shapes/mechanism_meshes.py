@@ -11,6 +11,7 @@ from trimesh import Trimesh
 
 from jounce.kinematics import Motion
 from jounce.mechanism.mechanism import GROUND
+from jounce.plot.curve_lines import shown
 from jounce.plot.frames import frames, points_at, within
 from jounce.plot.geometry import Point, Skeleton, Symbol, Wheel
 from jounce.viewer.shapes.appearance import DARK, GREY, Colour
@@ -48,6 +49,9 @@ def planar_meshes(motion: Motion, skeleton: Skeleton, colours: Mapping[str, Colo
             yield from _pins(symbol, layer, size)
         if symbol.kind in ("prismatic", "slot"):
             yield from _planar_slide(motion, symbol, layer, size)
+        if symbol.kind == "curve":
+            yield from _pins(symbol, layer, size)
+            yield from _groove(motion, symbol, size, layer[symbol.bodies[0]])
     for symbol in skeleton.drivers:
         if symbol.kind == "slide":
             yield from _planar_slide(motion, symbol, layer, size)
@@ -119,6 +123,16 @@ def _planar_slide(motion: Motion, symbol: Symbol, layer: Mapping[str, float], si
         yield second, box([0.085 * size, 0.05 * size, 0.9 * thick], center, _turned_to(symbol.axis_on(1))), DARK
 
 
+def _groove(motion: Motion, symbol: Symbol, size: float, level: float = 0.0) -> Pieces:
+    """Give the curve or the lines of a surface on the first body, those of a planar body at the level of its layer."""
+    whole, body = frames(motion), symbol.bodies[0]
+    visited = within(whole[body], points_at(whole[symbol.bodies[1]], symbol.points[1]))
+    radius = (0.5 if symbol.kind == "curve" else 0.15) * BAR * size
+    for line in shown(symbol.curve, visited, 0.1 * size):
+        high = np.full((len(line), 1), level + 0.4 * THICKNESS * size)
+        yield body, tube(np.concatenate([line, high], axis=1)[:, :3] if line.shape[1] == 2 else line, radius), GREY
+
+
 def _turned_to(axis: Point) -> Float[np.ndarray, "3 3"]:
     """Return the rotation about z that turns x to an axis in the plane."""
     x, y = axis / np.linalg.norm(axis)
@@ -150,6 +164,9 @@ def spatial_meshes(motion: Motion, skeleton: Skeleton, colours: Mapping[str, Col
     for symbol in skeleton.symbols:
         if symbol.kind in ("prismatic", "cylindrical", "screw"):
             yield from _spatial_slide(motion, symbol, skeleton.size)
+        elif symbol.kind in ("curve", "surface"):
+            yield from _groove(motion, symbol, skeleton.size)
+            yield symbol.bodies[1], sphere(1.3 * radius, symbol.points[1]), DARK
         else:
             yield from _spatial_joint(symbol, skeleton.size)
 

@@ -120,7 +120,7 @@ class MechanismRecording(Recording):
             words = tuple(quantity_word(outputs[name], k) for k in range(values.shape[1]))
             unit, factor = units.of(outputs[name].unit, name)
             quantities[name] = self._quantity(unit, values * factor, words, outputs[name].labels)
-        return quantities or dict(map(self._turning, self.solution.mechanism.bodies))
+        return quantities or dict(map(self._turning, self.solution.mechanism.rigid_bodies))
 
     def _turning(self, body: str) -> tuple[str, Quantity]:
         rates = [quantity_word(AngularVelocityOutput(body), k) for k in range(self.order + 1)]
@@ -188,7 +188,7 @@ def recorded(
         planar=mechanism.space == "planar",
         time=motion.time[solved],
         order=motion.order,
-        bodies=(ground, *mechanism.bodies),
+        bodies=(ground, *mechanism.rigid_bodies),
         position=position[solved],
         quaternion=quaternion[solved],
         values={name: float(value) for name, value in mechanism.parameter_values.items()},

@@ -1,0 +1,174 @@
+"""Carriages: bodies without mass whose places are the hidden coordinates of joints, such as the parameter of a curve.
+
+The carriage of a joint is a body of the mechanism beside those of its user. Its first coordinates are the parameters,
+in units of the curve, and its last one is that unit, so that their ratio is known from its pose alone.
+"""
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+
+from jounce.errors import MechanismError, UnsupportedError
+from jounce.jet import Jet
+from jounce.trajectory.curve_checks import derivatives_at
+from jounce.trajectory.curves import HALF_WINDOW, CurveLaw, ParametricCurve, SampledCurve
+
+ENDING = ".s"
+PLACES = 721  # of a curve, and to each side of a surface its root, where it may be nearest
+ALIKE, SLIGHT = 1.25, 1e-6  # how much farther, and of the size of a curve, another part may be and count as near
+STEPS = 40
+
+
+def carriage_of(joint: str) -> str:
+    """Return the name of the carriage of a joint.
+
+    Examples
+    --------
+    >>> carriage_of("track")
+    'track.s'
+    """
+    return joint + ENDING
+
+
+def carriages(place: str, element: Any) -> tuple[str, ...]:
+    """Return the names of the carriages that a joint has beside its bodies; `place` is its dotted name, or its name."""
+    return (carriage_of(place.partition(".")[2] or place),) if getattr(element, "hidden", ()) else ()
+
+
+def joint_of(carriage: str) -> str:
+    """Return the name of the joint that a carriage belongs to."""
+    return carriage.removesuffix(ENDING)
+
+
+def curve_in(values: Mapping[str, Any]) -> CurveLaw:
+    """Return the curve or the surface among the values of a joint in numbers."""
+    return next(value for value in values.values() if isinstance(value, CurveLaw))
+
+
+def carriage_guess(curve: CurveLaw, start: Any, place: Any) -> Any:
+    """Return where a carriage starts.
+
+    Parameters
+    ----------
+    curve : CurveLaw
+        Of the joint.
+    start : list of float or None
+        Guess of the parameters; None for what is nearest.
+    place : array of shape (components,)
+        Where the point is, at the starting guess of the bodies, in the frame of the curve, m.
+
+    Raises
+    ------
+    MechanismError
+        If the start is beyond an end, or if several parts of the curve are as near.
+    """
+    count = len(place)
+    if start is None:
+        start = [_nearest(curve, place)] if len(curve.components) and _is_curve(curve) else [0.0, 0.0]
+    elif curve.ends is not None and not any(isinstance(x, Tracer) for x in (*curve.ends, *start)):
+        for k, value in enumerate(start):
+            low, high = (float(x) for x in curve.ends[2 * k : 2 * k + 2])
+            if not low <= float(value) <= high:
+                message = f"the start must be between the ends of the curve, {low:.6g} and {high:.6g}"
+                raise MechanismError(message, name="start", value=float(value))
+    parts = [x * curve.unit for x in start]
+    whole = (*parts, *[0.0] * (count - 1 - len(parts)), curve.unit)
+    if any(isinstance(x, Tracer) for x in whole):
+        return jnp.stack([jnp.asarray(x, float) for x in whole])
+    return np.array([float(x) for x in whole])
+
+
+def _is_curve(curve: CurveLaw) -> bool:
+    names = getattr(curve.components[0], "names", ("s",))
+    return len(names) == 1
+
+
+def _nearest(curve: CurveLaw, place: Any) -> Any:
+    """Return the parameter where a curve is nearest to a place."""
+    low, high = (-HALF_WINDOW, HALF_WINDOW)
+    if curve.ends is not None:
+        low, high = _plain(curve.ends)
+    elif curve.lap is not None:
+        low, high = 0.0, _plain((curve.lap,))[0]
+    grid = np.linspace(low, high, PLACES)
+    if any(isinstance(x, Tracer) for x in jax.tree.leaves((curve, place))):  # it was looked at before JAX traced it
+        points = curve(Jet([jnp.asarray(grid)])).coefficients[0]
+        far = jnp.sum((points - jnp.asarray(place)[:, None]) ** 2, axis=0)
+        return jnp.asarray(grid)[jnp.nanargmin(far)]
+
+    away = partial(derivatives_at, curve.components)
+    points = away(grid)[0]
+    size = float(np.ptp(np.where(np.isfinite(points), points, 0.0), axis=1).max()) or 1.0
+    far = np.linalg.norm(points - np.asarray(place)[:, None], axis=0)
+    far = np.where(np.isfinite(far), far, np.inf)
+    before, after = np.append(np.inf, far[:-1]), np.append(far[1:], np.inf)
+    near = np.flatnonzero((far <= before) & (far <= after) & np.isfinite(far))
+    step = (high - low) / (PLACES - 1)
+    lower, upper = np.maximum(grid[near] - step, low), np.minimum(grid[near] + step, high)
+    for _ in range(STEPS):  # by thirds
+        a, b = lower + (upper - lower) / 3, upper - (upper - lower) / 3
+        sizes = np.split(np.linalg.norm(away(np.concatenate([a, b]))[0] - np.asarray(place)[:, None], axis=0), 2)
+        nearer = sizes[0] < sizes[1]
+        lower, upper = np.where(nearer, lower, a), np.where(nearer, b, upper)
+    found = 0.5 * (lower + upper)
+    points = away(found)[0]
+    distances = np.linalg.norm(points - np.asarray(place)[:, None], axis=0)
+    ranked = np.lexsort((np.abs(found), np.round(distances / (SLIGHT * size))))
+    best = int(ranked[0])
+    for k in ranked[1:]:
+        elsewhere = np.linalg.norm(points[:, k] - points[:, best]) > 100 * SLIGHT * size
+        crossing = (
+            not elsewhere and distances[best] < SLIGHT * size and _turned(away, float(found[best]), float(found[k]))
+        )
+        if (elsewhere or crossing) and distances[k] <= ALIKE * distances[best] + SLIGHT * size:
+            names = " and ".join(f"s = {found[j]:.4g}" for j in sorted((best, int(k)), key=lambda j: found[j]))
+            message = f"two parts of the curve are about as near to the starting guess, at {names}; give start"
+            raise MechanismError(message, name="start")
+    return float(found[best])
+
+
+def _plain(values: Any) -> list[Any]:
+    return [x if isinstance(x, Tracer) else float(x) for x in values]
+
+
+def _turned(away: Any, first: float, second: float) -> bool:
+    """Tell whether the tangents at two values of a parameter have different directions."""
+    tangents = away(np.array([first, second]))[1]
+    tangents = tangents / np.linalg.norm(tangents, axis=0)
+    return abs(float(tangents[:, 0] @ tangents[:, 1])) < 1 - 1e-6
+
+
+def has_ends(mechanism: Any) -> bool:
+    """Tell whether a mechanism holds a point on a curve, or on a surface, that has ends."""
+    parts = (part for joint in mechanism.joints.values() if joint.hidden for part in vars(joint).values())
+    curves = [part for part in parts if isinstance(part, ParametricCurve | SampledCurve)]
+    return any(not curve.closed and getattr(curve, "range", curve) is not None for curve in curves)
+
+
+def check_without_ends(mechanism: Any, what: str) -> None:
+    """Raise UnsupportedError if a mechanism has curves with ends, which are not looked for."""
+    if has_ends(mechanism):
+        message = (
+            f"{what} does not look for the ends of curves yet, and would go on beyond; give a curve without a range"
+        )
+        raise UnsupportedError(message, name="joints")
+
+
+def with_carriages(bodies: Mapping[str, Any], joints: Mapping[str, Any], kind: type[Any]) -> Mapping[str, Any]:
+    """Return the bodies of a mechanism, those of its user first, and then the carriages of its joints.
+
+    `kind` is the class of carriages; the place of a new one is None, as it follows from the guess of the bodies.
+    """
+    wanted = [carriage for name, joint in joints.items() for carriage in carriages(name, joint)]
+    own = {name: body for name, body in bodies.items() if not isinstance(body, kind)}
+    if not wanted and len(own) == len(bodies):
+        return bodies
+    for name in (name for name in wanted if name in own):
+        message = "this name is that of the carriage of a joint; give the body another one"
+        raise MechanismError(message, name=f"bodies.{name}")
+    return {**own, **{name: bodies.get(name) or kind(None) for name in wanted}}

@@ -1,0 +1,82 @@
+"""The lines of curves and surfaces that joints hold points on, in the frame of the body that has them."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.mechanism import Mechanism
+from jounce.mechanism.resolve import resolve_element
+from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.trajectory.curve_checks import derivatives_at
+from jounce.trajectory.curves import HALF_WINDOW, CurveLaw
+
+__all__ = ["CurveLines", "curve_lines", "shown"]
+
+PLACES, ACROSS = 401, 9  # of a curve; lines of a surface in each direction, with as many places
+AROUND = 0.4  # of the way of a point: how far around it an endless curve is shown
+PERIODIC = 1e-6  # of its size: how nearly an endless curve comes back
+
+
+class CurveLines(NamedTuple):
+    """Lines, each (places, components), m, and whether they are all that there is: those of an endless curve go on."""
+
+    lines: tuple[Float[np.ndarray, "place component"], ...]
+    whole: bool
+
+
+NONE = CurveLines((), True)
+
+
+def curve_lines(mechanism: Mechanism, name: str) -> CurveLines:
+    """Return the lines of the curve or the surface of a joint, by its name; none where it has neither."""
+    element: Any = mechanism.joints[name]
+    if not element.hidden:
+        return NONE
+    size = POSITION_COMPONENTS[mechanism.space]
+    values = resolve_element(element, mechanism.parameter_values, size, f"joints.{name}")
+    curve = next(value for value in values.values() if isinstance(value, CurveLaw))
+    if len(element.hidden) > 1:
+        return CurveLines(() if curve.ends is None else _net(curve, [float(x) for x in curve.ends]), True)
+    start = float(values["start"] or 0.0)
+    low, high = start - HALF_WINDOW, start + HALF_WINDOW
+    if curve.ends is not None:
+        low, high = (float(x) for x in curve.ends)
+    elif curve.lap is not None:
+        low, high = 0.0, float(curve.lap)
+    line = derivatives_at(curve.components, np.linspace(low, high, PLACES))[0].T
+    bounded = curve.ends is not None or curve.lap is not None
+    laps = np.linalg.norm(line[-1] - line[0]) <= PERIODIC * np.ptp(line, axis=0).max()
+    return CurveLines((line,), bounded or bool(laps))
+
+
+def _net(curve: CurveLaw, ends: list[float]) -> tuple[Float[np.ndarray, "place component"], ...]:
+    """Return lines of a surface along both of its parameters."""
+    (first, last), (low, high) = ends[:2], ends[2:]
+    u, v = np.linspace(first, last, PLACES // 8), np.linspace(low, high, PLACES // 8)
+    across = [(np.full(len(v), x), v) for x in np.linspace(first, last, ACROSS)]
+    along = [(u, np.full(len(u), x)) for x in np.linspace(low, high, ACROSS)]
+    return tuple(derivatives_at(curve.components, *places)[0].T for places in (*across, *along))
+
+
+def shown(found: CurveLines, visited: Float[np.ndarray, "time component"], least: float) -> list[Any]:
+    """Return lines as they are shown: of an endless curve what is near to the places visited, in the same frame."""
+    known = visited[np.isfinite(visited).all(axis=1)]
+    if found.whole or not len(known):
+        return list(found.lines)
+    low, high = known.min(axis=0), known.max(axis=0)
+    margin = max(AROUND * float(np.linalg.norm(high - low)), least)
+    parts = []
+    for line in found.lines:
+        inside = ((line >= low - margin) & (line <= high + margin)).all(axis=1)
+        nearest = int(np.argmin(np.linalg.norm(line - known[0], axis=1)))
+        first = last = nearest
+        while first > 0 and inside[first - 1]:
+            first -= 1
+        while last < len(line) - 1 and inside[last + 1]:
+            last += 1
+        if last > first:
+            parts.append(line[first : last + 1])
+    return parts

@@ -1,0 +1,207 @@
+"""Whether a curve is smooth: corners, gaps, jumps of curvature and cusps are told by where they are."""
+
+import re
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import MechanismError
+from jounce.jet import Jet
+
+Places = Float[np.ndarray, " place"]
+Values = Float[np.ndarray, "level component place"]
+
+LANES = 1024  # places that are evaluated together, whatever is asked: nothing is compiled for other numbers
+PLACES = 801  # of a curve that are looked at
+HALVINGS = 45  # of an interval, until nothing but a jump is left in it
+LEVELS = 4  # derivatives by the parameter that may not jump
+JUMP = 1e-6  # of the largest value: what is no rounding
+CUSP = 1e-6  # of the median of the tangents
+SLOW = 0.3  # of it: a tangent that may go on to vanish
+NARROWINGS = 70  # of an interval, for the place where a tangent is least
+SHARPEST = 50.0  # deg between chords
+WIDEST = 8.0  # times the median of the chords
+SMOOTH = {"sin", "cos", "tan", "exp", "sinh", "cosh", "tanh", "atan", "asinh", "erf", "expm1"}
+_POWER = re.compile(r"\*\*\s*[0-9]+(?![0-9.eE])")  # a whole number
+_FUNCTION = re.compile(r"([A-Za-z_]\w*)\s*\(")
+
+
+def refuses_without_ends(formulas: Sequence[Any]) -> str:
+    """Return the function in the expressions of a curve that is not smooth everywhere: a range must say where it is."""
+    texts = [f.expression.text for f in formulas]
+    words = {word for text in texts for word in _FUNCTION.findall(text)} - SMOOTH
+    if words:
+        return min(words)
+    return "a power" if any(len(_POWER.findall(text)) < text.count("**") for text in texts) else ""
+
+
+def check_curve(formulas: Sequence[Any], window: Sequence[float], *, stated: bool, closed: bool) -> None:
+    """Raise MechanismError for a corner, a gap or a cusp between two values of the parameter of a curve.
+
+    Parameters
+    ----------
+    formulas : sequence of callable
+        Coordinates on jets of the parameter.
+    window : sequence of two float
+        Where to look.
+    stated : bool
+        Whether the curve is to be defined all along.
+    closed : bool
+        Whether its end is its beginning.
+    """
+
+    def at(places: Places) -> Values:
+        return derivatives_at(formulas, places)
+
+    low, high = window
+    places = np.linspace(low, high, PLACES)
+    values = at(places)
+    finite = np.isfinite(values[:2]).all(axis=(0, 1))
+    if stated and not finite.all():
+        where = float(places[np.argmin(finite)])
+        raise MechanismError(f"the curve or its tangent is not finite at s = {where:.6g}; state a range where they are")
+    known = np.where(finite)[0]
+    if not known.size:
+        return
+    _check_cusps(at, places[known], values[:, :, known])
+    if any(_may_break(f.expression.text) for f in formulas):
+        _check_jumps(at, places, values)
+    if closed:
+        _check_seam(at, low, high, values)
+
+
+def derivatives_at(formulas: Sequence[Any], places: Places, *others: Places) -> Values:
+    """Return coordinates of a curve, or of a surface along its first parameter, with their derivatives by it."""
+    found = []
+    for first in range(0, len(places), LANES):
+        given = [np.resize(x[first : first + LANES], LANES) for x in (places, *others)]
+        moved, *still = (jnp.asarray(x) for x in given)
+        jets = [Jet.variable(moved, LEVELS), *(Jet.constant(x, LEVELS) for x in still)]
+        count = len(places[first : first + LANES])
+        parts = [np.stack([np.asarray(c) for c in f(*jets).dense().derivatives()]) for f in formulas]
+        found.append(np.stack(parts, axis=1)[..., :count])
+    return np.concatenate(found, axis=-1)
+
+
+def _may_break(text: str) -> bool:
+    """Tell whether an expression may have kinks or poles."""
+    return "/" in text or "**" in text or not set(_FUNCTION.findall(text)) <= SMOOTH - {"tan"}
+
+
+def _check_cusps(at: Callable[[Places], Values], places: Places, values: Values) -> None:
+    speed = np.linalg.norm(values[1], axis=0)
+    usual = float(np.median(speed))
+    if usual == 0:
+        raise MechanismError("the curve is a single point: its tangent vanishes everywhere")
+    before, after = np.append(np.inf, speed[:-1]), np.append(speed[1:], np.inf)
+    least = np.flatnonzero((speed <= before) & (speed <= after) & (speed < SLOW * usual))
+    if not least.size:
+        return
+    low, high = places[np.maximum(least - 1, 0)], places[np.minimum(least + 1, len(places) - 1)]
+    for _ in range(NARROWINGS):  # by thirds, where the tangent is longer
+        near, far = low + (high - low) / 3, high - (high - low) / 3
+        sizes = np.split(np.linalg.norm(at(np.concatenate([near, far]))[1], axis=0), 2)
+        nearer = sizes[0] < sizes[1]
+        low, high = np.where(nearer, low, near), np.where(nearer, far, high)
+    middle = 0.5 * (low + high)
+    candidates = np.concatenate([middle, places[least]])
+    sizes = np.linalg.norm(at(candidates)[1], axis=0)
+    if sizes.min() < CUSP * usual:
+        where = float(candidates[np.argmin(sizes)])
+        message = f"the curve has a cusp at s = {_shown(where)}: its tangent vanishes there, and no motion along it"
+        raise MechanismError(f"{message} is determined; leave that place out by a range, or take another parameter")
+
+
+def _check_jumps(at: Callable[[Places], Values], places: Places, values: Values) -> None:
+    """Halve every interval between places, keeping the half in which values change more: a jump is what stays."""
+    sizes = np.max(np.where(np.isfinite(values), np.abs(values), 0.0), axis=(1, 2))
+
+    def change(a: Values, b: Values) -> Float[np.ndarray, "level place"]:
+        return np.nan_to_num(np.abs(a - b).max(axis=1), nan=0.0, posinf=1e300) / np.maximum(sizes, 1e-300)[:, None]
+
+    for level in range(LEVELS + 1):
+        low, high, first, last = places[:-1], places[1:], values[..., :-1], values[..., 1:]
+        for _ in range(HALVINGS):
+            if not (change(first, last)[level] > JUMP).any():
+                break
+            middle = 0.5 * (low + high)
+            between = at(middle)
+            left = change(first, between)[level] >= change(between, last)[level]
+            low, high = np.where(left, low, middle), np.where(left, middle, high)
+            first, last = np.where(left, first, between), np.where(left, between, last)
+        else:
+            jumps = change(first, last)[level]
+            if jumps.max() > JUMP:
+                where = _shown(float(low[np.argmax(jumps)]))
+                raise MechanismError(f"the curve {_WORDS[level]} at s = {where}; {_ADVICE}")
+
+
+_WORDS = (
+    "has a gap",
+    "has a corner",
+    "has a jump of its curvature",
+    *(f"has a jump of its derivative {k} by s" for k in (3, 4)),
+)
+_ADVICE = "it must be smooth where a point moves along it: round it off, or leave that place out by a range"
+
+
+def _check_seam(at: Callable[[Places], Values], low: float, high: float, values: Values) -> None:
+    """Compare what follows the end of a closed curve with what follows its beginning."""
+    since = np.linspace(0.0, 0.3 * (high - low), 7)
+    begins, ends = at(low + since), at(high + since)
+    sizes = np.abs(values).max(axis=(1, 2))
+    sizes[0] = max(np.ptp(values[0], axis=1))
+    if (away := np.linalg.norm(ends[0, :, 0] - begins[0, :, 0])) > JUMP * sizes[0]:
+        raise MechanismError(
+            f"the curve does not close: there is a gap of {away:.3g} m between its end and its beginning"
+        )
+    for level in range(1, LEVELS + 1):
+        if np.abs(ends[level, :, 0] - begins[level, :, 0]).max() > JUMP * max(sizes[level], sizes[1]):
+            raise MechanismError(f"the curve {_WORDS[level]} where its end meets its beginning; {_ADVICE}")
+    if np.abs(ends[0] - begins[0]).max() > JUMP * sizes[0]:
+        message = "the expressions of a closed curve must go on periodically beyond its end, as sines do"
+        raise MechanismError(f"{message}; give the curve by samples")
+
+
+def check_points(points: np.ndarray, *, closed: bool, least: int) -> Float[np.ndarray, "point component"]:
+    """Return points of a curve, the first once more at the end of a closed one; raise MechanismError if not smooth."""
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise MechanismError("points of a curve are rows of two or three numbers", name="points", value=points.shape)
+    bad = np.argwhere(~np.isfinite(points))
+    if len(bad):
+        raise MechanismError("must be finite", name=f"points[{bad[0][0]}]", value=points[bad[0][0]].tolist())
+    size = float(np.ptp(points, axis=0).max(initial=0.0))
+    if closed and len(points) and np.linalg.norm(points[-1] - points[0]) > 1e-9 * size:
+        points = np.concatenate([points, points[:1]])
+    elif closed:
+        points = np.concatenate([points[:-1], points[:1]])
+    if len(points) <= least:
+        raise MechanismError(f"a curve needs at least {least + 1} points; give more", name="points", value=len(points))
+    steps = np.diff(points, axis=0)
+    chords = np.linalg.norm(steps, axis=1)
+    if (chords <= 1e-12 * size).any():
+        row = int(np.argmin(chords)) + 1
+        raise MechanismError("this point repeats the one before", name=f"points[{row}]", value=points[row].tolist())
+    if chords.max() > WIDEST * np.median(chords):
+        row = int(np.argmax(chords))
+        places = " and ".join(str(points[k].tolist()) for k in (row, row + 1))
+        message = f"there is a gap of {chords[row]:.3g} m between {places}, where others are"
+        raise MechanismError(
+            f"{message} {np.median(chords):.3g} m apart; give points between, all nearly evenly", name=f"points[{row}]"
+        )
+    along = steps / chords[:, None]
+    after = np.roll(along, -1, axis=0) if closed else along[1:]
+    cosine = (along[: len(after)] * after).sum(axis=1)
+    if cosine.min() < np.cos(np.radians(SHARPEST)):
+        row = int(np.argmin(cosine)) + 1
+        angle = np.degrees(np.arccos(np.clip(cosine.min(), -1, 1)))
+        message = f"the curve has a corner of {angle:.0f} deg; round it off, or give more points"
+        raise MechanismError(message, name=f"points[{row % (len(points) - 1)}]", value=points[row].tolist())
+    return points
+
+
+def _shown(value: float) -> str:
+    return f"{0.0 if abs(value) < 1e-9 else value:.6g}"

@@ -1,0 +1,300 @@
+"""Curves and surfaces fixed in a body, by expressions of parameters or through samples, as functions on jets."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from functools import lru_cache, partial
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import Float
+
+from jounce.errors import JounceError, MechanismError, whole_number
+from jounce.jet import Jet, stack
+from jounce.modules import Module
+from jounce.shapes import ArrayLike, real_numbers
+from jounce.trajectory.curve_checks import check_curve, check_points, derivatives_at, refuses_without_ends
+from jounce.trajectory.motion import SplineMotion
+from jounce.units.expression import Expression
+
+HALF_WINDOW = 2 * np.pi  # of a parameter, on either side of the start, where a curve is looked at that states no range
+LOOKS = 65  # places of a curve by which its size is measured
+
+
+@dataclasses.dataclass(frozen=True)
+class ParametricCurve:
+    """A curve given by expressions of its parameter ``s``, or a surface by those of ``u`` and ``v``.
+
+    Parameters
+    ----------
+    expressions : sequence of str or Expression
+        One for each coordinate in the frame of the body, m; they may contain parameters of the mechanism.
+    range : sequence of two numbers, optional
+        First and last value of the parameter: the ends of the curve, or one lap where it is closed; of a surface two
+        pairs. Without it the curve goes on as far as its expressions do.
+    closed : bool, default False
+        Whether the curve comes back to its beginning and goes on smoothly there.
+
+    Raises
+    ------
+    MechanismError
+        If a closed curve has no range.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> jn.ParametricCurve(["0.2*cos(s)", "0.1*sin(s)"], range=[0, "2*pi"], closed=True).closed
+    True
+    """
+
+    expressions: tuple[Any, ...]
+    range: Any = None
+    closed: bool = False
+
+    def __post_init__(self) -> None:
+        given = self.expressions
+        if isinstance(given, str) or not isinstance(given, Sequence):
+            raise MechanismError("must be a list of expressions, one for each coordinate", value=given)
+        object.__setattr__(self, "expressions", tuple(given))
+        if self.range is not None:
+            object.__setattr__(self, "range", tuple(tuple(x) if isinstance(x, list) else x for x in self.range))
+        if not isinstance(self.closed, bool):
+            raise MechanismError("must be true or false", name="closed", value=self.closed)
+        if self.closed and self.range is None:
+            message = "a closed curve states the range of its parameter that is one lap, such as [0, 2*pi]"
+            raise MechanismError(message, name="range")
+
+
+class SampledCurve(Module):
+    """A smooth curve through points, its parameter the length along their chords, m.
+
+    Parameters
+    ----------
+    points : array_like of shape (points, components)
+        In the frame of the body, m, in their order along the curve; the first need not be repeated at the end of a
+        closed one.
+    closed : bool, default False
+        Whether the curve goes on from the last point to the first.
+    degree : int, default 5
+        Of the spline, odd; derivatives by the parameter are continuous up to that below it.
+
+    Raises
+    ------
+    MechanismError
+        If the points are too few, are not finite, repeat, or make a corner or a gap.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import jounce as jn
+    >>> angle = 2 * np.pi * np.arange(60) / 60
+    >>> circle = jn.SampledCurve(np.stack([np.cos(angle), np.sin(angle)], axis=1), closed=True)
+    >>> round(circle.length, 2)
+    6.28
+    """
+
+    parameter: Any
+    points: Any
+    closed: bool = eqx.field(static=True)
+    degree: int = eqx.field(static=True)
+
+    def __init__(self, points: ArrayLike, closed: bool = False, degree: int = 5):
+        found = real_numbers("points", points, MechanismError)
+        self.degree = whole_number("degree", degree, 1, 11, error=MechanismError)
+        if not isinstance(closed, bool):
+            raise MechanismError("must be true or false", name="closed", value=closed)
+        if closed and self.degree % 2 == 0:
+            raise MechanismError("a closed curve needs a spline of odd degree", name="degree", value=degree)
+        found = check_points(found, closed=closed, least=self.degree + 1)
+        chords = np.linalg.norm(np.diff(found, axis=0), axis=1)
+        self.parameter, self.points, self.closed = np.concatenate([[0.0], np.cumsum(chords)]), found, closed
+
+    @property
+    def length(self) -> float:
+        """Length of all chords, m: where the parameter ends, or begins again."""
+        return float(self.parameter[-1])
+
+
+class CurveLaw(Module):
+    """A curve or a surface in numbers: maps jets of its parameters to the jet of a point, (components, ...), m.
+
+    Parameters
+    ----------
+    components : tuple
+        Functions of the parameters, one for each coordinate.
+    ends : tuple of numbers, optional
+        Least and greatest value of each parameter, in turn; None where there is no end.
+    unit : float
+        A length, m, by which the point moves with a unit of the parameters: that of a carriage.
+    lap : float, optional
+        How much of the parameter is a lap of a closed curve.
+    """
+
+    components: tuple[Any, ...]
+    ends: tuple[Any, ...] | None
+    unit: Any
+    lap: Any = None
+
+    def __call__(self, *parameters: Jet) -> Float[Jet, "component *batch"]:
+        """Return the point."""
+        return stack([component(*parameters) for component in self.components])
+
+
+class _Formula(Module):
+    """One coordinate by an expression."""
+
+    expression: Expression = eqx.field(static=True)
+    names: tuple[str, ...] = eqx.field(static=True)
+    known: dict[str, Any]
+
+    def __call__(self, *parameters: Jet) -> Jet:
+        value = self.expression.evaluate({**self.known, **dict(zip(self.names, parameters, strict=True))})
+        if isinstance(value, Jet):
+            return value
+        first = parameters[0]
+        return Jet.constant(jnp.zeros_like(first.coefficients[0]) + value, first.order)
+
+
+def resolve_curve(
+    given: Any, names: tuple[str, ...], components: int, start: Any, parameters: Mapping[str, Any]
+) -> CurveLaw:
+    """Return the curve or surface that a list of expressions, or a curve, stands for, checked unless JAX traces it.
+
+    Parameters
+    ----------
+    given : ParametricCurve, SampledCurve or sequence
+        As a user gives it.
+    names : tuple of str
+        Of the parameters of the curve: ``("s",)``, of a surface ``("u", "v")``.
+    components : int
+        2 in the plane, 3 in space.
+    start : array, or None
+        Where the parameters are guessed to start.
+    parameters : mapping
+        Values of the other names in expressions.
+
+    Raises
+    ------
+    MechanismError
+        If it is neither, or is not smooth: a corner, a gap, a cusp, with where it is.
+    """
+    if isinstance(given, SampledCurve):
+        return _through_points(given, names, components)
+    if not isinstance(given, ParametricCurve):
+        given = ParametricCurve(given)
+    if len(given.expressions) != components:
+        raise MechanismError(
+            f"must be {components} expressions, one for each coordinate", value=list(given.expressions)
+        )
+    if given.closed and len(names) > 1:
+        raise MechanismError("a surface is not closed; it goes on as far as its expressions do", name="closed")
+    formulas = tuple(_formula(entry, names, parameters) for entry in given.expressions)
+    ends = None if given.range is None else _range(given.range, len(names), parameters)
+    if ends is None and (word := refuses_without_ends(formulas)):
+        message = f"{word} may have kinks or ends; give the range of {' and '.join(names)} in which the curve is smooth"
+        raise MechanismError(message, name="range")
+    traced = any(isinstance(x, Tracer) for x in (*parameters.values(), *(ends or ())))
+    window = ends or tuple(x + sign * HALF_WINDOW for x in _near(start, len(names)) for sign in (-1, 1))
+    if not traced:
+        _checked(formulas, tuple(map(float, window)), bool(ends), given.closed, len(names))
+    lap = ends[1] - ends[0] if given.closed and ends else None
+    return CurveLaw(formulas, None if given.closed else ends, _unit(formulas, window), lap)
+
+
+def _near(start: Any, count: int) -> Float[np.ndarray, " parameter"]:
+    if start is None or any(isinstance(x, Tracer) for x in start):
+        return np.zeros(count)
+    return np.array(start, float)
+
+
+def _formula(given: Any, names: tuple[str, ...], parameters: Mapping[str, Any]) -> _Formula:
+    expression = _expression(given)
+    for name in sorted(expression.names & set(names) & set(parameters)):
+        message = f"the parameter '{name}' has the name of the parameter of a curve; give it another name"
+        raise MechanismError(message, value=expression.text)
+    expression.check({*parameters, *names})
+    return _Formula(expression, names, {name: parameters[name] for name in sorted(expression.names - {*names})})
+
+
+def _expression(given: Any) -> Expression:
+    return given if isinstance(given, Expression) else Expression(given if isinstance(given, str) else repr(given))
+
+
+def _range(given: Any, count: int, parameters: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return the least and the greatest value of each parameter, in turn."""
+    pairs = [given] if count == 1 else list(given)
+    if len(pairs) != count or not all(isinstance(pair, tuple | list) and len(pair) == 2 for pair in pairs):
+        words = "[first, last]" if count == 1 else "[[first, last], [first, last]], of u and of v"
+        raise MechanismError(f"must be {words}", name="range", value=given)
+    found = []
+    for pair in pairs:
+        try:
+            low, high = (_expression(x).evaluate(parameters) for x in pair)
+        except JounceError as error:
+            raise error.located(name="range") from None
+        if not isinstance(low, Tracer) and not isinstance(high, Tracer) and not low < high:
+            raise MechanismError(
+                "the first value must be below the last", name="range", value=[float(low), float(high)]
+            )
+        found += [low, high]
+    return tuple(found)
+
+
+@lru_cache(maxsize=200)
+def _checked_once(formulas: Any, window: tuple[float, ...], stated: bool, closed: bool) -> None:
+    names, parts = formulas
+    made = tuple(_Formula(expression, names, dict(known)) for expression, known in parts)
+    check_curve(made, window, stated=stated, closed=closed)
+
+
+def _checked(formulas: tuple[_Formula, ...], window: tuple[float, ...], stated: bool, closed: bool, count: int) -> None:
+    """Check the smoothness of curves; those of the same numbers were checked before."""
+    if count > 1:
+        return
+    parts = tuple((f.expression, tuple((k, float(v)) for k, v in f.known.items())) for f in formulas)
+    _checked_once((formulas[0].names, parts), window, stated, closed)
+
+
+def _unit(formulas: tuple[_Formula, ...], window: tuple[Any, ...]) -> Any:
+    """Return how far a point moves for a unit of the parameters, of several in the geometric mean, m."""
+    count, shares, lengths = len(window) // 2, np.linspace(0.05, 0.95, LOOKS), []
+    traced = any(isinstance(x, Tracer) for x in jax.tree.leaves((formulas, window)))
+    for moved in range(count):
+        turn = (moved, 1 - moved)[:count]
+        spread = (shares, (shares * 7.3) % 1.0)[:count]
+        given = [
+            window[2 * k] + (window[2 * k + 1] - window[2 * k]) * share for k, share in zip(turn, spread, strict=True)
+        ]
+        if traced:
+            jets = [Jet.variable(jnp.asarray(given[0]), 1), *(Jet.constant(jnp.asarray(x), 1) for x in given[1:])]
+            speed = sum(f(*(jets[k] for k in turn)).dense().coefficients[1] ** 2 for f in formulas)
+        else:
+            ordered = [partial(_turned, f, turn) for f in formulas]
+            speed = (derivatives_at(ordered, *map(np.asarray, given))[1] ** 2).sum(axis=0)
+        namespace = jnp if traced else np
+        lengths.append(namespace.sqrt(namespace.mean(namespace.where(namespace.isfinite(speed), speed, 0.0))))
+    found = lengths[0] if count == 1 else (lengths[0] * lengths[1]) ** 0.5
+    if isinstance(found, Tracer):
+        return found
+    return float(found) if float(found) > 0 else 1.0
+
+
+def _turned(formula: _Formula, turn: tuple[int, ...], *jets: Jet) -> Jet:
+    """Return a coordinate from jets of its parameters, the one that moves first."""
+    return formula(*(jets[k] for k in turn))
+
+
+def _through_points(given: SampledCurve, names: tuple[str, ...], components: int) -> CurveLaw:
+    if len(names) > 1:
+        raise MechanismError("a surface is given by expressions of u and v", name="surface")
+    points: Any = given.points
+    if points.shape[1] != components:
+        message = f"points of this curve have {components} coordinates"
+        raise MechanismError(message, name="samples", value=int(points.shape[1]))
+    beyond = "repeat" if given.closed else "continue"
+    laws = tuple(SplineMotion(given.parameter, column, given.degree, beyond) for column in points.T)
+    last = given.length
+    return CurveLaw(laws, None if given.closed else (0.0, last), 1.0, last if given.closed else None)
