@@ -28,6 +28,7 @@ Vector = Annotated[Any, "vector"]
 MotionLaw = Annotated[Any, "motion"]
 Wrenches = Annotated[Any, "wrenches"]
 Whole = Annotated[int, "whole"]
+Part = Annotated[Any, "part"]  # another joint or driver within one
 
 SPACES = ("planar", "spatial")
 ROLES = ("joint", "driver", "force")

@@ -14,7 +14,15 @@ from typing import Any
 from jounce.errors import MechanismError, no_such
 from jounce.units.dimensions import KINDS
 
-WORDS = ("Scalar", "Vector", "Law", "Laws", "Wrenches", "Whole")  # annotations that say what kind of value a field has
+WORDS = (
+    "Scalar",
+    "Vector",
+    "Law",
+    "Laws",
+    "Wrenches",
+    "Whole",
+    "Part",
+)  # annotations that say what kind of value a field has
 BODY_ENDINGS = ("_i", "_j", "_m")  # of fields, by the body that they are fixed in
 
 USUAL_DIMENSIONS: Mapping[str, str] = MappingProxyType(
@@ -276,7 +284,7 @@ def field_kinds(kind: type[Any]) -> Mapping[str, str]:
 
 
 def field_kind(field: dataclasses.Field) -> str:
-    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole`` or ``text``."""
+    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``part`` or ``text``."""
     if isinstance(field.type, str):  # under ``from __future__ import annotations``
         word = field.type.rpartition(".")[2].strip()
         return "motion" if word == "MotionLaw" else word.lower() if word in WORDS else "text"
