@@ -160,3 +160,9 @@ def test_what_is_no_cam_is_refused():
         jn.Cam(lift, planar.DoubleRevolute(("a", "b"), [0, 0], [0, 0], 1.0))
     renamed = dataclasses.replace(jn.Cam(lift, pin), bodies=("ground", "c", "d"))
     assert (renamed.follower.bodies, renamed.leader.bodies) == (("ground", "c"), ("ground", "d"))
+
+
+def test_the_least_preload_that_keeps_contact_at_a_dwell(tmp_path):
+    """At 200 rpm the least force is that at rest, below: the spring and the weight of 1 kg balance at 46 mm."""
+    found = jn.dynamics.contact_spring(jn.load("examples/camshaft.yaml"), "cam", "spring", np.linspace(0, 0.3, 31))
+    np.testing.assert_allclose([found.free, found.margin], [0.046 + 9.81 / 5000, 5000 * 0.016 + 9.81], rtol=1e-9)
