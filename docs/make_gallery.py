@@ -65,6 +65,14 @@ def flat_face_cam(values):
     return support[:, None] * along + slope[:, None] * across
 
 
+def disc_cam(values):
+    """Return the profile of the cam of examples/camshaft.yaml for a roller of 6 mm."""
+    turns = [("modified_sine", values["rise"]), ("dwell", None), ("modified_sine", 0.0), ("dwell", None)]
+    law = jn.SegmentedMotion([jn.Segment(profile, np.pi / 2, to=to) for profile, to in turns], beyond="repeat")
+    cam = jn.plate_cam(law, jn.TranslatingFollower("roller", radius=0.006), base_radius=values["base"] - 0.006)
+    return np.stack([cam.dataset["x"].values, cam.dataset["y"].values], axis=-1)
+
+
 def robot(title, source, trajectory, body, place=(0.0, 0.0, 0.0), **options):
     """Return the picture of a robot, with the path of a point of a link."""
     options = {"title": title, "trajectory": trajectory} | options
@@ -83,6 +91,7 @@ PICTURES = {
         module="own_joint.py",
         outline=("cam", pitch_curve),
     ),
+    "camshaft": Picture(("roller",), 0.04, outline=("shaft", disc_cam)),
     "bennett": Picture(("B", "C"), 0.25, points={"B": ("BC", (0, 0, 0))}, view=(-60.0, 30.0)),
     "delta_robot": Picture(("platform",), 0.15, view=(-70.0, 18.0)),
     "double_cardan": Picture(("rim",), 0.1, view=(-70.0, 40.0)),

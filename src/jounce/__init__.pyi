@@ -9,6 +9,7 @@ from jounce import (
 )
 from jounce.constraints import (
     AbstractConstraint as AbstractConstraint,
+    Cam as Cam,
     Scalar as Scalar,
     Vector as Vector,
     drivers as drivers,
@@ -24,6 +25,8 @@ from jounce.dynamics import (
     BodyAccelerationEnergyOutput as BodyAccelerationEnergyOutput,
     BodyKineticEnergyOutput as BodyKineticEnergyOutput,
     BodyPotentialEnergyOutput as BodyPotentialEnergyOutput,
+    CamForceOutput as CamForceOutput,
+    CamTorqueOutput as CamTorqueOutput,
     DriverForceOutput as DriverForceOutput,
     DriverTorqueOutput as DriverTorqueOutput,
     Energy as Energy,

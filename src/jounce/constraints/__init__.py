@@ -9,6 +9,7 @@ from jounce.constraints.base import (
     catalogue as catalogue,
     rows as rows,
 )
+from jounce.constraints.cams import Cam as Cam
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
 _compute_under_own_settings(__name__)

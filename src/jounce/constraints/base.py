@@ -30,6 +30,7 @@ Wrenches = Annotated[Any, "wrenches"]
 Whole = Annotated[int, "whole"]
 Nested = Annotated[Any, "nested"]  # an element within another
 Curve = Annotated[Any, "curve"]
+Part = Annotated[Any, "part"]  # another joint or driver within one
 
 SPACES = ("planar", "spatial")
 ROLES = ("joint", "driver", "force")

@@ -23,6 +23,7 @@ WORDS = (
     "Whole",
     "Nested",
     "Curve",
+    "Part",
 )  # annotations that say what kind of value a field has
 BODY_ENDINGS = ("_i", "_j", "_m")  # of fields, by the body that they are fixed in
 
@@ -297,7 +298,7 @@ def field_kinds(kind: type[Any]) -> Mapping[str, str]:
 
 def field_kind(field: dataclasses.Field) -> str:
     """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``nested``,
-    ``curve`` or ``text``.
+    ``curve``, ``part`` or ``text``.
     """
     if isinstance(field.type, str):  # under ``from __future__ import annotations``
         word = field.type.rpartition(".")[2].strip()

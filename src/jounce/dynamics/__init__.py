@@ -32,6 +32,8 @@ from jounce.dynamics.energy.equations import (
     printed_coefficient as printed_coefficient,
 )
 from jounce.dynamics.energy.power import power_balance as power_balance
+from jounce.dynamics.inverse.cam_outputs import CamForceOutput as CamForceOutput, CamTorqueOutput as CamTorqueOutput
+from jounce.dynamics.inverse.cam_springs import ContactSpring as ContactSpring, contact_spring as contact_spring
 from jounce.dynamics.inverse.constraint_equations import constraint_equations as constraint_equations
 from jounce.dynamics.inverse.outputs import (
     AppliedForceOutput as AppliedForceOutput,

@@ -73,13 +73,13 @@ def with_outputs_held(mechanism: Mechanism) -> Mechanism:
             raise MechanismError(
                 f"the driver '{twice[0]}' follows from this output already", name=f"{place}.output", value=motion.output
             )
-        held[name] = _holder(mechanism, motion, f"{place}.output")
+        held[name] = holder_of(mechanism, motion, f"{place}.output")
     outputs = {name: x for name, x in mechanism.outputs.items() if not isinstance(x, AbstractMotionOutput)}
     return dataclasses.replace(mechanism, drivers=held, outputs=outputs)
 
 
-def _holder(mechanism: Mechanism, motion: OutputMotion, place: str) -> AbstractConstraint:
-    """Return the driver that holds an output to a law."""
+def holder_of(mechanism: Any, motion: OutputMotion, place: str) -> AbstractConstraint:
+    """Return the driver that holds an output to a law; of a mechanism its space and outputs count."""
     output, component = _named(mechanism, motion.output, place)
     law, spatial = motion.law, mechanism.space == "spatial"
     match output:
@@ -105,7 +105,7 @@ def _holder(mechanism: Mechanism, motion: OutputMotion, place: str) -> AbstractC
     raise MechanismError(message, name=place, value=motion.output)
 
 
-def _named(mechanism: Mechanism, name: str, place: str) -> tuple[Any, int | None]:
+def _named(mechanism: Any, name: str, place: str) -> tuple[Any, int | None]:
     """Return an output by its name, and which component of it is meant, if one is."""
     if name in mechanism.outputs:
         return mechanism.outputs[name], None

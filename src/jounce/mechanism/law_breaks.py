@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from jounce.constraints.base import field_kinds
 from jounce.forces import AbstractForce, ExpressionLaw, TimeLaw, VectorLaw
+from jounce.mechanism.cam_laws import cams_in_time
 from jounce.mechanism.held_outputs import with_outputs_held
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.resolve import resolve_motion
@@ -91,10 +92,11 @@ def breaks_depend_on(mechanism: Mechanism, names: Iterable[str]) -> bool:
 
 
 def laws_of(mechanism: Mechanism) -> list[AbstractMotion]:
-    """Return the laws of drivers, with numbers in the place of parameters."""
+    """Return the laws of drivers, and of cams that these lead, with numbers in the place of parameters."""
     values, drivers = mechanism.parameter_values, with_outputs_held(mechanism).drivers.values()
     motions = (getattr(driver, "motion", None) for driver in drivers)
-    return [resolve_motion(motion, values) for motion in motions if motion is not None]
+    found = [resolve_motion(motion, values) for motion in motions if motion is not None]
+    return [*found, *(law for _, law in cams_in_time(mechanism))]
 
 
 def laws_of_forces(mechanism: Mechanism) -> list[AbstractMotion]:

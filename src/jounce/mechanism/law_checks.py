@@ -9,6 +9,7 @@ from jounce.constraints.base import value_fields
 from jounce.errors import JounceError, SampleWarning, warn_caller
 from jounce.forces import AbstractForce, TimeLaw, VectorLaw
 from jounce.mechanism.angle_laws import warn_of_degrees
+from jounce.mechanism.cam_laws import cams_in_time
 from jounce.mechanism.mechanism import Mechanism
 from jounce.trajectory import AbstractMotion, SplineMotion
 from jounce.trajectory.sample_errors import unsupported_derivative, unsupported_words
@@ -57,6 +58,14 @@ def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces
                     raise error.located(name=place) from None
                 if orders >= 0 and isinstance(law, SplineMotion):
                     _warn(place, law, orders)
+    for name, law in cams_in_time(mechanism):
+        place = f"joints.{name}.motion"
+        try:
+            law.check_instants(first, last)
+        except JounceError as error:
+            raise error.located(name=place) from None
+        if isinstance(law.parts[0], SplineMotion):
+            _warn(place, law.parts[0], order)
 
 
 def _motions(element: AbstractConstraint | AbstractForce) -> Iterator[tuple[str, AbstractMotion]]:

@@ -230,6 +230,10 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
             elif kind in ("scalar", "vector") and (value is not None or field.default is not None):
                 value = resolve(value, parameters)
                 check_value(kind, value, components, facts.signs[field_name])
+            elif kind == "part":
+                # in a file the follower of a cam is the cam
+                place = name if field_name == "follower" else f"{name}.{field_name}"
+                value = unchecked(type(value), _of_part(value, parameters, components, place))
             elif kind == "wrenches":
                 value = _wrenches(resolve(value, parameters))
             elif kind == "nested":  # the bodies are those of the whole
@@ -248,6 +252,12 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
             raise MechanismError(error.message, name=f"{name}.{key}", value=error.value) from None
     _check_directions(values, facts.never_parallel, name)
     return values
+
+
+def _of_part(element: Element, parameters: Mapping[str, Any], components: int, name: str) -> dict[str, Any]:
+    """Return the values of an element within another one, which has its bodies."""
+    rest = {field.name: field.default for field in dataclasses.fields(type(element)) if not field.init}
+    return {"bodies": ()} | rest | resolve_element(element, parameters, components, name)
 
 
 def _wrenches(value: Any) -> Any:

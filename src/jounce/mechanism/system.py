@@ -248,7 +248,9 @@ class System(Module):
 
     def laws(self, time: Jet, *, periodic: bool = False) -> list[Jet]:
         """Return the jets of the motion laws; `periodic` for those, in rad, whose drivers forget whole turns, alone."""
-        drivers = (group.element for group in self.groups if group.element.periodic or not periodic)
+        drivers = (
+            group.element for group in self.groups if group.is_driver and (group.element.periodic or not periodic)
+        )
         return [
             driver.motion(time) for driver in drivers if isinstance(getattr(driver, "motion", None), AbstractMotion)
         ]

@@ -72,6 +72,8 @@ def holds_users_code(elements: Iterable[Any]) -> bool:
     def is_code(value: Any) -> bool:
         if isinstance(value, list | tuple):
             return any(map(is_code, value))
+        if isinstance(value, AbstractConstraint):
+            return holds_users_code([value])
         if isinstance(value, AbstractMotion | AbstractLaw):
             return any(map(is_users_law, jax.tree.leaves(value, is_leaf=is_users_law)))
         return callable(value)

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 import equinox as eqx
 import numpy as np
 
+from jounce.constraints import Cam
 from jounce.constraints.base import Vector, by_ratio_alone
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import check_loads
@@ -72,16 +73,26 @@ class _DriverOutput(AbstractForceOutput):
             return why
         if not isinstance(getattr(motion.mechanism.drivers[self.driver], "motion", None), FollowingMotion):
             return ""
-        forces = values[:, 0]
-        known = np.isfinite(forces)
-        times, sign = motion.time[known], np.sign(forces[known])
-        sign[np.abs(forces[known]) <= ROUNDING * np.max(np.abs(forces[known]), initial=0.0)] = 0.0
-        times, sign = times[sign != 0], sign[sign != 0]
-        changes = times[1:][sign[1:] != sign[:-1]]
-        if not changes.size:
-            return ""
-        where = ", ".join(f"{t:.4g} s" for t in changes[:MOST_SHOWN]) + (", ..." if len(changes) > MOST_SHOWN else "")
-        return f"changes its sign before t = {where}: a follower that is pressed against a cam lifts off there"
+        return lift_off_words(motion.time, values[:, 0])
+
+
+def lift_off_words(time: np.ndarray, forces: np.ndarray) -> str:
+    """Say before which instants the force of a cam on its follower changes its sign; nothing where it keeps it.
+
+    Examples
+    --------
+    >>> lift_off_words(np.array([0.0, 0.1, 0.2]), np.array([3.0, 1.0, -0.5]))
+    'changes its sign before t = 0.2 s: a follower that is pressed against a cam lifts off there'
+    """
+    known = np.isfinite(forces)
+    times, sign = time[known], np.sign(forces[known])
+    sign[np.abs(forces[known]) <= ROUNDING * np.max(np.abs(forces[known]), initial=0.0)] = 0.0
+    times, sign = times[sign != 0], sign[sign != 0]
+    changes = times[1:][sign[1:] != sign[:-1]]
+    if not changes.size:
+        return ""
+    where = ", ".join(f"{t:.4g} s" for t in changes[:MOST_SHOWN]) + (", ..." if len(changes) > MOST_SHOWN else "")
+    return f"changes its sign before t = {where}: a follower that is pressed against a cam lifts off there"
 
 
 class DriverForceOutput(_DriverOutput):
@@ -136,8 +147,11 @@ class _JointOutput(_Reaction):
         joints = motion.mechanism.joints
         bodies = {*_exerting(motion.mechanism, self.joint).bodies} - {GROUND}
         gears = [name for name, x in joints.items() if by_ratio_alone(x) and bodies & {*x.bodies}]
-        loaded = [name for name in gears if MotionForces.of(motion).is_loaded(name)]
-        return "; ".join(filter(None, (super().remark(motion, values), ratio_words(loaded))))
+        cams = [
+            name for name, x in joints.items() if isinstance(x, Cam) and name != self.joint and bodies & {*x.bodies}
+        ]
+        loaded, pressed = ([x for x in names if MotionForces.of(motion).is_loaded(x)] for names in (gears, cams))
+        return "; ".join(filter(None, (super().remark(motion, values), ratio_words(loaded), cam_words(pressed))))
 
     def _values(self, motion: Motion, point: ArrayLike | None, part: int, size: float) -> Numbers:
         """Return force or moment about a point of the body, with rates; about that of the joint unless given."""
@@ -158,6 +172,12 @@ def ratio_words(names: Sequence[str]) -> str:
     """Say of joints that are given by a ratio alone what their reactions leave out; nothing where there are none."""
     verb = "is" if len(names) == 1 else "are"
     return f"{', '.join(names)} {verb} given by a ratio alone: bearings show no tooth forces" if names else ""
+
+
+def cam_words(names: Sequence[str]) -> str:
+    """Say of cams what the reactions of bearings leave out; nothing where there are none."""
+    verb = "is a law" if len(names) == 1 else "are laws"
+    return f"{', '.join(names)} {verb} between coordinates: bearings show no contact force" if names else ""
 
 
 def _exerting(mechanism: Mechanism, name: str) -> Any:

@@ -71,6 +71,12 @@ class FileLaws:
 
         return self.source.read_named(given.file, location, through)
 
+    def of_cam(self, location: Location, value: Any) -> tuple[Any, str]:
+        """Return the law of a cam, of its leader in the place of the time, and the name of the leader."""
+        if hasattr(value, "samples"):
+            return self._spline(location, value), value.of
+        return value.law, value.driver
+
     def _leader(self, location: Location, name: str, following: tuple[str, ...]) -> AbstractMotion | Expression:
         """Return the law of a driver by its name."""
         own = (str(location[1]),) if location[0] == "drivers" and not following else following

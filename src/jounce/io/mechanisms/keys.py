@@ -11,8 +11,10 @@ from collections.abc import Iterable
 from dataclasses import MISSING, dataclass
 from typing import Any
 
+from jounce.constraints import catalogue
 from jounce.constraints.facts import facts_of, field_kind, value_fields
 from jounce.io.files.located_data import Location
+from jounce.modules import is_ours
 
 ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
 """The sections of a file that hold what is told apart by ``type``, and the role of each."""
@@ -69,6 +71,30 @@ def file_keys(kind: type[Any]) -> tuple[FileKey, ...]:
         required = first.default is MISSING and first.default_factory is MISSING
         keys.append(FileKey(key, tuple(names), field_kind(first), facts_of(kind).dimensions[names[0]], required))
     return tuple(sorted(keys, key=lambda k: k.kind != "text"))
+
+
+def cam_types(space: str) -> dict[str, type[Any]]:
+    """Return the drivers of this package whose coordinate may be that of a cam, by type.
+
+    Examples
+    --------
+    >>> sorted(cam_types("planar"))
+    ['coordinate', 'distance', 'slide']
+    """
+    return {
+        name: kind
+        for name, kind in catalogue(space, "driver").items()
+        if is_ours(kind) and hasattr(kind, "evaluate") and not hasattr(kind, "datum")
+    }
+
+
+def is_cam(space: str, entry: dict[str, Any]) -> bool:
+    """Tell whether an entry of the joints of a file is a cam: a driver of which the law is of another coordinate."""
+    kind = entry.get("type")
+    if "motion" not in entry or not isinstance(kind, str) or kind not in cam_types(space):
+        return False
+    own = catalogue(space, "joint").get(kind)
+    return own is None or all(key.key != "motion" for key in file_keys(own))
 
 
 def location_of(keys: Iterable[FileKey], field: str) -> Location:

@@ -14,6 +14,7 @@ from jounce.constraints.facts import at_coordinate
 from jounce.errors import JounceError, MechanismFileError, unknown
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
+from jounce.io.mechanisms.file_cams import CamEntry, coordinates_by_name, with_leaders
 from jounce.io.mechanisms.file_laws import FileLaws
 from jounce.io.mechanisms.keys import ROLES, FileKey, file_keys, location_of
 from jounce.io.mechanisms.unit_hints import warn_of_units
@@ -117,6 +118,8 @@ def _validate(source: Source, space: str) -> dict[str, Any]:
         "drivers": _driven_quantities(source.data.get("drivers"), space),
         "outputs": outputs if isinstance(outputs := source.data.get("outputs"), dict) else {},
     }
+    driven = _driven_quantities(source.data.get("initial"), space) | context["drivers"]
+    context["leaders"] = coordinates_by_name(source.data, space, driven)
     try:
         model = file_model(space).model_validate(source.data, context=context)
     except ValidationError as error:
@@ -169,10 +172,11 @@ def _build(source: Source, space: str, model: dict[str, Any], locations: _Locati
     except JounceError as error:
         raise error.located(name="parameters") from None
     laws = FileLaws(source, {name: _plain(driver) for name, driver in model["drivers"].items()})
+    elements = {kind: _elements(laws, space, kind, model[kind], locations) for kind in (*ROLES, "outputs")}
     return Mechanism(
         space=space,
         bodies={name: _body(source, space, name, _plain(body), values) for name, body in model["bodies"].items()},
-        **{kind: _elements(laws, space, kind, model[kind], locations) for kind in (*ROLES, "outputs")},
+        **with_leaders(source, space, elements),
         parameters=parameters,
         gravity=model["gravity"],
         time=TimeGrid(**_plain(model["time"])) if model["time"] is not None else None,
@@ -223,17 +227,21 @@ def _elements(
     elements = {}
     for name, model in models.items():
         given, name_in_file = _plain(model), f"{section}.{name}"
+        cam = type(model).__name__.endswith("_cam") and section == "joints"
         if section == "outputs":
             kind: Any = outputs[type(model).__name__]
         else:
-            kind = catalogue(space, ROLES[section])[given["type"]]
+            kind = catalogue(space, "driver" if cam else ROLES[section])[given["type"]]
         locations[name_in_file] = ((section, name), file_keys(kind))
         arguments = _arguments(locations[name_in_file][1], given)
+        of = ""
+        if cam:
+            arguments["motion"], of = laws.of_cam((section, name, "motion"), arguments["motion"])
         arguments = {field: laws.law((section, name, field), x) for field, x in arguments.items()}
         if kind.body_count:
             arguments["bodies"] = given["bodies"] if kind.body_count > 1 else (given["body"],)
         try:
-            elements[name] = kind(**arguments)
+            elements[name] = CamEntry(kind(**arguments), of) if cam else kind(**arguments)
         except JounceError as error:  # of a constructor, which knows its fields only
             error.name = f"{name_in_file}.{error.name}" if error.name else name_in_file
             raise

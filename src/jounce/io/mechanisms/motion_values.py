@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
@@ -87,6 +88,23 @@ FORMS = {
     "output": ("output", "law"),
 }
 """Keys of a law by the one that says which form it has."""
+
+
+def cam_motion(quantity: str) -> Any:
+    """Return the annotation of the law of a cam: of a coordinate, that of a driver, a joint or an output."""
+    plain: Checked = motion(quantity).__metadata__[0]
+
+    def check(raw: object, info: Any) -> Any:
+        if not isinstance(raw, dict) or raw.get("of") is None:
+            raise problem(
+                "a law under joints is a cam: it is of a coordinate; give of, the name of what leads it", "of"
+            )
+        if "output" in raw:
+            raise problem("a cam has its law itself; a driver may follow from an output", "output", value=UNSET)
+        context = info.context or {}
+        return plain.function(raw, SimpleNamespace(context={**context, "drivers": context["leaders"]}, data=info.data))
+
+    return Annotated[Any, Checked(check, plain.schema)]
 
 
 def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) -> Any:

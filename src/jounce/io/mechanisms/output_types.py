@@ -37,6 +37,8 @@ OUTPUTS: tuple[tuple[str | None, type[AbstractQuantity]], ...] = (
     ("force", dynamics.JointForceOutput),
     ("reaction", dynamics.JointForceOutput),
     ("torque", dynamics.JointTorqueOutput),
+    ("contact", dynamics.CamForceOutput),
+    ("contact_torque", dynamics.CamTorqueOutput),
     ("reaction", dynamics.GroundForceOutput),
     ("torque", dynamics.GroundTorqueOutput),
     ("force", dynamics.AppliedForceOutput),

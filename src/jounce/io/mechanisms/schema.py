@@ -18,8 +18,8 @@ from jounce.constraints.facts import facts_of
 from jounce.errors import JounceError, MechanismFileError, no_such
 from jounce.io.mechanisms.curve_values import curve
 from jounce.io.mechanisms.inertia_forms import inertia
-from jounce.io.mechanisms.keys import FileKey, file_keys
-from jounce.io.mechanisms.motion_values import laws, motion
+from jounce.io.mechanisms.keys import FileKey, cam_types, file_keys, is_cam
+from jounce.io.mechanisms.motion_values import cam_motion, laws, motion
 from jounce.io.mechanisms.output_types import HOLDERS, output_holder, output_tag, output_types
 from jounce.io.mechanisms.values import (
     Checked,
@@ -185,12 +185,27 @@ def _bodies(kind: type[Any]) -> dict[str, tuple[Any, Any]]:
 
 def _constraint_union(space: str, role: str, types: _Types) -> Any:
     """Return the union of all joints, drivers or forces of a space, told apart by ``type``."""
-    models = []
+    models: list[Any] = []
     for name, kind in types:
         fields = {"type": (Literal[name], ...)} | _bodies(kind)
         title = f"{space}_{name}_{role}"
         models.append(_model(title, kind.__doc__, fields | _values(kind, POSITION_COMPONENTS[space])))
-    return Annotated[Union[tuple(models)], Discriminator("type")]  # noqa: UP007
+    if role != "joint":
+        return Annotated[Union[tuple(models)], Discriminator("type")]  # noqa: UP007
+    models = [Annotated[model, Tag(name)] for model, (name, _) in zip(models, types, strict=True)]
+    for name, kind in cam_types(space).items():
+        fields = {"type": (Literal[name], ...)} | _bodies(kind) | _values(kind, POSITION_COMPONENTS[space])
+        (law,) = (key for key in file_keys(kind) if key.kind == "motion")
+        fields[law.key] = (cam_motion(law.quantity), ...)
+        words = f"A cam, by its law of another coordinate. {kind.__doc__}"
+        models.append(Annotated[_model(f"{space}_{name}_cam", words, fields), Tag(f"{name} cam")])
+
+    def form(raw: object) -> Any:
+        if not isinstance(raw, dict):
+            return None
+        return f"{raw.get('type')} cam" if is_cam(space, raw) else raw.get("type")
+
+    return Annotated[Union[tuple(models)], Discriminator(form)]  # noqa: UP007
 
 
 def output_form(raw: object) -> Any:

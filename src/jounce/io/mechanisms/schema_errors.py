@@ -7,7 +7,7 @@ from typing import Any
 from jounce.constraints import catalogue
 from jounce.errors import JounceError, did_you_mean, no_such, show_value
 from jounce.io.files.located_data import Location, Source
-from jounce.io.mechanisms.keys import ROLES, file_keys
+from jounce.io.mechanisms.keys import ROLES, file_keys, is_cam
 from jounce.io.mechanisms.output_types import output_holder, output_types
 from jounce.io.mechanisms.schema import file_model, output_form
 
@@ -89,7 +89,8 @@ def _valid_keys(source: Source, space: str, parent: Location) -> list[str]:
         quantity, output = output_types(space)[output_form(entry)]
         keys = dict.fromkeys([output_holder(output), *(["quantity"] if quantity else [])])
         return list(keys | dict.fromkeys(key.key for key in file_keys(output)))
-    constraint = catalogue(space, ROLES[str(kind)])[entry["type"]]
+    role = "driver" if kind == "joints" and is_cam(space, entry) else ROLES[str(kind)]
+    constraint = catalogue(space, role)[entry["type"]]
     return ["type", "body" if constraint.body_count == 1 else "bodies", *(key.key for key in file_keys(constraint))]
 
 

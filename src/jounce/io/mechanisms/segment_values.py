@@ -6,7 +6,7 @@ import dataclasses
 from typing import Any
 
 from jounce.constraints.facts import at_coordinate
-from jounce.errors import UNSET, TrajectoryError, show_value, unknown
+from jounce.errors import UNSET, TrajectoryError, no_such, show_value, unknown
 from jounce.io.mechanisms.values import ANY_VALUE, defined, list_schema, object_schema, parse, problem
 from jounce.trajectory import (
     AbstractMotion,
@@ -59,8 +59,16 @@ def leader(raw: dict[str, Any], info: Any) -> str | Expression | None:
         return None
     if not isinstance(given, str):
         raise problem("must be the name of a driver, or an expression of t", "of", value=given)
-    if given in (info.context or {}).get("drivers", ()):
+    context = info.context or {}
+    known = context.get("drivers", ())
+    if given in known:
         return given
+    if known is context.get("leaders", ...):
+        words = no_such("leader", given, known, "coordinate")
+        raise problem(f"must be the name of a driver, a joint, or an output; {words}", "of", value=given)
+    if given in context.get("leaders", ()) and given not in context.get("names", ()):
+        words = "is no driver: what moves by itself leads a cam, which is a joint; write this law under joints"
+        raise problem(words, "of", value=given)
     value = parse(given, "any", info, "of", variables={"t": None}).value
     if not isinstance(value, Expression):
         raise problem("must be the name of a driver, or an expression of t", "of", value=given)

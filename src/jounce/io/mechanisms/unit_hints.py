@@ -15,7 +15,7 @@ from jounce.constraints.facts import at_coordinate
 from jounce.errors import JounceError, UnitWarning
 from jounce.io.files.located_data import Location, Source, dotted
 from jounce.io.files.samples import sampled_dimension
-from jounce.io.mechanisms.keys import ROLES, file_keys
+from jounce.io.mechanisms.keys import ROLES, file_keys, is_cam
 from jounce.mechanism import Mechanism
 from jounce.mechanism.angle_laws import (
     IN_SI,
@@ -202,7 +202,8 @@ def _fields(data: dict[str, Any], mechanism: Mechanism) -> Iterator[tuple[Locati
     """Return the values of elements and bodies as the file has them, with their kind."""
     for section, role in ROLES.items():
         for name, given in (data.get(section) or {}).items():
-            for key in file_keys(catalogue(mechanism.space, role)[given["type"]]):
+            own = "driver" if section == "joints" and is_cam(mechanism.space, given) else role
+            for key in file_keys(catalogue(mechanism.space, own)[given["type"]]):
                 quantity = at_coordinate(key.quantity, given.get("coordinate"))
                 yield from _leaves((section, name, key.key), quantity, given.get(key.key))
     for name, given in (data.get("bodies") or {}).items():

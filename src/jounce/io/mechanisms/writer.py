@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from jounce.constraints import catalogue
+from jounce.constraints import Cam, catalogue
 from jounce.constraints.base import value_fields
 from jounce.errors import MechanismError
 from jounce.io.mechanisms.keys import ROLES, file_keys
@@ -19,6 +19,7 @@ from jounce.io.mechanisms.output_types import OUTPUTS, output_holder
 from jounce.io.mechanisms.written_laws import WrittenLaws
 from jounce.io.mechanisms.written_values import plain, plain_number
 from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid
+from jounce.mechanism.cam_laws import leader_name
 from jounce.mechanism.derivative_outputs import form_of
 from jounce.settings import under_own_settings
 from jounce.shapes import seconds
@@ -152,6 +153,8 @@ class _Writer:
         return entries
 
     def _element(self, section: str, name: str, element: Any) -> dict[str, Any]:
+        if isinstance(element, Cam):
+            return self._cam(f"{section}.{name}", element)
         location, kind = f"{section}.{name}", type(element)
         if catalogue(self.mechanism.space, ROLES[section]).get(kind.type_name) is not kind:
             message = f"the class {kind.__name__} has no type by which a file could name it"
@@ -160,6 +163,18 @@ class _Writer:
         single = kind.body_count == 1
         entries |= {"body": element.bodies[0]} if single else {"bodies": list(element.bodies)}
         return entries | self._values(location, element)
+
+    def _cam(self, place: str, cam: Cam) -> dict[str, Any]:
+        """Return a cam: the driver that has its coordinate, with its law of the leader."""
+        driver, leader = cam.follower, leader_name(self.mechanism, cam)
+        if leader is None:
+            message = (
+                "nothing in this mechanism has the coordinate that leads this cam; add a driver or an output of it"
+            )
+            raise MechanismError(message, name=place)
+        found = {"type": driver.type_name, "bodies": list(driver.bodies), **self._values(place, driver)}
+        law = self.laws.written(f"{place}.motion", cam.motion, driver)
+        return found | {"motion": (law if isinstance(law, dict) else {"expression": law}) | {"of": leader}}
 
     def _output(self, name: str, output: Any) -> dict[str, Any]:
         location, kind = f"outputs.{name}", form_of(output)

@@ -10,8 +10,9 @@ import numpy as np
 from jaxtyping import Float
 from typing_extensions import TypedDict
 
+from jounce.constraints import Cam
 from jounce.constraints.base import by_ratio_alone, value_fields
-from jounce.dynamics.inverse.outputs import ratio_words
+from jounce.dynamics.inverse.outputs import cam_words, ratio_words
 from jounce.errors import JounceError
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.output_types import OUTPUTS, output_holder
@@ -193,8 +194,10 @@ def _remarks(mechanism: Mechanism) -> list[str]:
     """Return what is to be said of forces: what reactions leave out."""
     if not mechanism.forces and all(body.mass is None for body in mechanism.bodies.values()):
         return []
-    words = ratio_words([name for name, joint in mechanism.joints.items() if by_ratio_alone(joint)])
-    return [words] if words else []
+    joints = mechanism.joints.items()
+    gears = ratio_words([name for name, joint in joints if by_ratio_alone(joint)])
+    cams = cam_words([name for name, joint in joints if isinstance(joint, Cam)])
+    return [words for words in (gears, cams) if words]
 
 
 def _time(mechanism: Mechanism) -> dict[str, Any] | None:
@@ -301,6 +304,8 @@ def _element(name: str, element: Any) -> dict[str, Any]:
     for key in ("motion", "law"):
         if key in fields:
             facts[key] = _law_words(getattr(element, key))
+    if isinstance(element, Cam) and element.of:
+        facts["motion"] += f" of {element.of}"
     return facts
 
 

@@ -1,0 +1,136 @@
+"""Cams: joints that hold a coordinate to a law of another one, and react on both."""
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+
+from jounce.constraints.base import AbstractConstraint, MotionLaw, Part
+from jounce.constraints.drivers import CoordinateDriver, SlideDriver, SpatialSlideDriver
+from jounce.constraints.facts import facts_of
+from jounce.errors import MechanismError
+from jounce.jet import Jet
+from jounce.modules import is_ours
+
+AT_REST = 0.0  # the law of a driver of which the coordinate alone is meant
+
+
+class Cam(AbstractConstraint):
+    """A coordinate is a law of another one: a cam, which presses its follower and is pressed by it.
+
+    The residual is the coordinate of the follower less the law of that of the leader. So the leader bears the force on
+    the follower times the slope of the law, whatever moves it.
+
+    Parameters
+    ----------
+    follower : AbstractConstraint
+        A driver, which says what follows, and by its law how: the coordinate of the leader takes the place of the time.
+    leader : AbstractConstraint
+        What is followed: a driver, of which the coordinate counts and not the law; or a joint that turns or slides.
+    of : str, optional
+        The name of the leader in a file.
+
+    Raises
+    ------
+    MechanismError
+        If one of them has no coordinate, or is a class of a user's own.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> axle = jn.planar.Revolute(("ground", "shaft"), [0, 0], [0, 0])
+    >>> lift = jn.drivers.CoordinateDriver(("ground", "valve"), "y", motion="0.02*(1 - cos(t))")
+    >>> jn.Cam(lift, axle).bodies
+    ('ground', 'valve', 'shaft')
+    """
+
+    follower: Part
+    motion: MotionLaw
+    leader: Part
+    of: str = eqx.field(static=True, default="")
+    slots: tuple[tuple[int, ...], tuple[int, ...]] = eqx.field(static=True, default=((), ()))
+
+    body_counts = (2, 3, 4)
+    symbol = "none"
+
+    def __init__(
+        self,
+        follower: Any,
+        leader: Any,
+        of: str = "",
+        *,
+        motion: Any = None,
+        bodies: Sequence[str] | None = None,
+        slots: Any = None,
+    ):
+        if getattr(follower, "role", "") != "driver" or not hasattr(follower, "motion"):
+            raise MechanismError("must be a driver, whose law is that of the cam", name="follower", value=follower)
+        self.motion = follower.motion if motion is None else motion
+        follower = coordinate_of_element(follower, "follower")
+        leader = coordinate_of_element(leader, "leader")
+        names = tuple(dict.fromkeys((*follower.bodies, *leader.bodies)))
+        self.slots = tuple(tuple(names.index(body) for body in part.bodies) for part in (follower, leader))
+        self.bodies = names if bodies is None else tuple(bodies)
+        self.follower, self.leader = (
+            _between(part, [self.bodies[k] for k in its])
+            for part, its in zip((follower, leader), self.slots, strict=True)
+        )
+        self.of = of
+
+    def evaluate(self, *bodies: Any) -> Jet:
+        """Return the coordinate of the follower."""
+        return self.follower.evaluate(*(bodies[k] for k in self.slots[0]))
+
+    def residual(self, *bodies_and_time: Any) -> Jet:
+        *bodies, _ = bodies_and_time
+        return self.evaluate(*bodies) - self.motion(self.leader.evaluate(*(bodies[k] for k in self.slots[1])))
+
+
+def coordinate_of_element(element: Any, name: str = "leader") -> Any:
+    """Return a driver without a law that has the coordinate of a driver, or of a joint that turns or slides.
+
+    Parameters
+    ----------
+    element : AbstractConstraint
+        Of this package.
+    name : str
+        What it is, for messages.
+
+    Raises
+    ------
+    MechanismError
+        If it has no coordinate, or one that a cam does not follow.
+
+    Examples
+    --------
+    >>> from jounce.constraints import planar
+    >>> pin = planar.Revolute(("ground", "crank"), [0, 0], [0, 0])
+    >>> coordinate_of_element(pin).coordinate
+    'angle'
+    """
+    if isinstance(element, Cam):
+        element = element.follower
+    kind, bodies = type(element), getattr(element, "bodies", ())
+    if not isinstance(element, AbstractConstraint) or not is_ours(kind.residual):
+        message = "must be a driver, or a joint that turns or slides, of this package"
+        raise MechanismError(f"{message}; a law of something else is a joint of your own", name=name, value=element)
+    if hasattr(element, "datum"):
+        message = "an angle about an axis in space leads no cam yet, and follows none; take a slide or a distance"
+        raise MechanismError(message, name=name, value=kind.type_name)
+    if element.role == "driver" and hasattr(element, "evaluate"):
+        return dataclasses.replace(element, motion=AT_REST)
+    pair = facts_of(kind).pair
+    if pair == "revolute":
+        return CoordinateDriver(bodies, "angle", AT_REST)
+    if pair == "prismatic":
+        return SlideDriver(bodies, element.point_i, element.point_j, element.vector_i, AT_REST)
+    if kind.space == "spatial" and kind.type_name == "prismatic":
+        return SpatialSlideDriver(bodies, element.point_i, element.point_j, element.axis_i, AT_REST)
+    message = "has no coordinate that a cam could follow; name a driver, a pin, a slide, or an output"
+    raise MechanismError(message, name=name, value=kind.type_name or kind.__name__)
+
+
+def _between(element: Any, bodies: Sequence[str]) -> Any:
+    """Return an element between bodies of other names."""
+    return element if element.bodies == tuple(bodies) else dataclasses.replace(element, bodies=tuple(bodies))

@@ -1,0 +1,108 @@
+"""Cams of a file: what leads them by name, a driver, a joint, an initial condition or an output, and what they are."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
+
+from jounce.constraints import Cam, catalogue
+from jounce.constraints.cams import coordinate_of_element
+from jounce.constraints.facts import at_coordinate, facts_of
+from jounce.errors import JounceError
+from jounce.io.files.source import Source
+from jounce.io.mechanisms.keys import cam_types, file_keys, is_cam
+from jounce.mechanism.held_outputs import holder_of
+from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.trajectory import OutputMotion
+
+COMPONENTS = ("x", "y", "z")
+OUTPUTS = {"angle": "angle", "distance": "length", "slide": "length", "displacement": "length"}
+PAIRS = {"revolute": "angle", "prismatic": "length"}
+
+
+@dataclasses.dataclass(frozen=True)
+class CamEntry:
+    """A cam whose leader is not known yet.
+
+    Attributes
+    ----------
+    follower : AbstractConstraint
+        The driver that has its law.
+    of : str
+        The name of its leader.
+    """
+
+    follower: Any
+    of: str
+
+
+def coordinates_by_name(data: Mapping[str, Any], space: str, driven: Mapping[str, str]) -> dict[str, str]:
+    """Return what may lead a cam, an angle or a length, by name; a driver goes before a joint, that before an output.
+
+    Parameters
+    ----------
+    data : mapping
+        The file.
+    space : str
+        planar or spatial.
+    driven : mapping of str to str
+        What drivers and initial conditions prescribe, by their names.
+    """
+    found: dict[str, str] = {}
+    for name, raw in _entries(data, "outputs"):
+        quantity = raw.get("quantity")
+        if quantity is None and "point" in raw:
+            found |= {f"{name}_{label}": "length" for label in COMPONENTS[: POSITION_COMPONENTS[space]]}
+        elif quantity in OUTPUTS:
+            found[name] = OUTPUTS[quantity]
+    drivers, joints = cam_types(space), catalogue(space, "joint")
+    for name, raw in _entries(data, "joints"):
+        kind = str(raw.get("type"))
+        if is_cam(space, dict(raw)):
+            (law,) = (key for key in file_keys(drivers[kind]) if key.kind == "motion")
+            found[name] = at_coordinate(law.quantity, raw.get("coordinate"))
+        elif kind in joints and (pair := facts_of(joints[kind]).pair or kind) in PAIRS:
+            found[name] = PAIRS[pair]
+    return found | dict(driven)
+
+
+def _entries(data: Mapping[str, Any], section: str) -> list[tuple[str, Mapping[str, Any]]]:
+    given = data.get(section)
+    return [(k, v) for k, v in given.items() if isinstance(v, Mapping)] if isinstance(given, Mapping) else []
+
+
+def with_leaders(source: Source, space: str, elements: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return the elements of a file with cams in the place of their entries.
+
+    Parameters
+    ----------
+    source : Source
+        The file.
+    space : str
+        planar or spatial.
+    elements : dict of str to dict
+        Joints, drivers, forces, initial conditions and outputs by kind and name.
+    """
+
+    def leader(name: str) -> Any:
+        for kind in ("drivers", "joints", "initial"):
+            if name in elements[kind]:
+                known = elements[kind][name]
+                return known.follower if isinstance(known, CamEntry) else known
+        motion = OutputMotion(name, "0")
+        return holder_of(SimpleNamespace(space=space, outputs=elements["outputs"]), motion, "motion.of")
+
+    joints = {}
+    for name, entry in elements["joints"].items():
+        if isinstance(entry, CamEntry):
+            at = ("joints", name, "motion", "of")
+            if entry.of == name and name not in elements["drivers"]:
+                raise source.error("a cam does not lead itself", at, value=name)
+            try:
+                entry = Cam(entry.follower, coordinate_of_element(leader(entry.of)), entry.of)
+            except JounceError as error:
+                raise source.error(error.message, at, value=entry.of) from None
+        joints[name] = entry
+    return {**elements, "joints": joints}

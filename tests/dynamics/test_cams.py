@@ -1,0 +1,168 @@
+"""Cams as joints: force on the follower, and what it does to the shaft, with rates, against closed forms in mpmath."""
+
+import dataclasses
+
+import mpmath
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce import drivers, planar
+from jounce.io.mechanisms.writer import write_mechanism
+
+SPRING, LENGTH, MASS, INERTIA, SPEED = 5000.0, 0.03, 1.3, 0.004, 20.0
+FILE = """
+space: planar
+gravity: [0, -9.81]
+parameters: {k: 5 kN/m, m: 1.3 kg, w: 20 rad/s, rise: 15 mm}
+units: {length: mm}
+bodies:
+  shaft: {position: [0, 0], mass: 1 kg, inertia: 0.004 kg*m^2}
+  follower: {position: [0, 46 mm], mass: m, inertia: 0.001 kg*m^2}
+joints:
+  axle: {type: revolute, bodies: [ground, shaft], points: [[0, 0], [0, 0]]}
+  guide: {type: prismatic, bodies: [ground, follower], points: [[0, 0], [0, 0]], vectors: [[0, 1], [0, 1]]}
+  cam: {type: coordinate, bodies: [ground, follower], coordinate: y, offset: 46 mm, motion: {MOTION, of: LEADER}}
+drivers:
+  shaft: {type: coordinate, bodies: [ground, shaft], coordinate: angle, motion: w*t + 0.3*sin(5*t)}
+forces:
+  spring: {type: slide_spring, bodies: [ground, follower], points: [[0, 0], [0, 0]], vector: [0, 1], stiffness: k,
+    length: 30 mm}
+outputs:
+  theta: {body: shaft, quantity: angle}
+  contact: {joint: cam, quantity: contact}
+  torque: {driver: shaft, quantity: torque}
+time: {start: 0, stop: 0.3, count: 31}
+"""
+SMOOTH = "expression: rise*(1 - cos(t))/2 + 0.001*sin(3*t)"
+RISES = (
+    "profile: [{profile: cycloidal, duration: 120 deg, to: rise}, {profile: dwell, duration: 60 deg}, "
+    "{profile: cycloidal, duration: 120 deg, to: 0}, {profile: dwell, duration: 60 deg}], beyond: repeat"
+)
+
+
+def load(tmp_path, motion=SMOOTH, leader="shaft", text=FILE):
+    path = tmp_path / "cam.yaml"
+    path.write_text(text.replace("MOTION", motion).replace("LEADER", leader))
+    return jn.load(path)
+
+
+def smooth(t):
+    return mpmath.mpf("0.015") * (1 - mpmath.cos(t)) / 2 + mpmath.mpf("0.001") * mpmath.sin(3 * t)
+
+
+def expected(law, instants):
+    """Force on the follower, and torque of the shaft, with four rates: D'Alembert, and the slope of the law."""
+
+    def angle(t):
+        return 20 * t + mpmath.mpf("0.3") * mpmath.sin(5 * t)
+
+    def place(t):
+        return mpmath.mpf("0.046") + law(angle(t))
+
+    def force(t):
+        spring = 5000 * (place(t) - mpmath.mpf("0.03"))
+        return mpmath.mpf("1.3") * (mpmath.diff(place, t, 2) + mpmath.mpf("9.81")) + spring
+
+    def torque(t):
+        return mpmath.mpf("0.004") * mpmath.diff(angle, t, 2) + force(t) * mpmath.diff(law, angle(t))
+
+    with mpmath.workdps(80):
+        return [np.array([[mpmath.diff(f, x, k) for k in range(5)] for x in instants], float) for f in (force, torque)]
+
+
+@pytest.mark.parametrize("leader", ["shaft", pytest.param("theta", marks=pytest.mark.slow)])
+def test_contact_and_shaft_torque_with_rates(tmp_path, leader):
+    instants = [-0.4, 0.02, 0.13, 1.07]
+    found = jn.solve(load(tmp_path, SMOOTH, leader), instants, order=4).outputs
+    for name, exact in zip(("contact", "torque"), expected(smooth, instants), strict=True):
+        sizes = np.abs(exact).max(axis=0)
+        np.testing.assert_allclose(found[name] / sizes, exact / sizes, rtol=0, atol=1e-11, err_msg=name)
+
+
+def test_the_exercise_of_the_forum(tmp_path):
+    """Spring of 15 N/mm compressed by 2.5 mm, 1.8 kg, 1000 rpm, rise of 10 mm: 61.69 N and 0.1473 N m at 100 deg."""
+    text = FILE.replace("5 kN/m", "15 N/mm").replace("1.3 kg", "1.8 kg").replace("15 mm", "10 mm")
+    text = text.replace("46 mm", "0").replace("length: 30 mm", "length: -2.5 mm").replace("-9.81", "0")
+    text = text.replace("w*t + 0.3*sin(5*t)", "1000 rpm").replace("1000 rpm", "w*t").replace("20 rad/s", "1000 rpm")
+    found = jn.solve(load(tmp_path, RISES, text=text), [1 / 60], order=0)
+    np.testing.assert_allclose(found.outputs["contact"], [[-61.6881]], rtol=1e-6)
+    np.testing.assert_allclose(found.outputs["torque"], [[-0.14726944]], rtol=1e-6)
+    assert "lifts off" not in str(found.dataset["contact"].attrs.get("comment", ""))
+
+
+def test_the_reactions_of_a_cam_balance_on_shaft_follower_and_ground(tmp_path):
+    motion = jn.solve(load(tmp_path), [0.02, 0.13], order=4)
+    parts = [jn.joint_reaction(motion, "cam", body=b, point=[0, 0]) for b in ("follower", "shaft")]
+    ground = jn.joint_reaction(motion, "cam", body="ground", point=[0, 0])
+    size = float(abs(parts[0].force).max())
+    assert float(abs(sum(p.force for p in parts) + ground.force).max()) <= 1e-12 * size
+    assert float(abs(parts[1].force).max()) == 0  # a law of coordinates: the shaft bears a torque alone
+    torque = jn.driver_force(motion, "shaft").values[:, :3] - INERTIA * motion.outputs["theta"][:, 2:5]
+    found = parts[1].torque.values[:, :3]
+    np.testing.assert_allclose(found, -torque, rtol=0, atol=1e-12 * np.abs(torque).max())
+
+
+def test_what_is_written_reads_the_same(tmp_path):
+    leader = "theta"
+    mechanism = load(tmp_path, RISES, leader)
+    write_mechanism(mechanism, tmp_path / "written.yaml")
+    again = jn.load(tmp_path / "written.yaml")
+    assert again.joints["cam"].of == leader
+    assert jn.solve(again, [0.13], order=1).outputs["torque"] == pytest.approx(
+        jn.solve(mechanism, [0.13], order=1).outputs["torque"], rel=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    "motion, leader, words",
+    [
+        (SMOOTH, "shft", "no leader has this coordinate; did you mean 'shaft'"),
+        (SMOOTH, "cam", "a cam does not lead itself"),
+        (SMOOTH, "2*t", "must be the name of a driver, a joint, or an output"),
+        ("output: theta, law: 1", "shaft", "a cam has its law itself"),
+        ("profile: [{profile: dwell, duration: 1 s}]", "shaft", "an angle"),
+    ],
+)
+def test_what_cannot_lead_a_cam_is_named(tmp_path, motion, leader, words):
+    with pytest.raises(jn.MechanismFileError, match=words):
+        load(tmp_path, motion, leader)
+
+
+def test_a_joint_without_a_leader_and_a_driver_of_what_moves_freely_are_named(tmp_path):
+    with pytest.raises(jn.MechanismFileError, match=r"joints.cam.motion.of: a law under joints is a cam"):
+        load(tmp_path, text=FILE.replace(", of: LEADER", ""))
+    text = FILE.replace("motion: w*t + 0.3*sin(5*t)", "motion: {expression: t, of: theta}")
+    with pytest.raises(jn.MechanismFileError, match=r"drivers.shaft.motion.of: is no driver: what moves by itself"):
+        load(tmp_path, text=text)
+
+
+def test_a_law_that_ends_before_its_leader_is_named_before_any_computing(tmp_path):
+    mechanism = load(tmp_path, "piecewise: [{until: 90 deg, expression: rise}]")
+    with pytest.raises(jn.MechanismError, match=r"joints.cam.motion: its leader goes from 0 to "):
+        jn.solve(mechanism, [0.0, 1.0])
+
+
+def test_breaks_of_a_cam_are_found_where_its_shaft_passes_them(tmp_path):
+    from jounce.mechanism.law_breaks import breaks_of_laws
+
+    text = FILE.replace("w*t + 0.3*sin(5*t)", "w*t")
+    found = breaks_of_laws(load(tmp_path, RISES, text=text), 0.0, 0.3, 4)
+    np.testing.assert_allclose(found, np.radians([0, 120, 180, 300]) / 20, atol=1e-9)
+
+
+def test_what_is_no_cam_is_refused():
+    pin = planar.Revolute(("ground", "a"), [0, 0], [0, 0])
+    with pytest.raises(jn.MechanismError, match="must be a driver, whose law is that of the cam"):
+        jn.Cam(pin, pin)
+    lift = drivers.CoordinateDriver(("ground", "b"), "y", "t")
+    with pytest.raises(jn.MechanismError, match="has no coordinate that a cam could follow"):
+        jn.Cam(lift, planar.DoubleRevolute(("a", "b"), [0, 0], [0, 0], 1.0))
+    renamed = dataclasses.replace(jn.Cam(lift, pin), bodies=("ground", "c", "d"))
+    assert (renamed.follower.bodies, renamed.leader.bodies) == (("ground", "c"), ("ground", "d"))
+
+
+def test_the_least_preload_that_keeps_contact_at_a_dwell(tmp_path):
+    """At 200 rpm the least force is that at rest, below: the spring and the weight of 1 kg balance at 46 mm."""
+    found = jn.dynamics.contact_spring(jn.load("examples/camshaft.yaml"), "cam", "spring", np.linspace(0, 0.3, 31))
+    np.testing.assert_allclose([found.free, found.margin], [0.046 + 9.81 / 5000, 5000 * 0.016 + 9.81], rtol=1e-9)
