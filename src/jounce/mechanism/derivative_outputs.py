@@ -68,7 +68,7 @@ class DerivativeOutput(AbstractMotionOutput):
         return self.found
 
     @property
-    def unit(self) -> str:
+    def unit(self) -> str:  # type: ignore[override] - of an instance, as it depends on the outputs
         """Unit in SI."""
         return _unit(self.operands, int(self.order))
 
@@ -118,7 +118,7 @@ class PosedDerivativeOutput(AbstractOutput):
         return Operand(self.first, self.components[0]), Operand(self.second, self.components[1])
 
     @property
-    def unit(self) -> str:
+    def unit(self) -> str:  # type: ignore[override] - of an instance, as it depends on the outputs
         """Unit in SI."""
         return _unit(self.operands, int(self.order))
 

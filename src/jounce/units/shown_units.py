@@ -119,7 +119,7 @@ class ShownUnits:
     >>> units.of("rad/s"), units.of("N*m")
     (('deg/s', 57.29577951308232), ('N*m', 1.0))
     >>> units.of("rad/m^2")
-    ('deg/mm^2', 5.729577951308232e-05)
+    ('deg/mm^2', 5.7295779513082324e-05)
     """
 
     chosen: Mapping[str, str] = field(default_factory=dict)
