@@ -35,7 +35,7 @@ class Angles(NamedTuple):
         s.
     """
 
-    samples: tuple[Float[Numbers, "place _ batch"], ...]
+    samples: tuple[Float[Numbers, "point _ batch"], ...]
     step: Lanes
 
     def at(self, since: Lanes) -> AnglesOfForces:
