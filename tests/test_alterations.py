@@ -37,7 +37,7 @@ def test_what_is_replaced_is_named_until_it_is_back(monkeypatch, thing, name, va
     assert altered() is None  # and known
     with monkeypatch.context() as patch:
         patch.setattr(thing, name, value)
-        assert altered().endswith(f".{name}")
+        assert str(altered()).endswith(f".{name}")
         with pytest.raises(UndescribedError, match=name):
             program_key((altered,), None, (), {})
     assert altered() is None
@@ -45,14 +45,14 @@ def test_what_is_replaced_is_named_until_it_is_back(monkeypatch, thing, name, va
 
 def test_a_method_that_a_class_did_not_have_is_named(monkeypatch):
     monkeypatch.setattr(REVOLUTE, "__rsub__", lambda *_: 0.0, raising=False)
-    assert altered().endswith("Revolute.__rsub__")
+    assert str(altered()).endswith("Revolute.__rsub__")
 
 
 def test_a_table_that_has_another_entry_is_named(monkeypatch):
     name, table = next((n, t) for n, t in vars(operations).items() if n.isupper() and isinstance(t, dict))
     assert altered() is None
     monkeypatch.setitem(table, "an operation of this test", None)
-    assert altered().endswith(f".{name}")
+    assert str(altered()).endswith(f".{name}")
 
 
 def test_users_classes_alter_nothing():
@@ -69,7 +69,7 @@ def test_programs_of_files_that_were_written_meanwhile_have_no_names(monkeypatch
     monkeypatch.setattr(structure, "BEGUN", time.time() - 1e10)
     structure._changed_file.cache_clear()
     try:
-        assert structure._changed_file().endswith(".py")
+        assert str(structure._changed_file()).endswith(".py")
     finally:
         structure._changed_file.cache_clear()
     assert time.time() >= alterations.BEGUN

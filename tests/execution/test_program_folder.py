@@ -61,7 +61,8 @@ def test_those_that_were_not_used_for_longest_go_first(tmp_path, monkeypatch):
     for key in "abcde":
         ProgramFolder(PrivateFolder(tmp_path)).put(key, PROGRAM)
         for file in tmp_path.iterdir():
-            os.utime(file, (1e9 + "abcde".index(file.stem),) * 2)
+            used = 1e9 + "abcde".index(file.stem)
+            os.utime(file, (used, used))
     assert sorted(file.stem for file in tmp_path.iterdir()) == ["c", "d", "e"]
     assert ProgramFolder(PrivateFolder(tmp_path)).get("c") == PROGRAM
     ProgramFolder(PrivateFolder(tmp_path)).put("f", PROGRAM)
@@ -129,16 +130,20 @@ def undecided(monkeypatch):
     monkeypatch.delenv("JOUNCE_CACHE_DIR", raising=False)
 
 
+def path_of(found):
+    return found._folder.path
+
+
 def test_it_is_among_the_caches_of_the_user_or_where_the_environment_says(undecided, monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert store.current_store()._folder.path == tmp_path / "jounce"
+    assert path_of(store.current_store()) == tmp_path / "jounce"
     assert store.current_store() is store.current_store()
     for folder in (tmp_path / "chosen", ""):
         monkeypatch.setattr(store, "_store", store._undecided)
         monkeypatch.setenv("JOUNCE_CACHE_DIR", str(folder))
         found = store.current_store()
-        assert (found and found._folder.path) == (folder or None)
+        assert (found and path_of(found)) == (folder or None)
 
 
 def test_without_a_home_that_can_be_written_nothing_is_kept_without_a_word(undecided, monkeypatch, tmp_path):
