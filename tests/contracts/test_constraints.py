@@ -16,7 +16,7 @@ def case(request) -> Case:
 
 def checked(case, *contracts, **claims):
     """Hold a case to contracts; return why those that say nothing of it do not."""
-    claims = {"values": case.given, "period": "lead" if case.kind.type_name == "screw" else None, **claims}
+    claims = {"values": case.given, "bodies": case.joined, "period": case.period, **claims}
     report = check_joint(case.kind, space=case.space, optional=case.optional, contracts=contracts, **claims)
     assert {*report.held, *report.left_out} == {*contracts}
     return report.left_out

@@ -17,7 +17,7 @@ from jounce.io.files.located_data import Location
 ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
 """The sections of a file that hold what is told apart by ``type``, and the role of each."""
 
-_PLURALS = {"point": "points", "vector": "vectors", "axis": "axes", "normal": "normals"}
+_PLURALS = {"point": "points", "vector": "vectors", "axis": "axes", "normal": "normals", "radius": "radii"}
 
 
 @dataclass(frozen=True)
