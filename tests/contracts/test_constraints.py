@@ -1,6 +1,5 @@
 """Laws that every joint and driver of the catalogue keeps, and a user's own one too: those of `jounce.testing`."""
 
-import numpy as np
 import pytest
 
 from jounce.testing import check_joint
@@ -17,8 +16,7 @@ def case(request) -> Case:
 
 def checked(case, *contracts, **claims):
     """Hold a case to contracts; return why those that say nothing of it do not."""
-    period = {"screw": "lead", "constant_velocity": 2 * np.pi}.get(case.kind.type_name)
-    claims = {"values": case.given, "period": period, **claims}
+    claims = {"values": case.given, "bodies": case.joined, "period": case.period, **claims}
     report = check_joint(case.kind, space=case.space, optional=case.optional, contracts=contracts, **claims)
     assert {*report.held, *report.left_out} == {*contracts}
     return report.left_out

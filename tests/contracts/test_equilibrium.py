@@ -156,6 +156,7 @@ MOTIONS = {
     "pair": lambda: jn.solve(pair(), [0.1, 0.7], ORDER),
     "pair that falls": lambda: jn.simulate(falling(), [0.0, 0.2], order=ORDER),
     "plane": lambda: jn.solve(MECHANISMS["plane"](), [0.0, 0.3, 0.8], ORDER),
+    "teeth": lambda: jn.solve(MECHANISMS["teeth"](), [0.0, 0.3, 0.8], ORDER),
     "robot with a loop": lambda: jn.solve(loop(), [0.0, 0.8], ORDER),
 }
 

@@ -291,6 +291,52 @@ def tracks():
     )
 
 
+def shafts():
+    """A cage that turns, with a shaft on it about another axis that rolls on a gear beside it."""
+    across = [0.3, 1.0, -0.2]
+    return in_space(
+        9,
+        {"cage": [0, 1, 0], "sun": [0, 1.5, 0.2], "planet": [0.5, 1.2, 0.1]},
+        joints={
+            "C": spatial.Revolute(("ground", "cage"), [0, 1, 0], ZERO, Z, Z),
+            "S": spatial.Revolute(("cage", "sun"), [0, 0.5, 0.2], ZERO, Z, Z),
+            "P": spatial.Revolute(("cage", "planet"), [0.5, 0.2, 0.1], ZERO, across, across),
+            "mesh": spatial.Gear(("sun", "planet", "cage"), Z, [0.6, 2.0, -0.4], -3 / 7),
+        },
+        drivers={
+            "turn": drivers.RotationDriver(("ground", "cage"), Z, wave(0.3, 0.2, 0.4, 1.5), A, [1.0, 0.3, 0.5]),
+            "spin": drivers.RotationDriver(("ground", "sun"), Z, wave(0.4, 0.7, 0.4, 2.0), A, [1.0, 0.3, 0.5]),
+        },
+    )
+
+
+def teeth():
+    """A sun, a planet on an arm, a ring, and a rack that the ring drives, unbalanced, with pressure angles."""
+    o, x, angle = [0.0, 0.0], [1.0, 0.0], 0.35
+    massive = {"mass": 1.3, "inertia": 0.2, "center_of_mass": [0.1, -0.05]}
+    places = {"sun": o, "arm": o, "planet": [0.5, 0], "ring": o, "rack": [0.4, 0.7]}
+    return jn.Mechanism(
+        space="planar",
+        gravity=[0.3, -9.81],
+        bodies={body: jn.Body(at, **massive) for body, at in places.items()},
+        joints={
+            "S": planar.Revolute(("ground", "sun"), o, o),
+            "A": planar.Revolute(("ground", "arm"), o, o),
+            "P": planar.Revolute(("arm", "planet"), [0.5, 0], o),
+            "R": planar.Revolute(("ring", "ground"), o, o),
+            "inner": planar.Gear(("sun", "planet"), None, None, o, o, 0.3, 0.2, angle),
+            "outer": planar.Gear(("ring", "planet"), None, None, o, o, -0.7, 0.2, angle),
+            "guide": planar.Prismatic(("ground", "rack"), [0, 0.7], o, x, x),
+            "teeth": planar.Rolling(("rack", "ring"), o, o, x, 0.7, None, angle),
+        },
+        drivers={
+            "turn": drivers.CoordinateDriver(("ground", "arm"), "angle", "0.5*t + 0.3*sin(2*t)"),
+            "spin": drivers.CoordinateDriver(("ground", "sun"), "angle", "2*t + sin(3*t)"),
+        },
+        forces={"wind": forces.PointForce("rack", [0.1, 0.2], ["t - x", "0.3 - vx"])},
+    )
+
+
 def all_in_the_plane():
     """The same in the plane."""
     o, x, y = [0.0, 0.0], [1.0, 0.1], [-0.1, 1.0]
@@ -413,6 +459,7 @@ MECHANISMS = {
     "couplings": couplings,
     "tracks": tracks,
 }
+MECHANISMS |= {"shafts": shafts, "teeth": teeth}
 
 
 @pytest.mark.slow

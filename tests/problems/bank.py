@@ -33,6 +33,14 @@ def users_own_joint():
 OWN = users_own_joint()
 
 
+TEETH = {"point_i": [0.3, -0.2], "point_j": [0.1, 0.4], "pressure_angle": 0.35}
+GEARS = {
+    "ratio": {"ratio": -0.7},
+    "teeth": TEETH | {"radius_i": 0.8, "radius_j": 1.3},
+    "ring": TEETH | {"radius_i": 0.7, "radius_j": -1.4},
+}
+
+
 @dataclasses.dataclass(frozen=True)
 class Case:
     """A class of the catalogue, with or without its optional values, and its word where it takes one."""
@@ -48,11 +56,28 @@ class Case:
 
     def element(self, random, bodies=None, values=None):
         """Return a random instance; `values` replaces some of its values."""
-        return Samples(self.kind, self.space, self.given, self.optional).element(random, bodies or (), values)
+        samples = Samples(self.kind, self.space, self.given, self.optional, self.joined)
+        return samples.element(random, bodies or (), values)
+
+    @property
+    def joined(self):
+        """How many bodies it is between, where that is not told by its class."""
+        return {"teeth": 2, "ring": 2, "ratio": 3}.get(self.word)
+
+    @property
+    def period(self):
+        """Of its last row, where that is known up to whole periods: a number, or the field that has it."""
+        if self.word in ("teeth", "ring"):
+            return 2 * np.pi * (1 + self.given["radius_i"] / self.given["radius_j"])
+        return {"screw": "lead", "constant_velocity": 2 * np.pi}.get(self.kind.type_name)
 
     @property
     def given(self):
-        """The values that are not random: its word."""
+        """The values that are not random: its word, or what makes gears of one form."""
+        if self.word in GEARS:
+            return GEARS[self.word]
+        if self.kind is jn.planar.Rolling and self.optional:
+            return {"pressure_angle": 0.35}
         return {"coordinate": self.word} if self.word else {}
 
 
@@ -68,5 +93,7 @@ def cases():
             variants = [(False, ""), (True, "")] if extras else [(False, "")]
             if "coordinate" in fields:
                 variants = [(False, "angle"), (True, "angle"), (False, "x"), (True, "y")]
+            if kind is jn.planar.Gear:
+                variants = [(False, word) for word in GEARS]
             found += [Case(kind, space, *variant) for variant in variants]
     return found

@@ -197,7 +197,8 @@ def by_ratio_alone(element: AbstractConstraint) -> bool:
     """Tell whether a joint couples moving bodies by a ratio and nothing else: it does not say where its teeth touch."""
     fields = value_fields(type(element))
     given = "ratio" in fields and getattr(element, "ratio", None) is not None and element.role != "driver"
-    return given and len({*element.bodies} - {"ground"}) > 1 and not any(name.startswith("point") for name in fields)
+    placed = any(getattr(element, name) is not None for name in fields if name.startswith("point"))
+    return given and len({*element.bodies} - {"ground"}) > 1 and not placed
 
 
 def check_bodies(element: Any, counts: tuple[int, ...], does: str = "joins", must: str = "join") -> None:

@@ -6,6 +6,7 @@ is inherited by itself. The base classes state those of usual names.
 """
 
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from types import MappingProxyType
@@ -56,6 +57,7 @@ SIGNS: Mapping[str, str] = MappingProxyType(
         "positive": "must be greater than zero",
         "not negative": "must not be negative",
         "not zero": "must not be zero",
+        "pressure angle": "must be from 0 to 45 deg; a number without a unit is in rad",
         "any": "",
     }
 )
@@ -72,6 +74,7 @@ _MACHINES = {
         "cylindrical",
         "prismatic",
         "screw",
+        "gear",
         "curve",
         "surface",
     ),
@@ -257,6 +260,8 @@ def has_other_sign(sign: str, least: Any, largest: Any) -> Any:
             return least < 0
         case "not zero":
             return largest == 0
+        case "pressure angle":
+            return least < 0 or largest > math.pi / 4
     return False
 
 

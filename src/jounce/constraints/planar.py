@@ -4,11 +4,17 @@ In each, ``d = r_j^P - r_i^P`` leads from the joint's point on body i to that on
 a body, seen in the global frame. ``cross(a, b)`` is the paper's ``a^T R^T b``.
 """
 
+from typing import Any
+
 import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from jounce.constraints.base import AbstractConstraint, Curve, Scalar, Vector, rows
-from jounce.jet import Jet, cross, dot, sqrt
+from jounce.errors import MechanismError
+from jounce.jet import Jet, atan2, cross, dot, sqrt, wrap
+from jounce.jet.turns import brought_near
 from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
@@ -163,31 +169,110 @@ class Coordinate(AbstractConstraint, type="coordinate", space="planar"):
 
 
 class Gear(AbstractConstraint, type="gear", space="planar"):
-    """Gears i and j on a rotating frame m (epicyclic). Sommer 2024, equations 41-43."""
+    """Gears i and j by their pitch circles, or by a ratio on a frame m that turns. Sommer 2024, equations 41-43.
 
-    ratio: Scalar  # -rho_i / rho_j external, rho_i / rho_j internal
+    Toothed gears have two bodies, the points on them where the gears are centered, and pitch radii, of which that of a
+    ring is negative. They turn relative to the line of centers as rolling circles do, and what they exert on each other
+    is the force of a tooth, which bearings bear: along the common tangent of the pitch circles, and with a pressure
+    angle as much off it as presses the gears apart, whichever way the load is.
+
+    By a ratio, gears turn relative to a third body, and no bearing bears anything.
+    """
+
+    ratio: Scalar = None  # -rho_i / rho_j external, rho_i / rho_j internal
     offset: Scalar = None  # rad
+    point_i: Vector = None  # m, center of each gear in its frame
+    point_j: Vector = None
+    radius_i: Scalar = None  # m, of the pitch circle; of a ring below zero
+    radius_j: Scalar = None
+    pressure_angle: Scalar = None  # rad
+    arm: Any = eqx.field(default=None, init=False)  # rad, of the line of centers in the frame of a body that has both
+    flank: Any = eqx.field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
 
-    body_count = 3
-    dimensions = {"ratio": "ratio", "offset": "angle"}
+    body_counts = (2, 3)
+    dimensions = {"ratio": "ratio", "offset": "angle", "pressure_angle": "angle"}
+    signs = {"radius": "not zero", "pressure_angle": "pressure angle"}
     symbol = "gear"
 
-    def residual(self, body_i: PlanarPose, body_j: PlanarPose, body_m: PlanarPose, time: Jet) -> Jet:
-        return (body_j.angle - body_m.angle) - self.ratio * (body_i.angle - body_m.angle) - self.offset
+    def __check_init__(self):
+        toothed = ("point_i", "point_j", "radius_i", "radius_j")
+        given = [name for name in toothed if getattr(self, name) is not None]
+        if (self.ratio is None) == (not given):
+            message = "gears have either a ratio, or points and radii, from which it follows"
+            raise MechanismError(message, name="ratio", value=self.ratio)
+        if given and len(given) < len(toothed):
+            missing = next(name for name in toothed if name not in given)
+            raise MechanismError("gears with teeth have two points, their centers, and two radii", name=missing)
+        if len(self.bodies) != (2 if given else 3):
+            message = (
+                "gears with teeth are two bodies; the one that carries both centers is found by their pins"
+                if given
+                else "gears by a ratio are [i, j, m]: the third body is the frame that carries both, such as ground"
+            )
+            raise MechanismError(message, name="bodies", value=list(self.bodies))
+        if self.pressure_angle is not None and not given:
+            message = "gears by a ratio have no teeth: give points and radii in place of the ratio"
+            raise MechanismError(message, name="pressure_angle", value=self.pressure_angle)
+
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, *others: Any) -> Jet:
+        """Return what body j lacks of turning as body i says.
+
+        Others are the body m and the time. Of gears with teeth there is a body m only where it is known which one
+        carries them: it counts the turns of the line of centers.
+        """
+        if self.ratio is not None:
+            return self._turned(body_i, body_j, others[0].angle, self.ratio)
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        ratio, apart = -self.radius_i / self.radius_j, self.radius_i + self.radius_j
+        d = d + _aside(d, apart)
+        line = atan2(d[1], d[0])
+        if self.arm is None:
+            excess = wrap(self._turned(body_i, body_j, line, ratio), 2 * jnp.pi * (1.0 - ratio))
+        else:
+            line = brought_near(line, others[0].angle.coefficients[0] + self.arm)
+            excess = self._turned(body_i, body_j, line, ratio)
+        if self.flank is None or self.pressure_angle is None:
+            return excess
+        # how far the centers may part, which they never do: across it, the tooth force is along the line of action
+        parted = sqrt(d.dot(d)) - jnp.abs(apart)
+        side = -self.flank * jnp.sign(apart) / jnp.abs(self.radius_j)
+        return excess + side * jnp.tan(self.pressure_angle) * parted
+
+    def _turned(self, body_i: PlanarPose, body_j: PlanarPose, line: Jet, ratio: Any) -> Jet:
+        return (body_j.angle - line) - ratio * (body_i.angle - line) - self.offset
+
+
+def _aside(d: Jet, distance: Any) -> Any:
+    """Return what parts centers of gears that a starting guess has in one place, where no line of centers is told."""
+    value = d.coefficients[0]
+    together = (value == 0).all(axis=0)
+    return jnp.where(together, jnp.abs(distance), 0.0)[None] * np.array([1.0, 0.0]).reshape(2, *[1] * together.ndim)
 
 
 class Rolling(AbstractConstraint, type="rolling", space="planar"):
-    """A disc j rolls along a line of body i. Sommer 2024, equations 50-52 (51 as corrected in the errata)."""
+    """A disc j rolls along a line of body i. Sommer 2024, equations 50-52 (51 as corrected in the errata).
+
+    A disc that turns anticlockwise, as angles count, goes along the line: its center lies on the right of it. A pinion
+    on a rack has a pressure angle, by which the force of a tooth presses both apart.
+    """
 
     point_i: Vector  # m, on the line; in the frame of body i
     point_j: Vector  # m, centre of the disc
     vector_i: Vector  # along the line
     radius: Scalar  # m
     offset: Scalar = None  # m
+    pressure_angle: Scalar = None  # rad
+    flank: Any = eqx.field(default=None, init=False)  # 1 or -1, the sign of the multiplier; zero for neither
 
-    dimensions = {"offset": "length"}
+    dimensions = {"offset": "length", "pressure_angle": "angle"}
+    signs = {"pressure_angle": "pressure angle"}
     symbol = "rolling"
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         travel = slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
-        return travel - self.radius * (body_j.angle - body_i.angle) - self.offset
+        rolled = travel - self.radius * (body_j.angle - body_i.angle) - self.offset
+        if self.flank is None or self.pressure_angle is None:
+            return rolled
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        aside = cross(body_i.direction(self.vector_i), d) / length_of(self.vector_i)
+        return rolled + self.flank * jnp.tan(self.pressure_angle) * (aside + self.radius)

@@ -5,10 +5,11 @@ In each, ``d = r_j^P - r_i^P`` leads from the joint's point on body i to that on
 
 from typing import Any
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.constraints.angles import Vectors, coaxial, perpendiculars, relative_angle
+from jounce.constraints.angles import Datum, Vectors, coaxial, perpendiculars, relative_angle
 from jounce.constraints.base import AbstractConstraint, Curve, Scalar, Vector, rows
 from jounce.constraints.planar import length_of, slide
 from jounce.jet import Jet, cross, dot, wrap
@@ -236,6 +237,38 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
         angle = relative_angle(body_i, body_j, self.axis_i, datum=coaxial(self.axis_i, self.axis_j))
         excess = advance - self.lead / (2 * jnp.pi) * angle - self.offset
         return rows(*_collinear(self, body_i, body_j), wrap(excess, self.lead))
+
+
+class Gear(AbstractConstraint, type="gear", space="spatial"):
+    """Shafts i and j turn in a ratio, each about its axis, relative to the frame m that carries them.
+
+    The axes may lie as they like, crossed as of a worm and its wheel, cut each other as of bevel gears, or be parallel
+    as of a belt, and the frame may move. Each is the axis of a joint, which holds its direction in the frame.
+
+    Turns are those that the attitudes tell, and what is left of the ratio after whole turns of both shafts must vanish:
+    a continuous motion never loses count, of a ratio of whole numbers, as all of teeth are.
+    """
+
+    axis_i: Vector  # in the frame of each body
+    axis_j: Vector
+    ratio: Scalar  # turns of j about its axis to those of i about its own
+    offset: Scalar = None  # rad
+    held_i: Datum | None = eqx.field(default=None, init=False)  # that lays each axis on the one that it is in the frame
+    held_j: Datum | None = eqx.field(default=None, init=False)
+    whole: Any = eqx.field(default=None, init=False)  # the smallest whole number whose product with the ratio is whole
+
+    body_count = 3
+    dimensions = {"ratio": "ratio", "offset": "angle"}
+    signs = {"ratio": "not zero"}
+    symbol = "gear"
+
+    def residual(self, body_i: SpatialPose, body_j: SpatialPose, body_m: SpatialPose, time: Jet) -> Jet:
+        turn_i, turn_j = (
+            -relative_angle(body, body_m, axis, datum=held)
+            for body, axis, held in ((body_i, self.axis_i, self.held_i), (body_j, self.axis_j, self.held_j))
+        )
+        excess = turn_j - self.ratio * turn_i - self.offset
+        return excess if self.whole is None else wrap(excess, 2 * jnp.pi / self.whole)
 
 
 class ConstantVelocity(AbstractConstraint, type="constant_velocity", space="spatial"):

@@ -233,6 +233,36 @@ def prescribed_angles(
     return [given for given in found if np.isfinite(given.angle)]
 
 
+def lost_count(groups: Sequence[Group], history: AttitudeHistory) -> tuple[int, int, float] | None:
+    """Return where shafts of a ratio have lost count of their turns: group, instance, and instant, s; None if nowhere.
+
+    Their residual knows angles up to whole turns. Along attitudes that are close to each other turns are counted.
+    """
+    for index, group in enumerate(groups):
+        whole = getattr(group.element, "whole", None)
+        if whole is None:
+            continue
+        time, raw = history.looked_at(lambda quaternion, g=group: _shaft_angles(g, quaternion))
+        first, second = np.split(counted_on(raw), 2)
+        excess = second - np.asarray(group.element.ratio) * first
+        lost = np.abs(excess - excess[:, :1]) > np.pi / 2 / np.asarray(whole)
+        if lost.any():
+            instance = int(np.argmax(lost.any(axis=1)))
+            return index, instance, float(time[np.argmax(lost[instance])])
+    return None
+
+
+def _shaft_angles(group: Group, quaternion: Float[np.ndarray, "4 bodies place"]) -> Float[np.ndarray, "angle place"]:
+    """Return how far shafts of a group are turned in their frames, up to whole turns: the first, then the second."""
+    element, frame, found = group.element, quaternion[:, list(group.bodies[2])], []
+    for bodies, axis, held in zip(
+        group.bodies[:2], (element.axis_i, element.axis_j), (element.held_i, element.held_j), strict=True
+    ):
+        axis = np.asarray(axis) / np.linalg.norm(axis, axis=0)
+        found.append(-since(held, _product(_inverse(quaternion[:, list(bodies)]), frame), axis))
+    return np.concatenate(found)
+
+
 def axis_of(group: Group) -> Float[np.ndarray, "3 instance 1"]:
     """Return the unit axes on body i of the elements of a group, (3, instances, 1)."""
     element = group.element

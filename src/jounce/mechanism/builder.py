@@ -27,10 +27,11 @@ from jounce.mechanism.axis_angles import (
     with_datums,
 )
 from jounce.mechanism.carriages import ENDING, carriage_guess, curve_in, joint_of
-from jounce.mechanism.mechanism import GROUND, Carriage, Mechanism
+from jounce.mechanism.gear_frames import Grouped, grouped_with_frames
+from jounce.mechanism.mechanism import Carriage, Mechanism
 from jounce.mechanism.outputs import AbstractMotionOutput
 from jounce.mechanism.resolve import along_instances, resolve, resolve_element, resolved
-from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, group_elements, holding, law_left_out
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, holding, law_left_out
 from jounce.modules import unchecked, with_fields
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.euler_parameters import euler_parameters
@@ -38,9 +39,6 @@ from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 from jounce.trajectory import AbstractMotion
 from jounce.trajectory.curves import CurveLaw
-
-Grouped = tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]
-"""Groups, and the names of the elements of each, with their kinds before them."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -204,13 +202,12 @@ def grouped_elements(mechanism: Mechanism, *, initial: bool = False) -> tuple[Gr
 
     Initial conditions are among the drivers, where they are asked for.
     """
-    parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
-    body_index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
 
     def grouped(*kinds: str) -> Grouped:
         elements = {f"{kind}.{k}": v for kind in kinds for k, v in mechanism.elements[kind].items()}
-        posed = {name: v for name, v in elements.items() if not isinstance(v, AbstractMotionOutput)}
-        return group_elements(posed, parameters, body_index, components)
+        return grouped_with_frames(
+            mechanism, {name: v for name, v in elements.items() if not isinstance(v, AbstractMotionOutput)}
+        )
 
     held = grouped("joints", "drivers", "initial") if initial else grouped("joints", "drivers")
     return held, grouped("forces"), grouped("outputs")

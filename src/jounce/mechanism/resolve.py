@@ -305,7 +305,7 @@ def static_fields(kind: type[Element]) -> tuple[str, ...]:
 def group_key(element: Element, values: Mapping[str, Any]) -> Any:
     """Return what instances must share to be stacked: class, words, and the structure of their values."""
     static = static_fields(type(element))
-    words = tuple(getattr(element, name) for name in static)
+    words = (len(element.bodies), *(getattr(element, name) for name in static))
     numbers_only = {name: value for name, value in values.items() if name not in static}
     if all(isinstance(value, float | np.ndarray | jax.Array) for value in numbers_only.values()):  # traced ones too
         shapes = tuple((name, np.shape(value)) for name, value in numbers_only.items())

@@ -28,6 +28,7 @@ from jounce.mechanism.builder import (
     with_offsets,
     with_sense,
 )
+from jounce.mechanism.gear_frames import check_ratios
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.preconditions import PLAIN
 from jounce.mechanism.resolve import resolve
@@ -153,6 +154,7 @@ def traced_model(
     components, pose_type = (2, PlanarPose) if planar else (3, SpatialPose)
     guess = starting_guess(posed, mechanism.parameter_values, components)
     (groups, names), *others = grouped_elements(mechanism)
+    check_ratios(groups, names)
     groups = tuple(with_sense(with_offsets(group, pose_type, guess), pose_type, guess) for group in groups)
     parts = [groups, *(part for part, _ in others)]
     if angles is not None and any(measures_angle(group) for part in parts for group in part):

@@ -13,9 +13,11 @@ from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve
 from jounce.plot.frames import guessed, points_at, within
 
-__all__ = ["pitch_radii"]
+__all__ = ["pitch_radii", "shaft_wheels"]
 
-Center = Float[np.ndarray, "2"]
+THINNEST = 0.12  # of the distance of shafts: the radius of a worm, as it is drawn
+
+Center = Float[np.ndarray, " component"]
 Pins = list[dict[str, Center]]  # the points of each revolute joint by body
 
 
@@ -98,3 +100,80 @@ def _seen_from(mechanism: Mechanism, pins: Pins, body: str, carrier: str, center
     frames = guessed(mechanism)
     (point,) = points_at(frames[body], center)
     return within(frames[carrier], point[None])[0]
+
+
+def shaft_wheels(mechanism: Mechanism, gear: Any) -> tuple[list[Center], list[float]]:
+    """Return where wheels of two shafts in space are drawn, each in the frame of its body, and their radii, m.
+
+    Their rims touch, of radii in the ratio of the turns, where the axes lie so: about axes that meet, at the distance
+    of the hinges from there, and about others, at the common perpendicular.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Spatial.
+    gear : jounce.spatial.Gear
+        One of its joints.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> from jounce.plot.gears import shaft_wheels
+    >>> zero, x, y = [0, 0, 0], [1, 0, 0], [0, 1, 0]
+    >>> pair = jn.Mechanism(
+    ...     space="spatial",
+    ...     bodies={"pinion": jn.Body([-0.06, 0, 0]), "wheel": jn.Body([0, 0.04, 0])},
+    ...     joints={
+    ...         "A": jn.spatial.Revolute(("ground", "pinion"), [-0.06, 0, 0], zero, x, x),
+    ...         "B": jn.spatial.Revolute(("ground", "wheel"), [0, 0.04, 0], zero, y, y),
+    ...         "mesh": jn.spatial.Gear(("pinion", "wheel", "ground"), x, y, -2 / 3),
+    ...     },
+    ... )
+    >>> centres, radii = shaft_wheels(pair, pair.joints["mesh"])
+    >>> [round(radius, 6) for radius in radii]
+    [0.04, 0.06]
+    """
+    parameters, frames = mechanism.parameter_values, guessed(mechanism)
+    ratio = abs(float(np.asarray(resolve(gear.ratio, parameters))))
+    places, axes = [], []
+    for body, given in zip(gear.bodies[:2], (gear.axis_i, gear.axis_j), strict=True):
+        axis = np.asarray(resolve(given, parameters), float)
+        places.append(points_at(frames[body], _on_axis(mechanism, body, axis))[0])
+        axes.append(frames[body][0, :, 1:] @ axis / np.linalg.norm(axis))
+    apart, normal = places[1] - places[0], np.cross(*axes)
+    sine = float(np.linalg.norm(normal))
+    if sine < 1e-9:
+        across = apart - (apart @ axes[0]) * axes[0]
+        centers = [places[0], places[0] + across]
+    else:  # the feet of the common perpendicular
+        along = [np.linalg.det(np.stack([apart, axis, normal])) / sine**2 for axis in axes[::-1]]
+        centers = [place + t * axis for place, t, axis in zip(places, along, axes, strict=True)]
+    distance = float(np.linalg.norm(centers[1] - centers[0]))
+    reach = [float((place - center) @ axis) for place, center, axis in zip(places, centers, axes, strict=True)]
+    size = max(1e-300, *(float(np.max(np.abs(place))) for place in places))
+    if distance > 1e-9 * size:
+        thick = np.maximum(np.array([ratio, 1.0]) / (1.0 + ratio), THINNEST)
+        radii = (thick / thick.sum() * distance).tolist()
+    else:
+        known = [abs(reach[0]) * sine, abs(reach[1]) * sine / ratio]
+        second = next((x for x in known if x > 1e-9 * size), 0.15 * size)
+        radii = [ratio * second, second]
+        for k, other in enumerate((second, ratio * second)):
+            side = axes[k] if reach[k] >= 0 else -axes[k]
+            centers[k] = centers[k] + side * other / (sine or 1.0)
+    found = [within(frames[b], c[None])[0] for b, c in zip(gear.bodies, centers, strict=False)]
+    return found, radii
+
+
+def _on_axis(mechanism: Mechanism, body: str, axis: Center) -> Center:
+    """Return a point of a body on an axis of it: of a joint that has the axis, else its origin."""
+    for joint in mechanism.joints.values():
+        for pair in facts_of(type(joint)).held_parallel:
+            for of, name, end in zip(joint.bodies, pair, "ij", strict=False):
+                point = getattr(joint, f"point_{end}", None)
+                if of != body or point is None:
+                    continue
+                direction = np.asarray(resolve(getattr(joint, name), mechanism.parameter_values), float)
+                if np.linalg.norm(np.cross(direction, axis)) <= 1e-9 * np.linalg.norm(direction) * np.linalg.norm(axis):
+                    return np.asarray(resolve(point, mechanism.parameter_values), float)
+    return np.zeros(3)

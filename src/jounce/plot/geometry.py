@@ -25,7 +25,7 @@ from jounce.mechanism.resolve import check_value, resolve
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.plot.curve_lines import NONE, CurveLines, curve_lines
 from jounce.plot.frames import guessed, points_at
-from jounce.plot.gears import pitch_radii
+from jounce.plot.gears import pitch_radii, shaft_wheels
 
 __all__ = ["DrawnLink", "Point", "Points", "Skeleton", "Symbol", "Wheel", "frame_along", "skeleton"]
 
@@ -158,12 +158,12 @@ class Skeleton:
 
     @cached_property
     def wheels(self) -> list[Wheel]:
-        """Gears and wheels, in the order of their joints; a gear of several pairs counts once."""
+        """Gears and wheels in the plane, in the order of their joints; a gear of several pairs counts once."""
         wheels: list[Wheel] = []
         for symbol in self.symbols:
             radii = [radius for radius in symbol.radii if radius is not None]
             for body, center, radius in zip(symbol.bodies, symbol.points, symbol.radii, strict=True):
-                if radius is None:
+                if radius is None or len(center) > 2:  # those in space are drawn about their axes
                     continue
                 near = SAME * self.size
                 same = (w for w in wheels if w.body == body and np.allclose(w.center, center, rtol=0, atol=near))
@@ -363,6 +363,12 @@ def _symbol(
     symbol = Symbol(name, facts.symbol, bodies, tuple(points), tuple(axes), tuple(radii))
     if curve is not None:
         symbol = replace(symbol, curve=curve)
+    if facts.symbol == "gear" and components == 3:
+        centers, wheels = shaft_wheels(mechanism, element)
+        return replace(symbol, points=(*centers, *symbol.points[2:]), radii=(*wheels, *symbol.radii[2:]))
+    if "radius_j" in values:
+        radii = [float(values[name]) for name in ("radius_i", "radius_j")]
+        return replace(symbol, radii=tuple(map(abs, radii)), internal=min(radii) < 0)
     if element.role == "joint" and facts.symbol in ("gear", "coordinate"):
         return _geared(mechanism, symbol, coordinate, float(values.get("ratio", 1.0)))
     return symbol

@@ -193,6 +193,18 @@ def _universal(drawing: Drawing, symbol: Symbol) -> None:
             drawing.disc(end, 0.4 * u, stroke=colour, fill=parts.PAPER, width=1.2, layer=SYMBOLS)
 
 
+def _shafts(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw the wheels of two shafts, each with a mark that shows how it turns."""
+    for slot, (body, radius) in enumerate(zip(symbol.bodies[:2], symbol.radii, strict=False)):
+        if radius is None or body == GROUND:
+            continue
+        axes, colour = drawing.frame_along(body, symbol.axis_on(slot)), drawing.colours.get(body, INK)
+        place, look = drawing.place(symbol, slot), {"stroke": colour, "layer": WHEELS, "owner": f"bodies.{body}"}
+        parts.cylinder(drawing, place, axes, (0.7, radius / drawing.unit), fill=tinted(colour, 0.15), width=1.2, **look)
+        rim = place + radius * drawing.flat(axes[:, 1])
+        drawing.line(place, rim, width=1.0, **look)
+
+
 def _plane(drawing: Drawing, symbol: Symbol) -> None:
     """Draw the plane of a body, as large as the point on it travels, and a ball at the point."""
     body, point = symbol.bodies[0], drawing.global_point(symbol, 1)
@@ -246,5 +258,6 @@ _SPATIAL: dict[str, Callable[[Drawing, Symbol], None]] = {
     "screw": _sleeve,
     "curve": _curve,
     "surface": _curve,
+    "gear": _shafts,
     "none": _nothing,
 }

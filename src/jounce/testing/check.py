@@ -76,6 +76,7 @@ def check_joint(
     equations: int | None = None,
     period: str | float | None = None,
     optional: bool = False,
+    bodies: int | None = None,
     contracts: Sequence[str] | None = None,
     seed: int = 0,
 ) -> JointReport:
@@ -116,6 +117,8 @@ def check_joint(
         class is `periodic`.
     optional : bool
         Whether fields that may be left out have values, too.
+    bodies : int, optional
+        How many bodies the joint is between, where its class allows several numbers; the first of them unless given.
     contracts : sequence of str, optional
         Names of those to be looked at, if not all.
     seed : int
@@ -151,7 +154,7 @@ def check_joint(
         check_name("contract", name, CONTRACTS, MechanismError, name="contracts")
     for name in values or {}:
         check_name("field", name, facts_of(kind).signs, MechanismError, name="values")
-    samples = Samples(kind, space, dict(values or {}), optional)
+    samples = Samples(kind, space, dict(values or {}), optional, bodies)
     subject = Subject(samples, order, relative, period, equations, seed)
     held, left_out = [], {}
     for name in chosen:

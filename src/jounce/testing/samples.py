@@ -42,12 +42,15 @@ class Samples:
         Values of fields that are not random.
     optional : bool, default False
         Whether fields that may be left out have values, too; an offset always has.
+    joined : int, optional
+        How many bodies a joint is between, where its class allows several numbers; the first of them unless given.
     """
 
     kind: type[Any]
     space: str
     given: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     optional: bool = False
+    joined: int | None = None
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -58,7 +61,7 @@ class Samples:
     def count(self) -> int:
         """How many bodies the joint is between."""
         counts: tuple[int, ...] = self.kind.body_counts or (self.kind.body_count,)
-        return counts[0]
+        return self.joined or counts[0]
 
     def element(
         self, random: np.random.Generator, bodies: Sequence[str] = (), values: Mapping[str, Any] | None = None

@@ -290,7 +290,10 @@ def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> d
         or (isinstance(motion, MotionAtState) and not _determined(motion, jacobian[0], mass[0]))
     ):
         return forces
-    values = derivatives_along(motion, MotionForces.of(motion).unique_multipliers[:levels][:, _row_order(motion)])
+    solved = MotionForces.of(motion)
+    if solved.flanks:  # which the equations do not have: what the teeth press apart moves nothing
+        solved = MotionForces(motion, flanks=False)
+    values = derivatives_along(motion, solved.unique_multipliers[:levels][:, _row_order(motion)])
     return forces | {"multipliers": (("time", "derivative", "row"), values, 0)}
 
 

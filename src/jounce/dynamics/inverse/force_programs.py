@@ -17,6 +17,7 @@ from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.forward.loads import loads, mass_matrices
 from jounce.dynamics.inverse import constraint_forces, redundant_forces
 from jounce.dynamics.inverse.constraint_forces import Multipliers, Slope, Slopes
+from jounce.dynamics.inverse.tooth_flanks import with_flanks
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.dynamics.motion_values import Coordinates, in_lots, part_of, pose_of
 from jounce.execution.compilation import compiled
@@ -27,6 +28,7 @@ from jounce.jet.algebra import stacked, total
 from jounce.kinematics.sensitivity.jacobian_series import along_displacements, slopes
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import Group, System, movable, with_rows
+from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
@@ -80,11 +82,13 @@ def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, A
         The system, one of its forces alone, masses and gravity; and, where rows are redundant, what `least_multipliers`
         takes beside the load, else None: then there is one case, that of `multipliers`.
     lanes : tuple
-        Of the instant: the coordinates of all bodies, the angles about axes that forces measure, and its time.
+        Of the instant: the coordinates of all bodies, the angles about axes that forces measure, the flanks on which
+        teeth press, and its time.
     pose_type
         Of the coordinates.
     """
-    (system, loaded, masses, gravity, choice), (bodies, angles, instants) = shared, lanes
+    (system, loaded, masses, gravity, choice), (bodies, angles, flanks, instants) = shared, lanes
+    system = with_fields(system, groups=with_flanks(system.groups, flanks))
     levels = len(bodies["position"]) - 2  # accelerations use up two
     loaded = dataclasses.replace(loaded, forces=with_turns(loaded.forces, angles))
     load, finite = body_loads.function(loaded, bodies, instants, masses, gravity, pose_type)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.inverse import force_programs as programs
+from jounce.dynamics.inverse import force_programs as programs, tooth_flanks as teeth
 from jounce.dynamics.inverse.redundant_forces import OPEN, OpenMultipliers
 from jounce.dynamics.masses import check_loads, gravity_of, masses_of
 from jounce.dynamics.motion_values import along_motion, part_of
@@ -21,7 +21,7 @@ from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism.axis_angles import at_lanes, measures_angle
 from jounce.mechanism.element_indices import ElementIndex, element_indices, force_names
 from jounce.mechanism.redundant_reactions import resolved_reactions
-from jounce.mechanism.system import Group, law_left_out
+from jounce.mechanism.system import Group, holding, law_left_out
 from jounce.shapes import Numbers
 
 NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
@@ -36,6 +36,8 @@ class MotionForces:
         Of a mechanism with masses or applied forces.
     gravity, applied : bool, default True
         Whether the bodies have weight, and whether the applied forces act.
+    flanks : bool, default True
+        Whether teeth press on their flanks, and so load bearings by their pressure angle.
 
     Raises
     ------
@@ -43,7 +45,7 @@ class MotionForces:
         If nothing has a mass and no force is applied, the motion has no accelerations, or the masses are not valid.
     """
 
-    def __init__(self, motion: Motion, *, gravity: bool = True, applied: bool = True):
+    def __init__(self, motion: Motion, *, gravity: bool = True, applied: bool = True, flanks: bool = True):
         check_loads(motion.mechanism)
         self.motion, self.model = motion, motion.model
         self.pose_type, self.coordinates = motion.poses
@@ -58,6 +60,8 @@ class MotionForces:
         system = self.model.system  # programs without laws serve all of them, also those that a motion has found
         self._bare = dataclasses.replace(system, groups=tuple(map(law_left_out, system.groups)))
         self._kept: dict[tuple[Any, ...], Numbers] = {}
+        self.flanks: teeth.Flanks = teeth.either_flank(system.groups, len(motion.time)) if flanks else {}
+        self._reversals: dict[int, np.ndarray] = {}
 
     @classmethod
     def of(cls, motion: Motion) -> "MotionForces":
@@ -74,7 +78,6 @@ class MotionForces:
         at change points, where they are not determined, and next to them where rounding decides them.
         """
         found = self._balancing[0]
-        self.check_finite(found)
         passages, time = self.motion.passages, self.motion.time
         if passages:  # a distance d away they grow as 1 / d, and so does what rounding makes of them
             unknown = [spoiled(passages, time, level + 1) for level in range(len(found))]
@@ -84,6 +87,18 @@ class MotionForces:
     @cached_property
     def _balancing(self) -> Float[Numbers, "case level row time"]:
         """Multipliers that balance the loads; after them some that balance none, where any are looked for."""
+        if not self.flanks:
+            return self._balanced({})
+        teeth.check_pitch(self.motion, self._bare.groups, lambda k: self._poses(k, np.arange(len(self.motion.time))))
+        found, known, self._reversals = teeth.settled(self._balanced, self.flanks, self.model, self.motion)
+        if self._looks_for_open:  # what is open presses on no flank that is known: any others tell what depends on it
+            found = np.stack([found[0], self._balanced(teeth.by_chance(known))[1]])
+        self.flanks = known
+        return found
+
+    def _balanced(self, flanks: teeth.Flanks) -> Float[Numbers, "case level row time"]:
+        """Return what balances the loads, and balances none, with flanks that teeth press on."""
+        self.flanks = flanks
         system = dataclasses.replace(self._bare, outputs=())
         nothing = Pattern.of((), (), system.pattern.width, system.body_count)
         unjoined = dataclasses.replace(
@@ -95,7 +110,8 @@ class MotionForces:
 
         def lanes_of(lanes: np.ndarray) -> Any:
             bodies = self.coordinates_at(None, lanes, self.levels + 2)
-            return bodies, tuple(angle[..., lanes] for angle in angles), self.motion.time[lanes]
+            turned, pressed = (tuple(x[..., lanes] for x in each) for each in (angles, flanks.values()))
+            return bodies, turned, pressed, self.motion.time[lanes]
 
         first = np.zeros(1, int)
         loaded = dataclasses.replace(unjoined, forces=at_lanes(self.forces, first))  # angles come with each instant
@@ -107,7 +123,7 @@ class MotionForces:
                 found, finite = code(lanes_of(lanes))
                 self._check_finite(finite, lanes)
                 return found
-            blocks, (bodies, _, instants) = self._blocks(lanes), lanes_of(lanes)
+            blocks, (bodies, *_, instants) = self._blocks(lanes), lanes_of(lanes)
             forces = dataclasses.replace(unjoined, forces=at_lanes(self.forces, lanes))
             load, finite = programs.body_loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
             self._check_finite(finite, lanes)
@@ -116,7 +132,9 @@ class MotionForces:
             still = None if square else self.coordinates_at(None, lanes, 1)
             return programs.multipliers(system, blocks, load, still, self.masses, self.pose_type)[None]
 
-        return self.in_chunks(chunk)
+        found = self.in_chunks(chunk)
+        self.check_finite(found[0])
+        return found
 
     @property
     def _choice(self) -> tuple[Numbers, Numbers, Numbers]:
@@ -167,6 +185,7 @@ class MotionForces:
         solved = self.motion.status == Status.OK
         size = np.abs(found[0][:, solved] * self.open.weights[:, None]).max(initial=0.0)
         twin.__dict__["multipliers"] = found / (size or 1.0)
+        twin.flanks = teeth.by_chance(self.flanks)
         return twin
 
     @property
@@ -271,7 +290,8 @@ class MotionForces:
             def of_constraint(lanes: np.ndarray) -> Any:
                 return programs.wrenches(self._slopes(place.group, slot, lanes), self._of_group(place)[..., lanes])
 
-            return self._once(of_constraint, "joint", place.group, slot)[:, :, place.instance]
+            found = self._once(of_constraint, "joint", place.group, slot)[:, :, place.instance]
+            return teeth.told(found, self._reversals.get(place.group), place.instance)
         index, instance = self._force_index(name)
 
         def of_force(lanes: np.ndarray) -> Any:
@@ -388,8 +408,10 @@ class MotionForces:
         return tuple(self.coordinates_at(slot, lanes, self.levels) for slot in bodies)
 
     def _slopes(self, index: int, slot: int, lanes: np.ndarray) -> Any:
-        element = self._bare.groups[index].element
-        poses, instants = self._poses(index, lanes), self.motion.time[lanes]
+        group = self._bare.groups[index]
+        if index in self.flanks:
+            group = holding(group, "flank", self.flanks[index][..., lanes])
+        element, poses, instants = group.element, self._poses(index, lanes), self.motion.time[lanes]
         return programs.element_slopes(element, poses, instants, self.pose_type, slot, self.levels)
 
     def _of_group(self, index: ElementIndex) -> Float[Numbers, "order row instance time"]:

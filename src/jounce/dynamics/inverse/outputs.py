@@ -9,6 +9,7 @@ import numpy as np
 from jounce.constraints import Cam
 from jounce.constraints.base import Vector, by_ratio_alone
 from jounce.dynamics.inverse.motion_forces import MotionForces
+from jounce.dynamics.inverse.tooth_flanks import flank_words
 from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_choice, check_name, did_you_mean
 from jounce.forces import AbstractForce
@@ -143,15 +144,17 @@ class _JointOutput(_Reaction):
         check_choice("frame", self.frame, ("global", "body", *dict.fromkeys(felt)), MechanismError)
 
     def remark(self, motion: Motion, values: np.ndarray) -> str:
-        """Return why values are NaN, and which gears load no bearing of their bodies."""
+        """Return why values are NaN, which gears load no bearing of their bodies, and where loads change flanks."""
         joints = motion.mechanism.joints
         bodies = {*_exerting(motion.mechanism, self.joint).bodies} - {GROUND}
         gears = [name for name, x in joints.items() if by_ratio_alone(x) and bodies & {*x.bodies}]
         cams = [
             name for name, x in joints.items() if isinstance(x, Cam) and name != self.joint and bodies & {*x.bodies}
         ]
-        loaded, pressed = ([x for x in names if MotionForces.of(motion).is_loaded(x)] for names in (gears, cams))
-        return "; ".join(filter(None, (super().remark(motion, values), ratio_words(loaded), cam_words(pressed))))
+        forces = MotionForces.of(motion)
+        loaded, pressed = ([x for x in names if forces.is_loaded(x)] for names in (gears, cams))
+        words = super().remark(motion, values), ratio_words(loaded), cam_words(pressed), flank_words(forces, bodies)
+        return "; ".join(filter(None, words))
 
     def _values(self, motion: Motion, point: ArrayLike | None, part: int, size: float) -> Numbers:
         """Return force or moment about a point of the body, with rates; about that of the joint unless given."""

@@ -19,7 +19,7 @@ from jounce.modules import is_ours
 ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
 """The sections of a file that hold what is told apart by ``type``, and the role of each."""
 
-_PLURALS = {"point": "points", "vector": "vectors", "axis": "axes", "normal": "normals"}
+_PLURALS = {"point": "points", "vector": "vectors", "axis": "axes", "normal": "normals", "radius": "radii"}
 
 
 @dataclass(frozen=True)

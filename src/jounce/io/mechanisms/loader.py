@@ -20,6 +20,7 @@ from jounce.io.mechanisms.keys import ROLES, FileKey, file_keys, location_of
 from jounce.io.mechanisms.unit_hints import warn_of_units
 from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid, with_outputs_held
 from jounce.mechanism.builder import starting_guess
+from jounce.mechanism.gear_frames import check_distances
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.resolve import resolve, resolve_element
@@ -255,6 +256,7 @@ def _check_values(mechanism: Mechanism) -> None:
     for kind, elements in mechanism.elements.items():
         for name, element in elements.items():
             resolve_element(element, parameters, components, f"{kind}.{name}")
+    check_distances(mechanism)
     starting_guess(mechanism, parameters, components)
     for name, body in mechanism.rigid_bodies.items():
         body_mass(name, body, parameters, components)

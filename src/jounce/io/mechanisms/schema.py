@@ -27,6 +27,7 @@ from jounce.io.mechanisms.values import (
     problem,
     redundant_reactions,
     scalar,
+    scalars,
     vector,
     vectors,
     wrenches,
@@ -154,8 +155,10 @@ def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
             return laws(size, key.quantity, variables_of(kind))
         case "motion":
             return motion(key.quantity)
-        case "scalar":
+        case "scalar" if len(key.fields) == 1:
             return scalar(key.quantity)
+        case "scalar":
+            return scalars(len(key.fields), key.quantity)
         case "vector" if len(key.fields) == 1:
             return vector(size, key.quantity)
         case "vector":

@@ -107,6 +107,18 @@ def scalar(quantity: str) -> Any:
     return Annotated[Any, Checked(lambda raw, info: parse(raw, quantity, info).value, scalar_schema(quantity))]
 
 
+def scalars(count: int, quantity: str) -> Any:
+    """Return the annotation of a list of values of one kind, one of each body."""
+
+    def check(raw: object, info: Any) -> tuple[float | Expression, ...]:
+        if not isinstance(raw, (list, tuple)) or len(raw) != count:
+            raise problem(f"must be a list of {count} values, one of each body")
+        return tuple(parse(item, quantity, info, index).value for index, item in enumerate(raw))
+
+    schema = {"description": _words(quantity)} | list_schema({"anyOf": ANY_VALUE}, count)
+    return Annotated[Any, Checked(check, schema)]
+
+
 def vector_value(raw: object, size: int, quantity: str, info: Any, *at: str | int) -> tuple[float | Expression, ...]:
     """Read a list of values of one kind."""
     if not isinstance(raw, (list, tuple)) or len(raw) != size:

@@ -25,6 +25,7 @@ from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
 from jounce.mechanism.builder import group_rows, with_reference
 from jounce.mechanism.carriages import ENDING
+from jounce.mechanism.gear_frames import check_gears
 from jounce.modules import with_fields
 from jounce.trajectory import AbstractMotion
 
@@ -60,6 +61,8 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
         If no position near the guess fulfils all joints; the message names those that stay open.
     MobilityError
         If joints and drivers leave degrees of freedom, or the position is singular.
+    MechanismError
+        If no body carries the centers of gears with teeth, or a frame does not hold the axis of a shaft.
     """
     columns = model.system.shape[1]
     if not model.rows and not free:
@@ -90,6 +93,7 @@ def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Asse
     A guess in which directions that joints hold parallel are far from it may lead to a part that lies turned over, or
     nowhere: then the directions are drawn together first, in some ways until one does not end in a singular position.
     """
+    check_gears(model.system.groups, [model.rows[place] for place in group_rows(model)])
     best = _nearby(model, instant, tolerance)
     found = best[1]
     sought = senses_to_seek(model, found)

@@ -39,6 +39,8 @@ from jounce.mechanism import (
     time_grid,
     with_outputs_held,
 )
+from jounce.mechanism.axis_angles import AttitudeHistory, lost_count
+from jounce.mechanism.builder import group_rows
 from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete, concrete_or
@@ -151,6 +153,7 @@ def solve(
     found = solve_grid(solver, path, instants, progress, count, keep=keep)
     state, outcome = (found.coordinates, found.outputs), (found.status, found.faults, path.change_points)
     told = path.history(), _backend(solver, path, instants)
+    _check_count(solver.model, told[0])
     motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, *told))
     if strict:
         raise_for_status(motion)
@@ -258,6 +261,18 @@ def _followed(
         where = f"t = {first:g} s, {path.fault}"
         raise SolveError(f"{where}: {_words(path.status)}: {path.status.advice}", status=path.status)
     return solver, path
+
+
+def _check_count(model: Model, history: AttitudeHistory | None) -> None:
+    """Raise SolveError where gears in space have lost count of their turns on the way."""
+    lost = None if history is None else lost_count(model.system.groups, history)
+    if lost is not None:
+        group, instance, instant = lost
+        name = model.rows[group_rows(model)[group]][instance]
+        message = (
+            f"{name} has lost count of its turns before t = {instant:g} s: solve to a higher order, or use a ratio"
+        )
+        raise SolveError(f"{message} of smaller whole numbers", status=Status.BRANCH_JUMP)
 
 
 def _backend(solver: Solver, path: FollowedPath, instants: Instants) -> str:

@@ -129,7 +129,7 @@ class StartingState:
         pattern = model.system.pattern
         jacobian = HostJacobian.of(pattern, np.zeros(pattern.entry_count))
         if trial is not None and trial.jacobian.finite().all():
-            self.here = trial.jacobian
+            self.here, self.row_scale = trial.jacobian, model.system.row_scale
             model, facts = redundancy_of(model, trial, self.instant)
             jacobian = facts.jacobian
             try:

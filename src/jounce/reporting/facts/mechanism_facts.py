@@ -24,6 +24,7 @@ from jounce.mechanism.resolve import resolve
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.mechanism.time import last_step_words
 from jounce.reporting.facts.freedom_facts import AssemblyFacts, FreedomFacts, MobilityFacts, StartingState
+from jounce.reporting.facts.gear_facts import TrainFacts, train_facts
 from jounce.reporting.facts.range_facts import RangeFacts
 from jounce.reporting.text.law_facts import LawFacts, law_facts
 from jounce.trajectory import OutputMotion, SegmentedMotion
@@ -125,6 +126,7 @@ class InspectedMechanism(MechanismFacts):
     laws: list[LawFacts]
     assembly: AssemblyFacts
     ok: bool
+    trains: list[TrainFacts]
     remarks: list[str]
     range: NotRequired[RangeFacts | None]
 
@@ -186,6 +188,7 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
         "laws": laws,
         "assembly": state.assembly,
         "ok": state.ok,
+        "trains": train_facts(state),
         "remarks": _remarks(mechanism),
     }
 

@@ -120,7 +120,7 @@ def _mechanism_start(facts: Facts) -> list[str]:
         lines += [f"  {time['remark']}"] if "remark" in time else []
     else:
         lines.append("  no time grid is given")
-    lines += [f"  {line}" for line in (*law_words(facts["laws"]), *facts["remarks"])]
+    lines += [f"  {line}" for line in (*law_words(facts["laws"]), *_train_words(facts["trains"]), *facts["remarks"])]
     if freedom["message"] and facts["ok"] and freedom["left"]:
         lines.append("  it has degrees of freedom left: jounce simulate moves it by its forces")
     elif freedom["message"]:
@@ -212,3 +212,12 @@ def wrapped(line: str) -> str:
 def count(number: int, noun: str, plural: str = "") -> str:
     """Word a number of things."""
     return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
+
+
+def _train_words(facts: list[dict[str, Any]]) -> list[str]:
+    """Word ratios, a line for each driver."""
+    by_driver: dict[str, list[str]] = {}
+    for each in facts:
+        told = f" = {each['fraction']}" if "/" in (each["fraction"] or "") else ""
+        by_driver.setdefault(each["driver"], []).append(f"{each['body']} {each['ratio']:.9g}{told}")
+    return [f"turns for a turn of {driver}: {', '.join(told)}" for driver, told in by_driver.items()]

@@ -65,6 +65,8 @@ def _plates_and_wheels(skeleton: Skeleton, layer: Mapping[str, float], colours: 
             for point, names in zip(link.points, link.names, strict=True):
                 if names:
                     yield body, _pedestal(point, size, low), STAND
+            for ring in (w for w in skeleton.wheels if w.body == body):
+                yield from _wheel(ring, low, high, STAND)
             continue
         wheels = sorted((w for w in skeleton.wheels if w.body == body), key=lambda w: -w.radius)
         for step, its_wheel in enumerate(wheels):
@@ -167,6 +169,8 @@ def spatial_meshes(motion: Motion, skeleton: Skeleton, colours: Mapping[str, Col
         elif symbol.kind in ("curve", "surface"):
             yield from _groove(motion, symbol, skeleton.size)
             yield symbol.bodies[1], sphere(1.3 * radius, symbol.points[1]), DARK
+        elif symbol.kind == "gear":
+            yield from _shaft_wheels(symbol, skeleton.size, colours)
         else:
             yield from _spatial_joint(symbol, skeleton.size)
 
@@ -187,6 +191,17 @@ def _spatial_joint(symbol: Symbol, size: float) -> Pieces:
         yield second, sphere(1.3 * radius, points[1]), GREY
     elif kind == "plane":
         yield second, sphere(1.3 * radius, points[1]), DARK
+
+
+def _shaft_wheels(symbol: Symbol, size: float, colours: Mapping[str, Colour]) -> Pieces:
+    """Give the wheels of two shafts, with marks that show how they turn."""
+    for slot, (body, radius) in enumerate(zip(symbol.bodies[:2], symbol.radii, strict=False)):
+        if radius is None or body == GROUND:
+            continue
+        axis, center, thick = symbol.axis_on(slot), symbol.points[slot], 1.4 * BAR * size
+        yield body, cylinder(radius, thick, axis, center), colours[body]
+        mark = rotation_to(axis) @ np.array([0.5 * radius, 0.0, 0.0])
+        yield body, box([0.9 * radius, 0.1 * radius, 1.1 * thick], center + mark, rotation_to(axis)), DARK
 
 
 def _spatial_slide(motion: Motion, symbol: Symbol, size: float) -> Pieces:

@@ -1,0 +1,316 @@
+"""What carries gears: the body that both centers are pinned to, the axes of shafts in the frame that they turn in.
+
+Centers of toothed gears keep their distance where one body has both. It is found by the pins: a center stands on every
+body that is pinned there. So is the axis of a shaft in the frame m, by the joints that hold directions parallel. Where
+JAX traces values, points and directions are the same that are given by the same numbers or expressions.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
+
+from jounce.constraints import planar, spatial
+from jounce.constraints.angles import Datum, coaxial
+from jounce.constraints.facts import PAIRS, facts_of
+from jounce.errors import JounceError, MechanismError, UnsupportedError
+from jounce.mechanism.mechanism import GROUND, Mechanism
+from jounce.mechanism.resolve import along_instances, resolve
+from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements, holding
+
+LARGEST_GAP = 1e-6  # of the distance of centers, as written numbers are rounded
+SAME_DIRECTION = 1e-9  # largest sine
+LARGEST_WHOLE = 1000  # of the whole numbers in a ratio of turns in space
+WHOLE = 1e-9  # how near to a whole number a multiple of a ratio is
+
+
+class Place(NamedTuple):
+    """A point or a direction of a body: its components, and as they were given."""
+
+    body: str
+    value: tuple[Any, ...]
+    given: tuple[Any, ...]
+
+
+Grouped = tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]
+"""Groups, and the names of the elements of each, with their kinds before them."""
+Joined = Sequence[tuple[Place, Place]]
+"""Pairs of places that a joint holds together."""
+
+
+class Arm(NamedTuple):
+    """The body that has the centers of two gears, and the angle of the line between them in its frame, rad."""
+
+    body: str
+    angle: Any
+
+
+def is_toothed(element: Any) -> bool:
+    """Tell whether an element is a pair of planar gears with teeth."""
+    return isinstance(element, planar.Gear) and element.ratio is None
+
+
+def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None:
+    """Raise MechanismError unless what carries the gears of all groups was found.
+
+    Parameters
+    ----------
+    groups : sequence of Group
+        Of joints and drivers.
+    names : sequence of sequence of str
+        Of the elements of each, with their kinds before them.
+    """
+    for group, members in zip(groups, names, strict=True):
+        if is_toothed(group.element) and group.element.arm is None:
+            message = (
+                "no body carries both gears: pin each gear at its center, by a revolute joint with the same point, to "
+                "one body, such as a carrier or the ground, so that the centers keep their distance"
+            )
+            raise MechanismError(message, name=f"{members[0]}.points")
+        if isinstance(group.element, spatial.Gear) and None in (group.element.held_i, group.element.held_j):
+            slot = 0 if group.element.held_i is None else 1
+            message = (
+                f"the {('first', 'second')[slot]} gear does not turn about this axis in the frame, the third body: "
+                "hinge it there, or to a body that turns about the same axis, by joints that have the axis"
+            )
+            raise MechanismError(message, name=f"{members[0]}.axes")
+        if isinstance(group.element, spatial.Gear) and not isinstance(group.element.whole, Tracer):
+            odd = np.flatnonzero(np.isnan(group.element.whole))
+            if odd.size:
+                message = (
+                    f"must be one of whole numbers up to {LARGEST_WHOLE}, such as teeth, as attitudes tell angles up "
+                    "to whole turns only: write it as 22/37"
+                )
+                value = float(np.asarray(group.element.ratio).ravel()[odd[0]])
+                raise MechanismError(message, name=f"{members[odd[0]]}.ratio", value=value)
+
+
+def check_ratios(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None:
+    """Raise UnsupportedError if JAX differentiates by a ratio of turns in space: whole turns are not known to it."""
+    for group, members in zip(groups, names, strict=True):
+        if isinstance(group.element, spatial.Gear) and isinstance(group.element.ratio, Tracer):
+            message = "a ratio of turns in space is not differentiated, as whole turns go with it; vary it instead"
+            raise UnsupportedError(message, name=f"{members[0]}.ratio")
+
+
+def grouped_with_frames(mechanism: Mechanism, elements: Mapping[str, Any]) -> Grouped:
+    """Return the groups of some elements of a mechanism, by name with their kinds; gears with what carries them."""
+    index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
+    arms = _arms(mechanism, elements)
+    given = _with_arms(elements, arms)
+    groups, names = group_elements(given, mechanism.parameter_values, index, POSITION_COMPONENTS[mechanism.space])
+    found = zip(groups, names, strict=True)
+    return tuple(_carried(group, members, arms, mechanism, elements) for group, members in found), names
+
+
+def check_distances(mechanism: Mechanism) -> None:
+    """Raise MechanismError unless centers of gears with teeth are as far apart as their pitch radii say."""
+    _arms(mechanism, {f"joints.{name}": joint for name, joint in mechanism.joints.items()})
+
+
+def _arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, Arm]:
+    """Return what carries the toothed gears among some elements, by their names with kinds; none that is not found.
+
+    Raises
+    ------
+    MechanismError
+        If the centers are not as far apart as the pitch radii say.
+    """
+    toothed = {name: element for name, element in elements.items() if is_toothed(element)}
+    if not toothed:
+        return {}
+    pins = _joined(mechanism, _pinned)
+    found = {name: _arm(name, element, mechanism.parameter_values, pins) for name, element in toothed.items()}
+    return {name: arm for name, arm in found.items() if arm is not None}
+
+
+def _arm(name: str, gear: planar.Gear, parameters: Mapping[str, Any], pins: Joined) -> Arm | None:
+    try:
+        radii = [resolve(radius, parameters) for radius in (gear.radius_i, gear.radius_j)]
+        points = [
+            _place(body, p, parameters) for body, p in zip(gear.bodies, (gear.point_i, gear.point_j), strict=True)
+        ]
+    except JounceError:
+        return None  # which is told where all values of the gear are
+    plain = not any(isinstance(radius, Tracer) for radius in radii)
+    if plain and not all(math.isfinite(radius) and radius for radius in radii):
+        return None
+    size = sum(abs(radius) for radius in radii) if plain else 1.0
+
+    def same(a: Any, b: Any) -> bool:
+        return abs(a - b) <= LARGEST_GAP * size
+
+    def coincide(a: Place, b: Place) -> bool:
+        pairs = zip(a.value, b.value, a.given, b.given, strict=True)
+        return all(_same(x, y, of_x, of_y, same) for x, y, of_x, of_y in pairs)
+
+    first, second = (_reached(point, pins, coincide) for point in points)
+    shared = [body for body in first if body in second and body not in gear.bodies]
+    if not shared:
+        return None
+    body = GROUND if GROUND in shared else shared[0]
+    line = [b - a for a, b in zip(first[body].value, second[body].value, strict=True)]
+    if plain and not any(isinstance(x, Tracer) for x in line):
+        _check_gap(name, body, math.hypot(*line), radii)
+        return Arm(body, math.atan2(line[1], line[0]))
+    apart = jnp.abs(radii[0] + radii[1])  # of a design that JAX traces: it fails where there is a gap
+    meshes = jnp.abs(jnp.hypot(*line) - apart) <= LARGEST_GAP * apart
+    return Arm(body, jnp.where(meshes, jnp.arctan2(line[1], line[0]), jnp.nan))
+
+
+def _check_gap(name: str, body: str, distance: float, radii: Sequence[float]) -> None:
+    """Raise MechanismError unless centers are as far apart on a body as pitch radii say."""
+    apart = abs(sum(radii))
+    if radii[0] < 0 and radii[1] < 0:
+        raise MechanismError("one gear at most is a ring, of a radius below zero", name=f"{name}.radii", value=radii)
+    if apart <= LARGEST_GAP * max(map(abs, radii)) or min(radii) < 0 < sum(radii):
+        message = "a ring is larger than the gear in it, or they do not turn against each other"
+        raise MechanismError(message, name=f"{name}.radii", value=radii)
+    if not abs(distance - apart) <= LARGEST_GAP * apart:
+        kind = "of a ring less that of the gear in it" if min(radii) < 0 else "together"
+        message = (
+            f"the centers are {distance:.9g} m apart on '{body}', and the pitch radii {kind} are {apart:.9g} m, a gap "
+            f"of {distance - apart:.3g} m: move a center, or change a radius (a ring has one below zero)"
+        )
+        raise MechanismError(message, name=f"{name}.radii", value=radii)
+
+
+def _with_arms(elements: Mapping[str, Any], arms: Mapping[str, Arm]) -> dict[str, Any]:
+    """Return elements of which toothed gears have a third body, that carries them."""
+    found = dict(elements)
+    for name, arm in arms.items():
+        slots = (*found[name].bodies, arm.body)
+        found[name] = _holding_bodies(found[name], slots)
+    return found
+
+
+def _holding_bodies(element: Any, bodies: tuple[str, ...]) -> Any:
+    """Return an element with other bodies, which are not checked."""
+    copy = object.__new__(type(element))
+    for field in dataclasses.fields(element):
+        object.__setattr__(copy, field.name, bodies if field.name == "bodies" else getattr(element, field.name))
+    return copy
+
+
+def _carried(
+    group: Group, members: Sequence[str], arms: Mapping[str, Arm], mechanism: Mechanism, elements: Mapping[str, Any]
+) -> Group:
+    """Return a group of gears with what is found of what carries them; others as they are."""
+    if is_toothed(group.element) and all(name in arms for name in members):
+        return holding(group, "arm", along_instances(*(_number(arms[name].angle) for name in members)))
+    if isinstance(group.element, spatial.Gear):
+        return _on_frames(group, [elements[name] for name in members], mechanism)
+    return group
+
+
+def _number(value: Any) -> Any:
+    return value if isinstance(value, Tracer) else np.float64(value)
+
+
+def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism) -> Group:
+    """Return shafts with the axes that they turn about in their frames, where these are found, and whole turns."""
+    hinges, parameters = _joined(mechanism, _held_parallel), mechanism.parameter_values
+    for slot, field in enumerate(("held_i", "held_j")):
+        data = []
+        for gear in gears:
+            axis = _place(gear.bodies[slot], (gear.axis_i, gear.axis_j)[slot], parameters)
+            there = _reached(axis, hinges, _parallel).get(gear.bodies[2])
+            if there is None:
+                break
+            data.append((_vector(axis.value), _vector(there.value)))
+        if len(data) == len(gears):
+            axis, there = (along_instances(*vectors) for vectors in zip(*data, strict=True))
+            group = holding(group, field, _coaxial(axis, there))
+    return holding(group, "whole", _whole(group.element.ratio))
+
+
+def _coaxial(axis: Any, there: Any) -> Datum:
+    found = coaxial(axis, there)
+    if any(isinstance(x, Tracer) for x in (axis, there)):
+        return found
+    return Datum(*(np.asarray(x) for x in (found.attitude, found.angle, found.near)))
+
+
+def _whole(ratio: Any) -> Any:
+    """Return the smallest whole numbers, (instances, 1), by which ratios become whole; NaN where there are none."""
+    namespace = jnp if isinstance(ratio, Tracer) else np
+    counts = np.arange(1.0, LARGEST_WHOLE + 1)
+    products = ratio[..., None] * counts
+    fits = namespace.abs(products - namespace.round(products)) <= WHOLE * namespace.maximum(
+        1.0, namespace.abs(products)
+    )
+    return namespace.where(fits.any(axis=-1), 1.0 + namespace.argmax(fits, axis=-1), np.nan)
+
+
+def _joined(mechanism: Mechanism, pairs_of: Callable[[Any], Sequence[tuple[str, str]]]) -> list[tuple[Place, Place]]:
+    """Return the places that joints hold together, by the pairs of fields that say so."""
+    found = []
+    for joint in mechanism.joints.values():
+        for names in pairs_of(joint):
+            try:
+                first, second = (
+                    _place(body, getattr(joint, name), mechanism.parameter_values)
+                    for body, name in zip(joint.bodies, names, strict=False)
+                )
+            except JounceError:
+                continue
+            found.append((first, second))
+    return found
+
+
+def _pinned(joint: Any) -> list[tuple[str, str]]:
+    facts = facts_of(type(joint))
+    return [("point_i", "point_j")] if facts.pair == "revolute" and PAIRS["revolute"] else []
+
+
+def _held_parallel(joint: Any) -> Sequence[tuple[str, str]]:
+    return facts_of(type(joint)).held_parallel
+
+
+def _place(body: str, given: Any, parameters: Mapping[str, Any]) -> Place:
+    entries = tuple(given.tolist() if isinstance(given, np.ndarray) else given)
+    return Place(body, tuple(resolve(entry, parameters) for entry in entries), entries)
+
+
+def _same(a: Any, b: Any, given_a: Any, given_b: Any, near: Callable[[Any, Any], bool]) -> bool:
+    """Tell whether components are the same; what JAX traces is compared as it was given."""
+    if isinstance(a, Tracer) or isinstance(b, Tracer):
+        return a is b or (not isinstance(given_a, Tracer) and not isinstance(given_b, Tracer) and given_a == given_b)
+    return near(a, b)
+
+
+def _parallel(a: Place, b: Place) -> int:
+    """Return 1 for the same direction, -1 for the opposite one, else 0."""
+    if any(isinstance(x, Tracer) for x in (*a.value, *b.value)):
+        pairs = zip(a.value, b.value, a.given, b.given, strict=True)
+        return int(all(_same(x, y, of_x, of_y, lambda p, q: p == q) for x, y, of_x, of_y in pairs))
+    u, v = (np.asarray(x.value, float) / (np.linalg.norm(x.value) or 1.0) for x in (a, b))
+    return int(np.sign(u @ v)) if np.linalg.norm(np.cross(u, v)) <= SAME_DIRECTION else 0
+
+
+def _reached(start: Place, joined: Joined, alike: Callable[[Place, Place], int | bool]) -> dict[str, Place]:
+    """Return where a place is on each body that joints hold to it, one after the other."""
+    found, waiting = {start.body: start}, [start]
+    while waiting:
+        here = waiting.pop(0)
+        for pair in joined:
+            for near, far in (pair, pair[::-1]):
+                if near.body != here.body or far.body in found:
+                    continue
+                if sense := int(alike(here, near)):
+                    there = far if sense > 0 else Place(far.body, tuple(-x for x in far.value), far.given)
+                    found[far.body] = there
+                    waiting.append(there)
+    return found
+
+
+def _vector(value: tuple[Any, ...]) -> Any:
+    return (
+        jnp.stack([jnp.asarray(x, float) for x in value])
+        if any(isinstance(x, Tracer) for x in value)
+        else np.array(value, float)
+    )
