@@ -49,7 +49,7 @@ class Cam(AbstractConstraint):
     motion: MotionLaw
     leader: Part
     of: str = eqx.field(static=True, default="")
-    slots: tuple[tuple[int, ...], tuple[int, ...]] = eqx.field(static=True, default=((), ()))
+    slots: tuple[tuple[int, ...], ...] = eqx.field(static=True, default=((), ()))
 
     body_counts = (2, 3, 4)
     symbol = "none"

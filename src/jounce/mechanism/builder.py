@@ -28,7 +28,7 @@ from jounce.mechanism.axis_angles import (
 )
 from jounce.mechanism.carriages import ENDING, carriage_guess, curve_in, joint_of
 from jounce.mechanism.gear_frames import Grouped, grouped_with_frames
-from jounce.mechanism.mechanism import Carriage, Mechanism
+from jounce.mechanism.mechanism import GROUND, Carriage, Mechanism
 from jounce.mechanism.outputs import AbstractMotionOutput
 from jounce.mechanism.resolve import along_instances, resolve, resolve_element, resolved
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, System, holding, law_left_out

@@ -221,7 +221,8 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
     values, facts = {}, facts_of(type(element))
     kinds = field_kinds(type(element))
     for field_name, field in value_fields(type(element)).items():
-        kind, value = kinds[field_name], getattr(element, field_name)
+        kind: str = kinds[field_name]
+        value: Any = getattr(element, field_name)
         try:
             if kind == "motion":
                 value = resolve_motion(value, parameters)
@@ -230,13 +231,13 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
             elif kind in ("scalar", "vector") and (value is not None or field.default is not None):
                 value = resolve(value, parameters)
                 check_value(kind, value, components, facts.signs[field_name])
-            elif kind == "part":
+            elif kind == "part" and value is not None:
                 # in a file the follower of a cam is the cam
                 place = name if field_name == "follower" else f"{name}.{field_name}"
                 value = unchecked(type(value), _of_part(value, parameters, components, place))
             elif kind == "wrenches":
                 value = _wrenches(resolve(value, parameters))
-            elif kind == "nested":  # the bodies are those of the whole
+            elif kind == "nested" and value is not None:  # the bodies are those of the whole
                 found = resolve_element(value, parameters, components, name)
                 value = unchecked(type(value), {**vars(value), **found, "bodies": ()})
         except JounceError as error:

@@ -367,8 +367,8 @@ def _symbol(
         centers, wheels = shaft_wheels(mechanism, element)
         return replace(symbol, points=(*centers, *symbol.points[2:]), radii=(*wheels, *symbol.radii[2:]))
     if "radius_j" in values:
-        radii = [float(values[name]) for name in ("radius_i", "radius_j")]
-        return replace(symbol, radii=tuple(map(abs, radii)), internal=min(radii) < 0)
+        signed = [float(values[name]) for name in ("radius_i", "radius_j")]
+        return replace(symbol, radii=tuple(map(abs, signed)), internal=min(signed) < 0)
     if element.role == "joint" and facts.symbol in ("gear", "coordinate"):
         return _geared(mechanism, symbol, coordinate, float(values.get("ratio", 1.0)))
     return symbol

@@ -101,7 +101,7 @@ def _pin_in_slot(drawing: Drawing, symbol: Symbol) -> None:
 
 def _curve(drawing: Drawing, symbol: Symbol) -> None:
     """Draw the curve of a body as a groove, or the lines of a surface, and what is held on it."""
-    body, held = symbol.bodies[0], drawing.global_place(symbol, 1)
+    body, held = symbol.bodies[0], drawing.global_point(symbol, 1)
     colour = "#888888" if body == GROUND else drawing.colours.get(body, INK)
     for line in shown(symbol.curve, drawing.within(body, held), 4 * drawing.unit):
         flat = drawing.flat(drawing.at(body, line))
@@ -199,10 +199,12 @@ def _shafts(drawing: Drawing, symbol: Symbol) -> None:
         if radius is None or body == GROUND:
             continue
         axes, colour = drawing.frame_along(body, symbol.axis_on(slot)), drawing.colours.get(body, INK)
-        place, look = drawing.place(symbol, slot), {"stroke": colour, "layer": WHEELS, "owner": f"bodies.{body}"}
-        parts.cylinder(drawing, place, axes, (0.7, radius / drawing.unit), fill=tinted(colour, 0.15), width=1.2, **look)
-        rim = place + radius * drawing.flat(axes[:, 1])
-        drawing.line(place, rim, width=1.0, **look)
+        center, look = drawing.point(symbol, slot), {"stroke": colour, "layer": WHEELS, "owner": f"bodies.{body}"}
+        parts.cylinder(
+            drawing, center, axes, (0.7, radius / drawing.unit), fill=tinted(colour, 0.15), width=1.2, **look
+        )
+        rim = center + radius * drawing.flat(axes[:, 1])
+        drawing.line(center, rim, width=1.0, **look)
 
 
 def _plane(drawing: Drawing, symbol: Symbol) -> None:

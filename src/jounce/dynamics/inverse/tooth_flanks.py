@@ -87,7 +87,7 @@ def settled(
     if motion.traced:
         flanks = {k: jnp.where(jax.lax.stop_gradient(of_group(found[0], k)[0]) < 0, -1.0, 1.0) for k in flanks}
         return solve(flanks), flanks, {}
-    rate, reversals = _rate(motion), {}
+    rate, reversals, unsettled = _rate(motion), {}, []
     for _ in range(MOST_CHANGES):
         told = {k: _signs(of_group(found[0], k), found[0], rate) for k in flanks}
         now, reversals = ({k: pair[part] for k, pair in told.items()} for part in (0, 1))
