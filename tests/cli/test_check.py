@@ -66,10 +66,11 @@ def samples(law, count=101, names="pin"):
 def test_a_good_trajectory_ends_with_0_and_the_table_has_the_worst_values(run):
     status, out, err = run(PANDA, GOOD, "--limits", FRANKA)
     assert (status, err) == (0, "")
-    assert out.splitlines()[:4] == [
+    assert out.splitlines()[:5] == [
         "panda: 7 moving joints (panda.urdf, panda_good.csv)",
         "t = 0 s to 4 s, 2001 instants and the peaks between them",
         "not in the trajectory, held still: panda_finger_joint1 at 0 m",
+        "torques: armature, damping and friction, as far as the robot file has them",
         "without a limit: force rate",
     ]
     robot = load_robot(PANDA)

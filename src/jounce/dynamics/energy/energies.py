@@ -231,8 +231,9 @@ def energies_of(
             for x in coefficients
         )
         return *parts, bodies, order
+    series = checked_coordinates(system, q, order + 1)
     leading = tuple(k for k, joint in enumerate(system.moving_joints) if joint.mimic is None) if drives else ()
-    parts = _of_robot(system, (checked_coordinates(system, q, order + 1),), (), (order, function, leading))
+    parts = _of_robot(system, (series,), (), (order, function, leading))
     return *parts, system.moving_links, order
 
 

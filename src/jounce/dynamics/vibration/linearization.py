@@ -66,8 +66,8 @@ class Linearisation(Displayed):
         Drivers that hold; they may be inputs of `state_space` too.
     """
 
-    def __init__(self, reduction: Reduction, about: Equilibrium | None):
-        self._reduction, self.equilibrium = reduction, about
+    def __init__(self, reduction: Reduction, about: Equilibrium | None, *, by_forces: bool = True):
+        self._reduction, self.equilibrium, self._by_forces = reduction, about, by_forces
         self.mechanism, self.time = reduction.point.mechanism, float(reduction.point.clock[0, 0, 0])
         self.coordinates, self.units, self.held = reduction.names, reduction.units, reduction.held
         self.mass, self.damping, self.stiffness = (reduction.part(level) for level in (2, 1, 0))
@@ -90,7 +90,7 @@ class Linearisation(Displayed):
         for k, name in enumerate(reduction.released):
             names.append(name)
             columns.append(np.eye(own)[k])
-        if point.equations.system.forces:
+        if self._by_forces and point.equations.system.forces:
             changes = point.changes(reduction.changes[:, :, reduction.lanes(0)])
             forces = reaches(point.equations, point.coordinates, point.clock, changes)
             for members, reach in zip(point.model.forces, map(np.asarray, forces), strict=True):

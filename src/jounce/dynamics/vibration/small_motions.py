@@ -123,7 +123,7 @@ def _of_robot(robot: Robot, q: GivenState, coordinates: Sequence[str] | None, dr
     point, names = through_state(robot, q, joint_coordinates, drives)
     reduction = reduced(point, released=[name + DRIVE for name in names], drivers=False)
     _check(reduction)
-    return Linearisation(with_joints(reduction, names), None)
+    return Linearisation(with_joints(reduction, names), None, by_forces=False)  # the dampers of joints are none
 
 
 def point_along(motion: Motion, time: Real | None) -> OperatingPoint:

@@ -194,7 +194,8 @@ def verdict(report: LimitReport) -> str:
     if report.kept:
         return f"All limits kept ({number}).\nClosest: {location}"
     if report.broken:
-        return "\n".join([f"{len(report.broken)} of {count(number, 'limit')} broken.\nWorst: {location}", *ends])
+        head = f"{len(report.broken)} of {count(number, 'limit')} broken.\nWorst: {location}"
+        return "\n".join([head, *map(wrapped, ends)])
     lines = [f"Limits broken at the ends, not within the motion ({number}). Closest there: {location}", *ends]
     hint = "If the robot moves before the start and after the stop, say so with --hand-over."
     return "\n".join([*map(wrapped, lines), hint])
