@@ -13,7 +13,7 @@ from jounce.dynamics import DriverTorqueOutput, GroundTorqueOutput, JointTorqueO
 from jounce.io.mechanisms.output_types import output_types
 from jounce.mechanism import build
 from jounce.mechanism.axis_angles import with_datums
-from jounce.mechanism.builder import pose_at
+from jounce.mechanism.starting_guess import pose_at
 from jounce.robot import CoupledJoints, LinkClosure, SlideOutput
 from jounce.testing.samples import group_of, pose_of, random_motion
 from tests.problems.drawings import (

@@ -19,19 +19,12 @@ from jounce.constraints.planar import length_of
 from jounce.errors import UnsupportedError
 from jounce.jet.turns import brought_near
 from jounce.mechanism.axis_angles import measures_angle
-from jounce.mechanism.builder import (
-    Model,
-    grouped_elements,
-    model_of,
-    pose_at,
-    starting_guess,
-    with_offsets,
-    with_sense,
-)
+from jounce.mechanism.builder import Model, grouped_elements, model_of, with_offsets, with_sense
 from jounce.mechanism.gear_frames import check_ratios
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.preconditions import PLAIN
 from jounce.mechanism.resolve import resolve
+from jounce.mechanism.starting_guess import pose_at, starting_guess
 from jounce.mechanism.system import Group, holding
 from jounce.modules import with_fields
 from jounce.rigid import PlanarPose, SpatialPose

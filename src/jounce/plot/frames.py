@@ -20,8 +20,8 @@ from jounce.kinematics import Motion
 from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.curves.choice import chosen
 from jounce.mechanism import Mechanism, build, time_grid, with_outputs_held
-from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.mechanism import GROUND
+from jounce.mechanism.starting_guess import starting_guess
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid import PlanarPose, SpatialPose
 

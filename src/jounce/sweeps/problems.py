@@ -31,7 +31,7 @@ from jounce.mechanism import (
     time_grid,
     with_outputs_held,
 )
-from jounce.mechanism.builder import pose_at
+from jounce.mechanism.starting_guess import pose_at
 from jounce.rigid.inertia import Inertia
 from jounce.robot.robot import Robot
 from jounce.shapes import seconds

@@ -16,10 +16,10 @@ from jounce.io.mechanisms.keys import file_keys
 from jounce.io.mechanisms.output_types import output_holder, output_types
 from jounce.io.mechanisms.overrides import override
 from jounce.mechanism import build, time_grid
-from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.resolve import resolve, resolve_element
+from jounce.mechanism.starting_guess import starting_guess
 from jounce.rigid.solids import SOLIDS
 
 COMPONENTS = {"planar": 2, "spatial": 3}
@@ -30,6 +30,8 @@ VECTORS = {
     "vector": [1.0, 0.3, 0.2],
     "vectors": [1.0, 0.3, 0.2],
 }
+CURVE, SURFACE = ["cos(s)", "sin(s)", "0.2*s"], ["0.4*u", "0.5*v", "0.2*u*v"]
+GEARS = ("ratio", "points radii pressure_angle")  # of planar gears, either of both
 WORDS = {"coordinate": "angle", "frame": "body", "roles": "ijim", "kinds": "turn-slide"}
 FLAT = [("pseudo", 0, 1), ("pseudo", 1, 0), ("size", 2)]  # what does not bear on the moment of a plane body about z
 ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
@@ -50,6 +52,8 @@ def values_of(kind, size):
         }.get(key.kind)
         if key.kind == "text":
             one = WORDS.get(key.key)
+        if key.kind == "curve":
+            one = SURFACE if key.key == "surface" else {"expressions": CURVE[:size], "range": [-3.0, 3.0]}
         found[key.key] = [copy.deepcopy(one) for _ in key.fields] if len(key.fields) > 1 else one
     return {key: value for key, value in found.items() if value is not None}
 
@@ -91,9 +95,15 @@ def sections(space):
     size = COMPONENTS[space]
     for section, role in ROLES.items():
         for name, kind in catalogue(space, role).items():
-            if kind.__module__.startswith("jounce."):
-                entry = {"type": name, **bodies_of(kind), **values_of(kind, size)}
+            if not kind.__module__.startswith("jounce."):
+                continue
+            entry = {"type": name, **bodies_of(kind), **values_of(kind, size)}
+            if (space, name) != ("planar", "gear"):
                 yield f"{section}.{name}", {section: {"one": entry}}
+                continue
+            for keys, left_out, bodies in zip(GEARS, GEARS[::-1], ("abc", "ab"), strict=True):
+                form = {k: v for k, v in entry.items() if k not in left_out.split()} | {"bodies": [*bodies]}
+                yield f"{section}.{name} of {keys}", {section: {"one": form}}
     for tag, (quantity, kind) in output_types(space).items():
         entry = values_of(kind, size) | ({} if quantity is None else {"quantity": quantity})
         if output_holder(kind) in ("body", "bodies"):
@@ -207,6 +217,9 @@ def test_the_walk_meets_every_key_of_the_schema():
         "piecewise",
         "until",
         "units",
+        "expressions",
+        "closed",
+        "surface",
     }
     laws = {"profile", "duration", "to", "by", "begin", "end", "limits", "initial", "output"}  # in test_segment_laws.py
     named = set()

@@ -71,10 +71,12 @@ def test_toml_and_json_say_the_same(tmp_path):
     assert repr(yaml) == repr(as_json) == repr(as_toml)
 
 
-PAIR = {"points": "[[1 cm, 0], [AB, 0]]", "vectors": "[[1, 0], [0, 3 mm]]", "vector": "[1, AB]"}
+PAIR = {"points": "[[1 cm, 0], [AB, 0]]", "vectors": "[[1, 0], [0, 3 mm]]", "vector": "[1, AB]", "point": "[0, 0]"}
 TRIPLE = {"points": "[[1 cm, 0, 0], [AB, 0, 1]]", "vectors": "[[1, 0, 0], [0, 1, 0]]", "vector": "[1, 2, 3]"}
 TRIPLE |= {"axes": "[[0, 0, 1], [0, 0, 1]]", "axis": "[0, 0, 1]", "normals": "[[1, 0, 0], [1, 0, 0]]"}
 SCALARS = {"length": "14.23 cm", "ratio": "2", "radius": "AB", "lead": "5 mm", "coordinate": "angle", "motion": "t"}
+PAIR["curve"], TRIPLE["curve"], TRIPLE["surface"] = "[s, s**2 + s]", "[s, sin(s), 0.1*s]", "[u, v, u*v]"
+TRIPLE["point"] = "[0, 0, 0]"
 
 KEYS = {  # the table of the documentation
     ("planar", "joint", "revolute"): "points",
@@ -83,8 +85,10 @@ KEYS = {  # the table of the documentation
     ("planar", "joint", "parallel2"): "points vector",
     ("planar", "joint", "prismatic"): "points vectors",
     ("planar", "joint", "coordinate"): "coordinate ratio? offset?",
-    ("planar", "joint", "gear"): "ratio offset?",
-    ("planar", "joint", "rolling"): "points vector radius offset?",
+    ("planar", "joint", "gear"): "ratio? offset? points? radii? pressure_angle?",
+    ("planar", "joint", "rolling"): "points vector radius offset? pressure_angle?",
+    ("planar", "joint", "fixed"): "points offset?",
+    ("planar", "joint", "curve"): "curve point start?",
     ("planar", "driver", "coordinate"): "coordinate ratio? offset? motion",
     ("planar", "driver", "slide"): "points vector motion",
     ("planar", "driver", "distance"): "points motion",
@@ -97,6 +101,14 @@ KEYS = {  # the table of the documentation
     ("spatial", "joint", "cylindrical"): "points axes",
     ("spatial", "joint", "prismatic"): "points axes normals",
     ("spatial", "joint", "screw"): "points axes lead offset?",
+    ("spatial", "joint", "fixed"): "points axes normals",
+    ("spatial", "joint", "planar"): "points axes",
+    ("spatial", "joint", "constant_velocity"): "points axes offset?",
+    ("spatial", "joint", "tripod"): "points axes normals radius",
+    ("spatial", "joint", "oldham"): "points axes vectors",
+    ("spatial", "joint", "curve"): "curve point start?",
+    ("spatial", "joint", "surface"): "surface point start_u? start_v?",
+    ("spatial", "joint", "gear"): "axes ratio offset?",
     ("spatial", "driver", "rotation"): "axis vectors? motion",
     ("spatial", "driver", "slide"): "points vector motion",
     ("spatial", "driver", "distance"): "points motion",
@@ -121,7 +133,8 @@ def test_every_type_takes_the_keys_of_the_table(tmp_path, space, role, name):
     assert keys == set(KEYS[space, role, name].split())
     values = SCALARS | (PAIR if space == "planar" else TRIPLE)
     given = {key: values[key] for key in KEYS[space, role, name].split() if not key.endswith("?")}
-    bodies = "[ground, a, b]" if kind.body_count == 3 else "[a, b]"
+    given |= {"ratio": 2} if name == "gear" else {}  # or points and radii
+    bodies = "[ground, a, b]" if name == "gear" else "[a, b]"
     entry = ", ".join([f"{{type: {name}", f"bodies: {bodies}", *(f"{k}: {v}" for k, v in given.items())]) + "}"
     made = joint(tmp_path, space, entry, f"{role}s")
     assert type(made) is kind

@@ -400,8 +400,8 @@ class MotionForces:
         bad = np.argwhere((~np.asarray(finite) & (self.motion.status[lanes] == Status.OK)).T)
         if len(bad):
             lane, force = bad[0]
-            message = f"has no finite value at t = {self.motion.time[lanes[lane]]:g} s; check its law there"
-            raise MechanismError(message, name=f"forces.{force_names(self.model)[force]}")
+            name, instant = force_names(self.model)[force], self.motion.time[lanes[lane]]
+            raise MechanismError(f"has no finite value at t = {instant:g} s; check its law", name=f"forces.{name}")
 
     def _poses(self, index: int, lanes: np.ndarray) -> tuple[dict[str, Any], ...]:
         bodies = self.model.system.groups[index].bodies
@@ -416,6 +416,5 @@ class MotionForces:
 
     def _of_group(self, index: ElementIndex) -> Float[Numbers, "order row instance time"]:
         """Return the multipliers of a group."""
-        multipliers = self.multipliers[:, index.rows]
-        instances = self.model.system.groups[index.group].instances
-        return multipliers.reshape(len(multipliers), -1, instances, multipliers.shape[-1])
+        multipliers, group = self.multipliers[:, index.rows], self.model.system.groups[index.group]
+        return multipliers.reshape(len(multipliers), -1, group.instances, multipliers.shape[-1])

@@ -20,8 +20,9 @@ from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
 from jounce.mechanism import Mechanism, Model
-from jounce.mechanism.builder import pose_at, with_reference
+from jounce.mechanism.builder import with_reference
 from jounce.mechanism.element_indices import force_names
+from jounce.mechanism.starting_guess import pose_at
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers

@@ -23,7 +23,7 @@ from jounce.jet.turns import brought_near
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.axis_angles import measures_angle, raw_angles
-from jounce.mechanism.builder import starting_guess
+from jounce.mechanism.starting_guess import starting_guess
 from jounce.mechanism.system import POSITION_COMPONENTS, Group
 
 STAGES = 8  # in which parameters go from those of the first run to their own, so that positions follow

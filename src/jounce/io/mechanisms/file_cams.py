@@ -55,7 +55,7 @@ def coordinates_by_name(data: Mapping[str, Any], space: str, driven: Mapping[str
         quantity = raw.get("quantity")
         if quantity is None and "point" in raw:
             found |= {f"{name}_{label}": "length" for label in COMPONENTS[: POSITION_COMPONENTS[space]]}
-        elif quantity in OUTPUTS:
+        elif isinstance(quantity, str) and quantity in OUTPUTS:
             found[name] = OUTPUTS[quantity]
     drivers, joints = cam_types(space), catalogue(space, "joint")
     for name, raw in _entries(data, "joints"):

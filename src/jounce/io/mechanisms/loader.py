@@ -19,11 +19,11 @@ from jounce.io.mechanisms.file_laws import FileLaws
 from jounce.io.mechanisms.keys import ROLES, FileKey, file_keys, location_of
 from jounce.io.mechanisms.unit_hints import warn_of_units
 from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid, with_outputs_held
-from jounce.mechanism.builder import starting_guess
 from jounce.mechanism.gear_frames import check_distances
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.resolve import resolve, resolve_element
+from jounce.mechanism.starting_guess import starting_guess
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.rigid.euler_parameters import euler_parameters
 from jounce.settings import under_own_settings

@@ -19,7 +19,7 @@ from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.mechanism import Model
-from jounce.mechanism.builder import pose_at
+from jounce.mechanism.starting_guess import pose_at
 from jounce.mechanism.system import System
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose

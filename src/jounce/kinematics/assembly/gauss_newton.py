@@ -14,7 +14,7 @@ from jounce.kinematics.assembly.initial_revolutions import Coordinates, DriverLa
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism import Model
-from jounce.mechanism.builder import pose_at
+from jounce.mechanism.starting_guess import pose_at
 from jounce.mechanism.system import System
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose

@@ -17,7 +17,7 @@ from jounce.jet import Jet
 from jounce.jet.algebra import total
 from jounce.jet.series import Recursion
 from jounce.linear_algebra.linear import DenseFactor
-from jounce.mechanism.builder import pose_at
+from jounce.mechanism.starting_guess import pose_at
 from jounce.mechanism.system import System
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.pose import Pose

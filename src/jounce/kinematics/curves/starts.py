@@ -10,7 +10,7 @@ from jaxtyping import Float
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.linear_algebra.linear import DenseFactor
-from jounce.mechanism.builder import pose_at
+from jounce.mechanism.starting_guess import pose_at
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers

@@ -12,7 +12,7 @@ from jounce.jet import Jet
 from jounce.kinematics.assembly.gauss_newton import LONGEST_STEP, MAX_STEPS
 from jounce.kinematics.continuation.instant_program import of_design
 from jounce.kinematics.continuation.jacobian_factors import factored
-from jounce.mechanism.builder import pose_at
+from jounce.mechanism.starting_guess import pose_at
 from jounce.mechanism.system import System
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose

@@ -14,7 +14,7 @@ from jounce.kinematics.continuation.solver import Solver
 
 Item = TypeVar("Item")
 Indices = Int[np.ndarray, " lane"]
-Rounds = Int[np.ndarray, "round lane"]
+Rounds = Int[np.ndarray, "round width"]
 
 
 class Room:

@@ -191,7 +191,7 @@ def rounded(lines: Lines, deviation: float, *, timed: bool = False) -> Path:
     return Path(laws, float(knots[0]), float(knots[-1]), float(distances.max()), deviation, words, times)
 
 
-def _on(at: np.ndarray, knots: np.ndarray, points: _Points) -> Float[np.ndarray, "point joint"]:
+def _on(at: np.ndarray, knots: np.ndarray, points: _Points) -> Float[np.ndarray, "sample joint"]:
     """Return places on straight lines."""
     return np.stack([np.interp(at, knots, column) for column in points.T], axis=1)
 

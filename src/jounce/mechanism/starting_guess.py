@@ -1,0 +1,77 @@
+"""The starting guess of a mechanism: where its bodies are said to be, the ground first."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import JounceError, MechanismError
+from jounce.jet import Jet
+from jounce.mechanism.carriages import carriage_guess, curve_in, joint_of
+from jounce.mechanism.mechanism import GROUND, Carriage, Mechanism
+from jounce.mechanism.resolve import along_instances, resolve, resolve_element, resolved
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.euler_parameters import euler_parameters
+from jounce.rigid.pose import Pose
+
+
+def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components: int) -> dict[str, Any]:
+    """Return the coordinates of all bodies at the starting guess, the ground first."""
+    positions, attitudes = [np.zeros(components)], [np.zeros(()) if components == 2 else np.array([1.0, 0, 0, 0])]
+    whole = (GROUND, *mechanism.rigid_bodies)
+    for name, body in mechanism.bodies.items():
+        place = f"bodies.{name}"
+        if isinstance(body, Carriage):
+            poses = dict(zip(whole, zip(positions, attitudes, strict=False), strict=False))
+            positions.append(_carried(mechanism, name, body, poses, parameters, components))
+            attitudes.append(attitudes[0])
+            continue
+        positions.append(resolved(body.position, f"{place}.position", "vector", components, parameters))
+        if components == 2:
+            attitudes.append(resolved(body.angle, f"{place}.angle", "scalar", components, parameters))
+        else:
+            attitudes.append(_attitude(body.orientation, f"{place}.orientation", parameters))
+    attitude = "angle" if components == 2 else "quaternion"
+    return {"position": along_instances(*positions), attitude: along_instances(*attitudes)}
+
+
+def _carried(
+    mechanism: Mechanism, name: str, body: Carriage, poses: Any, parameters: dict[str, Any], components: int
+) -> Any:
+    """Return the starting guess of the place of a carriage, from the poses of the bodies before it."""
+    if body.position is not None:
+        return np.asarray(body.position, float)
+    joint = joint_of(name)
+    element = mechanism.joints[joint]
+    values = resolve_element(element, parameters, components, f"joints.{joint}")
+    start = [x for key, x in values.items() if key.startswith("start")]
+    pose_type, key = (PlanarPose, "angle") if components == 2 else (SpatialPose, "quaternion")
+    body_i, body_j = (
+        pose_at({"position": position, key: attitude}, pose_type)
+        for position, attitude in (poses[its] for its in element.bodies)
+    )
+    place = body_i.to_body(body_j.point(values["point_j"]) - body_i.position).coefficients[0]
+    try:
+        return carriage_guess(curve_in(values), None if any(x is None for x in start) else start, place)
+    except MechanismError as error:
+        raise MechanismError(error.message, name=f"joints.{joint}.{error.name}", value=error.value) from None
+
+
+def _attitude(orientation: Any, name: str, parameters: dict[str, Any]) -> np.ndarray:
+    """Return the Euler parameters of an orientation whose numbers may be expressions of the parameters."""
+    if orientation is None:
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    try:
+        if isinstance(orientation, Mapping):
+            given = {k: v if k == "euler" else resolve(v, parameters) for k, v in orientation.items()}
+        else:
+            given = resolve(orientation, parameters)
+        return np.array(euler_parameters(given))
+    except JounceError as error:
+        key = f"{name}.{error.name}" if error.name else name
+        raise type(error)(error.message, name=key, value=error.value) from None
+
+
+def pose_at(coordinates: Mapping[str, Any], pose_type: type[Pose]) -> Any:
+    """Return the pose of order zero that has the given coordinates."""
+    return pose_type.from_coordinates({name: Jet([value]) for name, value in coordinates.items()})
