@@ -50,7 +50,9 @@ class Group(NamedTuple):
 
     def anchors_of(
         self, designs: Indices
-    ) -> tuple[Indices, Float[np.ndarray, " anchor"], list[list[np.ndarray]], Indices]:
+    ) -> tuple[
+        Int[np.ndarray, " anchor"], Float[np.ndarray, " anchor"], list[list[np.ndarray]], Int[np.ndarray, " anchor"]
+    ]:
         """Return the anchors of some of the designs.
 
         Returns
