@@ -12,7 +12,7 @@ from jounce.execution.store import Store
 from jounce.execution.structure import UndescribedError, program_key
 from jounce.integrate.marching import marching
 from jounce.jet import operations
-from jounce.kinematics.continuation import continuation_steps
+from jounce.kinematics.continuation import continuation_steps, step_control
 
 REVOLUTE = jn.planar.Revolute
 
@@ -24,7 +24,7 @@ def test_nothing_is_altered():
 @pytest.mark.parametrize(
     "thing, name, value",
     [
-        (continuation_steps, "GROWTH", 2.0),
+        (step_control, "GROWTH", 2.0),
         (continuation_steps, "advance", lambda: None),
         (continuation_steps, "jnp", object()),
         (REVOLUTE, "residual", lambda *_: 0.0),

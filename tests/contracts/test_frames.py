@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import jounce as jn
 from jounce import drivers, forces, planar, spatial
 from jounce.constraints.base import ROLES, catalogue, field_kind, value_fields
-from jounce.dynamics import DriverTorqueOutput, GroundTorqueOutput, JointTorqueOutput
+from jounce.dynamics import CamForceOutput, CamTorqueOutput, DriverTorqueOutput, GroundTorqueOutput, JointTorqueOutput
 from jounce.io.mechanisms.output_types import output_types
 from jounce.mechanism import build
 from jounce.mechanism.axis_angles import with_datums
@@ -196,6 +196,11 @@ def linkage():
         outputs={
             "distance": jn.DistanceOutput(("ram", "link"), C, A),
             "slide": SlideOutput(("ram", "link"), C, A, B),
+            "caster": jn.ProjectedAngleOutput(("ram", "link", "link"), B, A, ZERO, C),
+            "center": jn.SpatialInstantCenterOutput(("ram", "link"), C, B),
+            "own_center": jn.SpatialInstantCenterOutput(("ram", "link"), C, B, "body"),
+            "roll_center": jn.RollCenterOutput(("ground", "ram", "link"), A, B, C),
+            "half": jn.SymmetricRollCenterOutput("link", C, A, B),
         },
     )
 
@@ -408,6 +413,8 @@ def all_in_the_plane():
             "rate": jn.AngularVelocityOutput("rocker"),
             "own_rate": jn.AngularVelocityOutput("rocker", "body"),
             "place": jn.ParameterOutput("track"),
+            "centrode": jn.InstantCenterOutput(("crank", "rocker")),
+            "own_centrode": jn.InstantCenterOutput(("crank", "rocker"), "body"),
         },
     )
 
@@ -527,5 +534,9 @@ def test_every_joint_driver_force_and_output_has_its_frames_drawn_otherwise(spac
         for elements in mechanism.elements.values() if mechanism.space == space else ():
             for element in elements.values():
                 missing[type(element)] = missing.get(type(element), set()) - forms_of(element)
+    # a cam is made of coordinates of other elements, a derivative of other outputs: tests/dynamics/test_cams.py and
+    # tests/mechanism/test_linkage_outputs.py
+    for kind in (CamForceOutput, CamTorqueOutput, jn.DerivativeOutput):
+        missing[kind] -= {"without"}
     missing[GroundTorqueOutput] -= {"without"}  # about the origin, which is another point of the ground then
     assert {kind.__name__: left for kind, left in missing.items() if left} == {}

@@ -53,7 +53,8 @@ def offered():
 def test_all_that_is_public_has_a_door():
     found = [(name, door) for name, value in offered() for door in doors(value)]
     assert len(found) > 450
-    assert [name for name, door in found if not hasattr(door, "own_settings")] == []
+    without = [name for name, door in found if not hasattr(door, "own_settings")]
+    assert without == ["keep_programs"]  # which computes nothing
 
 
 def test_an_operation_in_single_precision_is_found(monkeypatch, single_precision):

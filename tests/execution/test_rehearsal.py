@@ -16,7 +16,7 @@ from tests.problems.dynamics import double_pendulum
 from tests.problems.small import four_bar
 from tests.programs import counts
 
-START = "_moved", "_with_rates_told", "_judged"  # of a simulation, found beside
+START = "_moved", "_with_row_rates", "_judged"  # of a simulation, found beside
 
 
 @pytest.fixture

@@ -50,7 +50,7 @@ class ParametricCurve:
     True
     """
 
-    expressions: tuple[Any, ...]
+    expressions: Any  # a tuple of them
     range: Any = None
     closed: bool = False
 

@@ -37,7 +37,7 @@ def test_a_short_run_calls_few_programs(monkeypatch):
     jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)  # `expanded` is traced here, with `output_series` in it
     monkeypatch.setattr(Compiled, "__call__", told)
     jn.simulate(pendulum, [0.0, 1e-3], tolerance=1e-10)
-    start = ["_moved", "_with_rates_told", "_judged"]
+    start = ["_moved", "_with_row_rates", "_judged"]
     assert called == [*start, "march", *([] if is_wanted() else ["_block"])]  # else it is machine code of an instant
 
 

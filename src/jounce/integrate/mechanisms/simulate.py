@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from jounce.constraints import AbstractConstraint
-from jounce.dynamics.forward.accelerations import Equations, Instants, State
+from jounce.dynamics.forward.accelerations import Equations, Instants, State, with_ground
 from jounce.dynamics.forward.initial_state import ConsistentStart, consistent_start
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
@@ -247,7 +247,7 @@ def _events_at_ends(start: ConsistentStart) -> list[Event]:
 
 def _check_ends(start: ConsistentStart, instant: float) -> None:
     """Raise SolveError where a point starts beyond an end of its curve."""
-    beyond = beyond_end(start.model, pose_coordinates(start.state))
+    beyond = beyond_end(start.model, {"position": with_ground(start.state.position)})
     if beyond:
         status = Status.END_OF_CURVE
         raise SolveError(f"t = {instant:g} s, {beyond}: end of curve: {status.advice}", status=status)
