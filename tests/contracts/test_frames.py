@@ -200,7 +200,6 @@ def linkage():
             "center": jn.SpatialInstantCenterOutput(("ram", "link"), C, B),
             "own_center": jn.SpatialInstantCenterOutput(("ram", "link"), C, B, "body"),
             "roll_center": jn.RollCenterOutput(("ground", "ram", "link"), A, B, C),
-            "half": jn.SymmetricRollCenterOutput("link", C, A, B),
         },
     )
 
@@ -538,5 +537,6 @@ def test_every_joint_driver_force_and_output_has_its_frames_drawn_otherwise(spac
     # tests/mechanism/test_linkage_outputs.py
     for kind in (CamForceOutput, CamTorqueOutput, jn.DerivativeOutput):
         missing[kind] -= {"without"}
+    missing.pop(jn.SymmetricRollCenterOutput, None)  # its image is in a plane through the origin of the ground
     missing[GroundTorqueOutput] -= {"without"}  # about the origin, which is another point of the ground then
     assert {kind.__name__: left for kind, left in missing.items() if left} == {}

@@ -348,6 +348,15 @@ def with_all_outputs(mechanism):
     return dataclasses.replace(mechanism, outputs=outputs)
 
 
+LOCATIONS = (
+    jn.PointOutput,
+    jn.InstantCenterOutput,
+    jn.SpatialInstantCenterOutput,
+    jn.RollCenterOutput,
+    jn.SymmetricRollCenterOutput,
+)
+
+
 def assert_same(mechanism, kept, found, drawings, moved):
     """Assert that a motion in other frames is the same, each value to rounding of the largest of its unit and order."""
     world, scales, parts = drawings["ground"], {}, {}
@@ -363,8 +372,9 @@ def assert_same(mechanism, kept, found, drawings, moved):
             expected[:, 0] += weight(mechanism, output.single_body) @ world.origin
         elif expected.ndim == 3:
             expected = expected @ drawings[frame_of(mechanism, output)].axes
-        if isinstance(output, jn.PointOutput):
-            expected[:, 0] -= world.axes.T @ world.origin
+        if isinstance(output, LOCATIONS):
+            drawing = drawings[frame_of(mechanism, output)]
+            expected[:, 0] -= drawing.axes.T @ drawing.origin
         angle = output.driver if isinstance(output, jn.DriverAngleOutput) else name
         if angle in moved:
             turns = values[0, 0] - expected[0, 0] - moved[angle]
@@ -375,7 +385,7 @@ def assert_same(mechanism, kept, found, drawings, moved):
     # terms of higher rates of energies and of Euler angles cancel: they are larger than what is left
     lost = {name: 10 if isinstance(mechanism.outputs[name], CANCELLING) else 1 for name in parts}
     wrong = {name: part for name, part in parts.items() if (part > 1e-11 * lost[name]).any()}
-    assert not wrong
+    assert not wrong, wrong
 
 
 def attitudes(output, kept, found, drawings):
