@@ -11,6 +11,7 @@ from jounce.execution import structure
 from jounce.execution.store import Store
 from jounce.execution.structure import UndescribedError, program_key
 from jounce.integrate.marching import marching
+from jounce.io import json_schema
 from jounce.jet import operations
 from jounce.kinematics.continuation import continuation_steps, step_control
 
@@ -73,3 +74,8 @@ def test_programs_of_files_that_were_written_meanwhile_have_no_names(monkeypatch
     finally:
         structure._changed_file.cache_clear()
     assert time.time() >= alterations.BEGUN
+
+
+def test_writing_the_schema_alters_nothing():
+    json_schema()
+    assert altered() is None

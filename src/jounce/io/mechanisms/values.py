@@ -6,6 +6,7 @@ JSON Schema. Imported only when a file is loaded, since pydantic takes a while.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterable
 from typing import Annotated, Any
 
@@ -40,7 +41,7 @@ class Checked:
         return core_schema.with_info_plain_validator_function(self.function)
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
-        return self.schema
+        return copy.deepcopy(self.schema)  # pydantic writes titles into it
 
 
 def parse(
