@@ -52,11 +52,17 @@ def told(result: Jet, nearness: Rates, rate: Rates, lost: int = 0, also: Bool[Nu
     return Jet(kept)
 
 
-def told_in_plane(angle: Jet, seen: Jet, line: Jet) -> Jet:
-    """Return the angle of a line, seen in a plane, NaN where it is seen along itself; vectors (components, ...)."""
+def told_in_plane(angle: Jet, seen: Jet, line: Jet, normal: Jet | None = None) -> Jet:
+    """Return the angle of a line, seen in a plane, NaN where it is seen along itself; vectors (components, ...).
+
+    A plane that moves has a normal, in the axes of the line, unit length: what is seen moves as either does.
+    """
     batch = jnp.ndim(angle.coefficients[0])
     flat, whole = sizes(seen, batch), sizes(line, batch)
-    return told(angle, growth(flat[1:], flat[0]), growth(whole[1:], whole[0]), also=flat[0] > SMALLEST * whole[0])
+    rate = growth(whole[1:], whole[0])
+    if normal is not None:
+        rate = jnp.maximum(rate, growth(sizes(normal, batch)[1:], jnp.ones_like(rate)))
+    return told(angle, growth(flat[1:], flat[0]), rate, also=flat[0] > SMALLEST * whole[0])
 
 
 def rates_of(speed: Jet, scale: Rates, batch: int) -> tuple[Rates, Rates]:

@@ -183,7 +183,7 @@ class RelativeAngleOutput(AbstractOutput):
         if self.vector_j is None:
             return angle
         line, axis = body_j.direction(self.vector_j), body_i.direction(self.axis / length_of(self.axis)[None])
-        return told_in_plane(angle, line - line.dot(axis) * axis, line)
+        return told_in_plane(angle, line - line.dot(axis) * axis, line, axis)
 
 
 class PlanarRelativeAngleOutput(AbstractOutput):
