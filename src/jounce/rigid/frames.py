@@ -69,3 +69,8 @@ class Frames(AbstractFrame):
     def without_base(self) -> "Frames":
         """Return all of several frames but the last one."""
         return jax.tree.map(lambda c: c[:, :-1], self)
+
+    def truncate(self, order: int) -> "Frames":
+        """Return the frames cut to at most `order`."""
+        spin = None if self.angular_velocity is None or not order else self.angular_velocity.truncate(order - 1)
+        return Frames(self.position.truncate(order), tuple(axis.truncate(order) for axis in self.axes), spin)

@@ -1,11 +1,11 @@
-"""A driven mechanism in the coordinates of its drivers: how its energies follow from changes of their laws.
+"""A driven mechanism in the coordinates of its drivers: how its bodies move with changes of their laws.
 
-The laws of the drivers are generalised coordinates: with them, joints and loops determine all bodies. A law is changed
-by a jet, and all poses follow from it to first order by the factored Jacobian, order after order, as in a solve.
+The laws of the drivers are generalised coordinates: with them, joints and loops determine all bodies. A constant is
+added to a law, and all poses follow from it to first order by the factored Jacobian, order after order, as in a solve:
+these are the columns of the Jacobian of the bodies, as jets.
 """
 
 import dataclasses
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.energy.energies import body_energy
+from jounce.dynamics.energy.slopes import Columns, Form, slope_values
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import Masses, required_masses
@@ -22,15 +22,16 @@ from jounce.dynamics.motion_values import Coordinates, cut, labelled, pose_of
 from jounce.errors import MechanismError
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
-from jounce.jet import Jet
-from jounce.jet.algebra import total
+from jounce.jet import Jet, cross
+from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
 from jounce.kinematics.continuation.change_points import spoiled
 from jounce.kinematics.continuation.jacobian_factors import Factor, factored
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.element_indices import element_indices
-from jounce.mechanism.system import System
+from jounce.mechanism.system import System, movable
 from jounce.modules import Module
+from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
 from jounce.shapes import ArrayLike, Numbers
 from jounce.units.shown_units import derivative_unit
@@ -53,13 +54,11 @@ class ChangedLaw(Module):
 def in_driver_coordinates(
     motion: Motion,
     q: ArrayLike | None,
-    least: int,
-    form: Callable[..., Any],
-    static: tuple[Any, ...],
+    form: Form,
     *,
     power: int = 0,
 ) -> "xarray.DataArray":
-    """Return what a form of the equations of motion gives in the coordinates of the drivers.
+    """Return a sum of slopes of energies in the coordinates of the drivers.
 
     Parameters
     ----------
@@ -67,13 +66,8 @@ def in_driver_coordinates(
         Of a mechanism whose bodies have masses.
     q : None
         The motion has its own coordinates.
-    least : int
-        Highest derivative of the laws that counts.
-    form : callable
-        Maps energies, as a function of coefficients of the coordinates and of an order, those coefficients, and
-        `static` to coefficients of shape (levels, coordinates, batch).
-    static : tuple
-        What else the form takes.
+    form : Form
+        The sum, with its rates.
     power : int, default 0
         By which power of s what the form gives is divided, in units of forces.
 
@@ -99,10 +93,10 @@ def in_driver_coordinates(
 
     def chunk(lanes: np.ndarray) -> Any:
         at_lanes = {name: values[..., lanes] for name, values in start.items()}
-        return _evaluated(model.system, at_lanes, motion.time[lanes], masses, pose_type, order, least, form, static)
+        return _evaluated(model.system, at_lanes, motion.time[lanes], masses, pose_type, order, form)
 
     values = in_chunks(chunk, len(motion.time))
-    values = np.where(spoiled(motion.passages, motion.time, least), np.nan, values)
+    values = np.where(spoiled(motion.passages, motion.time, form.order), np.nan, values)
     return _of_drivers(motion, values, power)
 
 
@@ -161,7 +155,7 @@ def balanced(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray"
     return _of_drivers(motion, values)
 
 
-@compiled("pose_type", "order", "least", "form", "static")
+@compiled("pose_type", "order", "form")
 def _evaluated(
     system: System,
     coordinates: Coordinates,
@@ -169,20 +163,35 @@ def _evaluated(
     masses: Masses,
     pose_type: type[Pose],
     order: tuple[tuple[int, int], ...],
-    least: int,
-    form: Callable[..., Any],
-    static: tuple[Any, ...],
+    form: Form,
 ) -> Any:
     start_pose = pose_of(coordinates, pose_type)
     factor = factored(dataclasses.replace(system, fronts=None), start_pose, Jet([instants[None]]))
+    time = Jet.variable(instants[None], form.order)
 
-    def energies(changes: Any, p: int) -> Jet:
-        time = Jet.variable(instants[None], changes.shape[0] - 1)
-        pose = followed(with_changes(system, order, changes), start_pose, factor, time)
-        parts = body_energy(pose, *masses, p)
-        return total(part.map(lambda c: jnp.sum(c, axis=0)) for part in parts)
+    def pose_after(change: Any) -> Pose:
+        """Return the pose where constants are added to the laws."""
+        levels = jnp.concatenate([change[None], jnp.zeros((form.order, *change.shape))])
+        return movable(followed(with_changes(system, order, levels), start_pose, factor, time))
 
-    return form(energies, jnp.zeros((least + 1, len(order), len(instants))), *static)
+    unchanged = jnp.zeros((len(order), len(instants)))
+    pose, slope = jax.linearize(pose_after, unchanged)
+
+    def column(unit: Any) -> tuple[Any, Any]:
+        return _column(pose, slope(jnp.broadcast_to(unit, unchanged.shape)), masses.center, form.column_order)
+
+    linear, angular = jax.vmap(column, out_axes=2)(np.eye(len(order))[..., None])
+    columns = Columns(Jet(tuple(linear)), Jet(tuple(angular)))
+    return slope_values(form, pose, columns, *masses)
+
+
+def _column(pose: Any, change: Any, center: Any, order: int) -> tuple[Any, Any]:
+    """Return how fast centres of mass move, and bodies turn, as a pose changes, (levels, components, bodies, batch)."""
+    linear = change.point(center).truncate(order)
+    if isinstance(pose, PlanarPose):
+        return stacked(linear), stacked(change.angle.truncate(order)[None])
+    turns = (cross(axis.truncate(order), moved) for axis, moved in zip(pose.axes, change.axes, strict=True))
+    return stacked(linear), stacked(total(turns) * 0.5)
 
 
 def with_changes(

@@ -253,11 +253,11 @@ def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None, *, drives
     return acceleration_energy(system, q, order=0, drives=drives)
 
 
-def robot_energy(tree: Tree, frames: Frames, order: int, function: EnergyFunction = body_energy) -> tuple[Jet, ...]:
-    """Return the energy of the bodies of a robot as jets of shape (bodies, batch), from the frames of the bodies."""
+def mass_arrays(tree: Tree) -> tuple[Any, Any, Any]:
+    """Return masses, centres of mass and second moments of the bodies of a robot, as `body_energy` takes them."""
     tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)[..., None]
     center = jnp.swapaxes(jnp.asarray(tree.center), 0, 1)[:, :, None]
-    return function(frames, jnp.asarray(tree.mass)[:, None], center, second_moments(tensor), order)
+    return jnp.asarray(tree.mass)[:, None], center, second_moments(tensor)
 
 
 @Batched
@@ -265,7 +265,7 @@ def _of_robot(
     tree: Tree, arrays: tuple[Series], _: Any, order: int, function: EnergyFunction, leading: tuple[int, ...]
 ) -> tuple[Float[Numbers, "levels body batch"], ...]:
     frames = body_frames(tree, arrays[0]).without_base()
-    *parts, last = (stacked(part) for part in robot_energy(tree, frames, order, function))
+    *parts, last = (stacked(part) for part in function(frames, *mass_arrays(tree), order))
     if leading:  # the bodies that coordinates move, in their order
         rate = differentiated(Jet(tuple(arrays[0])), order + 1)
         last = last.at[:, np.array(leading)].add(stacked(rate * rate * (0.5 * jnp.asarray(tree.armature)[:, None])))

@@ -1,33 +1,30 @@
 """The equations of motion from energies, in every form, for a reader to compare. Negrean 2025, equations 126-134.
 
 All give the generalised inertia forces Q_i of a robot and their rates, and agree to rounding with those of
-`virtual_work` and `newton_euler`; for work, `jounce.inverse_dynamics` is the one to use. They rest on the partial
-derivatives of energies with respect to ``q^(m)``. As a jet has no separate velocity, the series in time of such a
-partial derivative is found from perturbations ``s^r / r!`` of the motion itself: to first order they change an energy
-by ``sum_r s^(m-r) / (m-r)! dE/dq^(r)``, which is solved for the last term. The coordinates are those of a robot, or the
-laws of the drivers of a mechanism (`driver_coordinates`).
+`virtual_work` and `newton_euler`; for work, `jounce.inverse_dynamics` is the one to use. Each is a list of partial
+derivatives of energies with respect to ``q^(m)``, which `slopes` adds up in closed form: they differ in the weights of
+the same products, and what cancels is not computed. `energy_slope` gives one of them alone. The coordinates are those
+of a robot, or the laws of the drivers of a mechanism (`driver_coordinates`).
 """
 
 import math
 from collections.abc import Callable
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any, overload
 
-import jax
-import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.energy.driver_coordinates import in_driver_coordinates
-from jounce.dynamics.energy.energies import differentiated, error_for, robot_energy
+from jounce.dynamics.energy.energies import error_for, mass_arrays
+from jounce.dynamics.energy.slopes import Columns, Form, Slope, slope_values
 from jounce.errors import whole_number
-from jounce.jet import Jet, components
-from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
+from jounce.robot.algorithms.equations_of_motion import partial_velocities
 from jounce.robot.model.arguments import checked_coordinates
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.kinematics import body_frames
-from jounce.robot.recursions.tree_scan import Series
+from jounce.robot.recursions.tree_scan import Series, to_coordinates
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike, Numbers
 
@@ -57,96 +54,15 @@ def printed_coefficient(p: int) -> int:
     return p * (p + 1) // 2 - (p > 1)
 
 
-Energies = Callable[[Series, int], Jet]
-"""What maps Taylor coefficients of coordinates and p to the energy E_p, (batch,)."""
-
-Slope = Float[Numbers, "{levels} coordinate batch"]
-"""Taylor coefficients of a derivative with respect to the coordinates."""
-
-
-def slope_series(energy: Callable[[Series], Float[Numbers, "levels batch"]], q: Series, m: int, levels: int) -> Slope:
-    """Return the series in time of the derivative of a quantity with respect to ``q^(m)``.
-
-    Parameters
-    ----------
-    energy : callable
-        Maps Taylor coefficients of the coordinates to those of the quantity, (levels, batch).
-    q : array of shape (K + 1, coordinates, batch)
-        Taylor coefficients of the coordinates.
-    m : int
-        Which derivative of the coordinates it is differentiated by.
-    levels : int
-        How many coefficients are wanted; one is the value.
-
-    Returns
-    -------
-    array of shape (levels, coordinates, batch)
-        Taylor coefficients.
-    """
-    lowest, coordinates = max(0, m + 1 - levels), q.shape[1]  # terms below vanish at the instant itself
-    q = jnp.concatenate([q, jnp.zeros((max(0, m + 1 - q.shape[0]), *q.shape[1:]))])
-    below, varied, above = q[:lowest], q[lowest : m + 1], q[m + 1 :]
-    _, slope = jax.linearize(lambda part: energy(jnp.concatenate([below, part, above])), varied)
-    series = []
-    for row in range(len(varied)):
-        shift = m - lowest - row
-        directions = np.zeros((coordinates, *varied.shape[:2], 1))
-        directions[np.arange(coordinates), row, np.arange(coordinates)] = 1 / math.factorial(lowest + row)
-        changes = jax.vmap(slope, out_axes=1)(jnp.broadcast_to(directions, (coordinates, *varied.shape)))
-        changes = changes * ((-1) ** shift / math.factorial(shift))
-        series.append(jnp.concatenate([jnp.zeros((shift, *changes.shape[1:])), changes[: levels - shift]]))
-    return total(series)
-
-
-def _slope(energies: Energies, q: Series, levels: int, order: int, rate: int, m: int) -> Slope:
-    """Return the series of ``dE_p^(n) / dq^(m)`` for order p and rate n."""
-
-    def energy(q: Any) -> Any:
-        return stacked(differentiated(energies(q, order), rate).truncate(levels - 1))
-
-    return slope_series(energy, q[: max(order + rate + levels, m) + 1], m, levels)
-
-
-def _lagrange(energies: Energies, q: Series, levels: int) -> Slope:
-    momentum = _slope(energies, q, levels + 1, 0, 0, 1)
-    rate = momentum[1:] * np.arange(1.0, levels + 1)[:, None, None]
-    return rate - _slope(energies, q, levels, 0, 0, 0)
-
-
-def _mangeron(energies: Energies, q: Series, levels: int, m: int) -> Slope:
-    return (_slope(energies, q, levels, 0, m, m) - (m + 1) * _slope(energies, q, levels, 0, 0, 0)) / m
-
-
-def _gibbs_appell(energies: Energies, q: Series, levels: int, m: int) -> Slope:
-    return _slope(energies, q, levels, 1, m - 2, m)
-
-
-def _higher_order(
-    energies: Energies, q: Series, k: int, m: int, weights: tuple[float, ...]
-) -> Float[Numbers, "1 coordinate batch"]:
-    def weighted(q: Any) -> Any:
-        terms = []
-        for p, weight in enumerate(weights, 1):
-            rate = m + k - 2 * p - 1
-            terms.append(weight * math.factorial(rate) * energies(q, p).dense().coefficients[rate])
-        return total(terms)[None]
-
-    return (math.factorial(k - 1) * math.factorial(m) / math.factorial(m + k - 1)) * slope_series(weighted, q, m, 1)
-
-
 @Batched
-def _of_robot(tree: Tree, arrays: tuple[Series], _: Any, form: Callable[..., Any], static: tuple[Any, ...]) -> Any:
-    def energies(q: Any, order: int) -> Jet:
-        frames = body_frames(tree, q).without_base()
-        return total(total(components(part)) for part in robot_energy(tree, frames, order))[0]
-
-    return form(energies, arrays[0], *static)
+def _of_robot(tree: Tree, arrays: tuple[Series], _: Any, form: Form) -> Any:
+    frames = body_frames(tree, arrays[0]).without_base()
+    columns = Columns(*partial_velocities(tree, frames.truncate(form.column_order)))
+    return to_coordinates(tree, slope_values(form, frames, columns, *mass_arrays(tree)))
 
 
-def _evaluated(
-    system: Robot | Motion, q: ArrayLike | None, least: int, form: Callable[..., Any], *static: Any, power: int = 0
-) -> Any:
-    """Return what a form gives for a robot, (..., levels, n), or for the drivers of a motion, labelled.
+def _evaluated(system: Robot | Motion, q: ArrayLike | None, *slopes: Slope, rates: int = 0, power: int = 0) -> Any:
+    """Return a sum of slopes for a robot, (..., rates + 1, n), or for the drivers of a motion, labelled.
 
     It is in units of forces, divided by a power of s.
 
@@ -155,9 +71,10 @@ def _evaluated(
     RobotError, MechanismError
         If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
     """
+    form = Form(slopes, rates + 1)
     if isinstance(system, Motion):
-        return in_driver_coordinates(system, q, least, form, static, power=power)
-    return _of_robot(system, (checked_coordinates(system, q, least, least),), (), (form, static))
+        return in_driver_coordinates(system, q, form, power=power)
+    return _of_robot(system, (checked_coordinates(system, q, form.order, form.order),), (), (form,))
 
 
 @overload
@@ -182,7 +99,8 @@ def energy_slope(
         A robot; gravity does not count. Or the motion of a mechanism whose bodies have masses: its coordinates are the
         laws of its drivers.
     q : array_like of shape (..., K + 1, n), optional
-        Coordinates of a robot and their derivatives, K at least order + rate + rates + 1.
+        Coordinates of a robot and their derivatives; order + rate + rates + 1 are enough for K, and of those beyond
+        2 order + rate + rates + 2 - m the slope does not depend.
     m : int
         Which derivative of the coordinates it is differentiated by; beyond order + rate + 1 all slopes are zero.
     order : int, default 1
@@ -216,8 +134,7 @@ def energy_slope(
     numbers = {"m": m, "order": order, "rate": rate, "rates": rates}
     error = error_for(system)
     m, order, rate, rates = (whole_number(name, value, error=error) for name, value in numbers.items())
-    least, power = order + rate + rates + 1, 2 * order + rate - m
-    return _evaluated(system, q, least, _slope, rates + 1, order, rate, m, power=power)
+    return _evaluated(system, q, Slope(order, rate, m), rates=rates, power=2 * order + rate - m)
 
 
 def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
@@ -254,7 +171,7 @@ def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0)
     [[10.0], [14.0]]
     """
     rates = whole_number("rates", rates, error=error_for(system))
-    return _evaluated(system, q, rates + 2, _lagrange, rates + 1)
+    return _evaluated(system, q, Slope(0, 0, 1, rate=1), Slope(0, 0, 0, factor=Fraction(-1)), rates=rates)
 
 
 def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0, m: int = 1) -> Any:
@@ -265,7 +182,7 @@ def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: 
     Parameters
     ----------
     system, q, rates
-        As for `lagrange`, with K at least rates + m + 1.
+        As for `lagrange`; of higher derivatives than rates + 2 the sum does not depend.
     m : int, default 1
         Order of the derivatives, 1 or more.
 
@@ -288,7 +205,8 @@ def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: 
     [[10.0]]
     """
     m, rates = whole_number("m", m, 1, error=error_for(system)), whole_number("rates", rates, error=error_for(system))
-    return _evaluated(system, q, rates + m + 1, _mangeron, rates + 1, m)
+    slopes = Slope(0, m, m, factor=Fraction(1, m)), Slope(0, 0, 0, factor=Fraction(-m - 1, m))
+    return _evaluated(system, q, *slopes, rates=rates)
 
 
 def gibbs_appell(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0, m: int = 2) -> Any:
@@ -299,7 +217,7 @@ def gibbs_appell(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     Parameters
     ----------
     system, q, rates
-        As for `lagrange`, with K at least rates + m.
+        As for `lagrange`; of higher derivatives than rates + 2 the slope does not depend.
     m : int, default 2
         Order of the derivatives, 2 or more.
 
@@ -322,7 +240,7 @@ def gibbs_appell(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
     [[10.0], [14.0]]
     """
     m, rates = whole_number("m", m, 2, error=error_for(system)), whole_number("rates", rates, error=error_for(system))
-    return _evaluated(system, q, rates + m, _gibbs_appell, rates + 1, m)
+    return _evaluated(system, q, Slope(1, m - 2, m), rates=rates)
 
 
 def higher_order(
@@ -340,7 +258,7 @@ def higher_order(
     Parameters
     ----------
     system, q
-        As for `lagrange`, with K at least m + k - 1.
+        As for `lagrange`, with K at least k + 1; of higher derivatives the sum does not depend.
     k : int, default 1
         1 gives the forces, 2 their first rate, and so on.
     m : int, optional
@@ -370,6 +288,8 @@ def higher_order(
     """
     k = whole_number("k", k, 1, error=error_for(system))
     m = k + 1 if m is None else whole_number("m", m, k + 1, error=error_for(system))
-    weights = tuple(float(coefficients(p)) for p in range(1, k + 1))
-    values = _evaluated(system, q, m + k - 1, _higher_order, k, m, weights, power=k - 1)
+    scale = Fraction(math.factorial(k - 1) * math.factorial(m), math.factorial(m + k - 1))
+    weights = ((p, Fraction(coefficients(p))) for p in range(1, k + 1))
+    slopes = [Slope(p, m + k - 2 * p - 1, m, factor=scale * weight) for p, weight in weights]
+    values = _evaluated(system, q, *slopes, power=k - 1)
     return values[:, 0] if isinstance(system, Motion) else values[..., 0, :]
