@@ -155,7 +155,7 @@ def _arm(name: str, gear: planar.Gear, parameters: Mapping[str, Any], pins: Join
     body = GROUND if GROUND in shared else shared[0]
     line = [b - a for a, b in zip(first[body].value, second[body].value, strict=True)]
     if plain and not any(isinstance(x, Tracer) for x in line):
-        _check_gap(name, body, math.hypot(*line), radii)
+        _check_gap(name, body, math.hypot(*line), [float(radius) for radius in radii])
         return Arm(body, math.atan2(line[1], line[0]))
     apart = jnp.abs(radii[0] + radii[1])  # of a design that JAX traces: it fails where there is a gap
     meshes = jnp.abs(jnp.hypot(*line) - apart) <= LARGEST_GAP * apart
@@ -279,8 +279,9 @@ def _place(body: str, given: Any, parameters: Mapping[str, Any]) -> Place:
 def _same(a: Any, b: Any, given_a: Any, given_b: Any, near: Callable[[Any, Any], bool]) -> bool:
     """Tell whether components are the same; what JAX traces is compared as it was given."""
     if isinstance(a, Tracer) or isinstance(b, Tracer):
-        return a is b or (not isinstance(given_a, Tracer) and not isinstance(given_b, Tracer) and given_a == given_b)
-    return near(a, b)
+        traced = isinstance(given_a, Tracer) or isinstance(given_b, Tracer)
+        return a is b or (not traced and bool(given_a == given_b))
+    return bool(near(a, b))
 
 
 def _parallel(a: Place, b: Place) -> int:
