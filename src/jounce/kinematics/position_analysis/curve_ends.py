@@ -55,7 +55,7 @@ class CurveEnds:
     def excess(self, position: Float[np.ndarray, "component body *time"]) -> Float[np.ndarray, "*time"]:
         """Return how far places of bodies are beyond an end, below zero where they are between both."""
         value = np.asarray(position)[self.component, self.body] / self.unit
-        return np.maximum(self.low - value, value - self.high) - self.slack
+        return np.asarray(np.maximum(self.low - value, value - self.high) - self.slack)
 
     def words(self, beyond_high: bool) -> str:
         """Say which end of which curve it is."""
