@@ -196,6 +196,7 @@ from jounce.robot import (
     joint_wrenches as joint_wrenches,
     mass_matrix as mass_matrix,
     operational_accelerations as operational_accelerations,
+    point_slope as point_slope,
 )
 from jounce.sweeps import sweep as sweep
 from jounce.trajectory import (

@@ -16,7 +16,8 @@ PAGE = ROOT / "docs" / "equations.md"
 ROW = re.compile(r"^\| (?P<number>[SN] A?\d+) \| `(?P<name>[\w.]+)` \| (?P<test>definition|`[^`]+`) \|$")
 SOMMER = [f"S {k}" for k in range(1, 112)] + [f"S A{k}" for k in range(1, 35)]
 NEGREAN = [f"N {k}" for k in range(1, 147)]
-DEFINITIONS = ["S 20", "S 60", "S 72", "N 74"]  # what a symbol means
+SYMBOLS = ["S 20", "S 60", "S 72", *(f"N {k}" for k in (1, 2, 4, 5, 9, 10, 27, 28, 74))]  # what a symbol means
+DEFINITIONS = [*SYMBOLS, "N 80", "N 108"]  # and which numbers are meant
 
 
 def table_rows():

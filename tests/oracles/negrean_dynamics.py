@@ -45,12 +45,12 @@ class BodyMotion:
         return self.r[k] + local @ self.R[k].T
 
     def cloud_energy(self, p, n=0, points=None):
-        """Return the n-th rate of the acceleration energy of order p by its definition: N 65, 82, 115, 117, 119."""
+        """Return the n-th rate of the acceleration energy of order p by its definition: N 65, 83, 116, 118, 120."""
         points = self.points if points is None else points
         return product_rate(lambda k: self.point(p + 1 + k, points), n, lambda a, b: self.masses @ (a * b).sum(axis=1))
 
     def trace_energy(self, p, n=0):
-        """Return the same by the pseudo-inertia J (N 108): 1/2 trace of the rate of T^(p+1) J T^(p+1)^T, N 107."""
+        """Return the same by the pseudo-inertia J (N 109): 1/2 trace of the rate of T^(p+1) J T^(p+1)^T, N 107."""
         J = np.zeros((4, 4))
         c = np.append(self.center, 1.0)
         J[:3, :3] = self.second_moments
@@ -81,7 +81,7 @@ class BodyMotion:
 
     @property
     def moments(self):
-        """Second moments about the centre of mass, in the base: N 108."""
+        """Second moments about the centre of mass, in the base: N 109."""
         return self.R[0] @ self.second_moments @ self.R[0].T
 
 
@@ -99,7 +99,7 @@ def body_axes(body):
 
 
 def printed_rotation(p, inertia, moments, w):
-    """Return the rotational part of the closed forms of E_2, E_3, E_4 as printed: N 116, 118, 120.
+    """Return the rotational part of the closed forms of E_2, E_3, E_4 as printed: N 117, 119, 121.
 
     `w` holds the angular velocity and its derivatives, in any one set of axes.
     """
@@ -112,12 +112,12 @@ def printed_rotation(p, inertia, moments, w):
 
 
 def printed_rotation_any_order(p, inertia, w):
-    """Return the rotational part of E_p as printed: N 121, with the product of angular velocities of N 122."""
+    """Return the rotational part of E_p as printed: N 122, with its product of angular velocities."""
     return w[p] @ inertia @ w[p] / 2 + (w[0] @ w[0]) ** p * (w[0] @ inertia @ w[0])
 
 
 def second_order_rotation(moments, w):
-    """Return the rotational part of E_2 as it must be: 1/2 trace(M S M^T), in place of N 116."""
+    """Return the rotational part of E_2 as it must be: 1/2 trace(M S M^T), in place of N 117."""
     spin, turn, jerk = (skew(x) for x in w[:3])
     M = jerk + 2 * turn @ spin + spin @ turn + spin @ spin @ spin
     return np.trace(M @ moments @ M.T) / 2

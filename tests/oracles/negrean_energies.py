@@ -55,14 +55,14 @@ def one_axis_torques(inertia, a, j, s):
 
 
 def printed_rotation_second_order(inertia, second_moments, w, a, j):
-    """Return the rotational part of N 115 as printed, which lacks terms."""
+    """Return the rotational part of N 117 as printed, which lacks terms."""
     inertia = np.asarray(inertia)
     mixed = a @ np.cross(j, np.asarray(second_moments) @ w)
     return j @ inertia @ j / 2 + mixed + (w @ w) ** 2 * (w @ inertia @ w) / 2
 
 
 def printed_rotation_third_order(inertia, second_moments, w, a, j, s):
-    """Return the rotational part of N 117 as printed, which lacks terms."""
+    """Return the rotational part of N 119 as printed, which lacks terms."""
     inertia = np.asarray(inertia)
     mixed = 3 * s @ np.cross(w, np.asarray(second_moments) @ j)
     return s @ inertia @ s / 2 + mixed + (w @ w) ** 3 * (w @ inertia @ w) / 2

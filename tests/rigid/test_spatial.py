@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jounce import jet
+from jounce import jet, rigid
 from jounce.jet import Jet
 from jounce.rigid import SpatialPose, to_body, to_global
 from tests.oracles import sommer_spatial as spatial
@@ -62,6 +62,13 @@ def test_equations_060_063_065_products_of_angular_velocity(seed):
     close(turned[2], skew[1] + skew[0] @ skew[0])
     close(turned[3], spatial.equation_063(case.i) + skew[2])
     close(turned[4], spatial.equation_065(case.i) + skew[3])
+    assert case.pose_i.angular_velocity is not None
+    products = np.asarray(rigid.angular_product_matrices(case.pose_i.angular_velocity)).reshape(-1, 3, 3)
+    close(products[3], spatial.equation_063(case.i))
+    close(products[4], spatial.equation_065(case.i))
+    for k in range(2, len(products)):
+        close(products[k] + skew[k - 1], turned[k])
+    np.testing.assert_array_equal(products[:2], [np.eye(3), np.zeros((3, 3))])
 
 
 @SEEDS

@@ -55,7 +55,7 @@ def masses_of(mechanism: Mechanism) -> Masses:
 
 
 def second_moments(tensor: Float[Numbers, "3 3 *batch"]) -> Float[Numbers, "3 3 *batch"]:
-    """Return the second moments about the centre of mass from the inertia tensor: Negrean 2025, equation 108."""
+    """Return the second moments about the centre of mass from the inertia tensor: Negrean 2025, equation 109."""
     unit = np.eye(3).reshape(3, 3, *[1] * (tensor.ndim - 2))
     return (tensor[0, 0] + tensor[1, 1] + tensor[2, 2])[None, None] / 2 * unit - tensor
 

@@ -26,6 +26,7 @@ from jounce.rigid.screws import (
 )
 from jounce.rigid.spatial import (
     SpatialPose as SpatialPose,
+    angular_product_matrices as angular_product_matrices,
     body_axes as body_axes,
     to_body as to_body,
     to_global as to_global,

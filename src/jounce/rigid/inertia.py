@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia of a rigid body, and their sums. Negrean 2025, equations 72 and 108."""
+"""Mass, centre of mass and inertia of a rigid body, and their sums. Negrean 2025, equations 72 and 109."""
 
 import dataclasses
 from collections.abc import Callable, Iterable
@@ -96,7 +96,7 @@ class Inertia:
 
     @property
     def second_moments(self) -> np.ndarray:
-        """Integral of rho rho^T dm about the centre of mass, (3, 3), kg m^2: Negrean 2025, equation 108."""
+        """Integral of rho rho^T dm about the centre of mass, (3, 3), kg m^2: Negrean 2025, equation 109."""
         return np.trace(self.tensor) / 2 * np.eye(3) - self.tensor
 
     @property

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from jounce.errors import JounceError
-from jounce.jet import Jet, components, dot, matvec, stack, transpose
+from jounce.jet import Jet, components, concatenate, dot, matmul, matvec, stack, transpose
 from jounce.jet.coefficients import minus, plus, sum_of_products, total
 from jounce.rigid.body_arrays import each_jet, take_bodies
 from jounce.rigid.frames import AbstractFrame
@@ -214,6 +214,41 @@ class SpatialPose(AbstractFrame):
             rate = coordinates["angular_velocity"].coefficients[k - 1] * (1 / k)
             pose = pose.extended(coordinates["position"].coefficients[k], rate)
         return pose
+
+
+def angular_product_matrices(angular_velocity: Jet) -> Float[jax.Array, "derivative 3 3 *batch"]:
+    """Return the products of angular velocities in the derivatives of an attitude: Sommer 2024, equations 63 and 65.
+
+    The k-th derivative of an attitude is ``A^(k) = A (P_k + [w^(k-1)]x)`` with the body-fixed angular velocity w, and
+    of a point ``r^(k) + A (P_k + [w^(k-1)]x) s``. P_3 is the angular jerk product matrix H of the paper, P_4 its
+    angular jounce product matrix W, and P_2 is ``[w]x [w]x``; those of higher orders follow.
+
+    Parameters
+    ----------
+    angular_velocity : Jet of shape (3, ...)
+        In the axes of the body, rad/s.
+
+    Returns
+    -------
+    array of shape (order + 2, 3, 3, ...)
+        The matrices P_0 (the identity), P_1 (zero), P_2, ..., P_(order + 1), in the axes of the body, 1/s^k.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> w = jn.Jet.from_derivatives([[0.0, 0.0, 2.0], [0.0, 0.0, 3.0], [0.0, 0.0, 0.0]])  # 2 rad/s and 3 rad/s^2
+    >>> jn.rigid.angular_product_matrices(w)[3, :, 0].tolist()  # of H: -3 w w' along the axis, -w^3 across
+    [-18.0, -8.0, 0.0]
+    """
+    x, y, z = components(angular_velocity.dense())
+    zero = x * 0.0
+    spin = stack([concatenate([zero, -z, y]), concatenate([z, zero, -x]), concatenate([-y, x, zero])])
+    one = jnp.broadcast_to(jnp.eye(3).reshape(3, 3, *[1] * (len(spin.shape) - 2)), spin.shape)
+    turned = Jet([one])
+    for k in range(spin.order + 1):  # A' = A [w]x, from the identity
+        turned = turned.append(matmul(turned, spin.truncate(k)).dense().coefficients[k] / (k + 1))
+    matrices, rates = turned.derivatives(), spin.derivatives()
+    return jnp.concatenate([matrices[:1], matrices[1:] - rates])
 
 
 def to_global(attitude: Float[Jet, "3 3 *batch"], body: Float[Jet, "3 *batch"]) -> Float[Jet, "3 *batch"]:

@@ -11,6 +11,7 @@ from jounce.robot.algorithms.inverse_dynamics import (
 from jounce.robot.algorithms.jacobian import (
     jacobian as jacobian,
     operational_accelerations as operational_accelerations,
+    point_slope as point_slope,
 )
 from jounce.robot.algorithms.joint_motion import JointMotion as JointMotion, joint_motion as joint_motion
 from jounce.robot.algorithms.wrenches import Wrench as Wrench

@@ -1,4 +1,4 @@
-"""The acceleration energy by its terms, against integrals over point masses: Negrean 2025, 73-75, 82-106, 109-114."""
+"""The acceleration energy by its terms, against integrals over point masses: Negrean 2025, 73-75, 83-106, 110-115."""
 
 import functools
 
@@ -68,7 +68,7 @@ def found_terms(terms, sample, body=-1):
 @pytest.mark.slow
 @ABOUT
 @pytest.mark.parametrize("p", range(3))
-def test_equations_082_to_106_each_term_is_its_integral(p, about):
+def test_equations_083_to_106_each_term_is_its_integral(p, about):
     terms = jn.energy_terms(free_body(), state(), order=p, about=about)
     whole = jn.acceleration_energy(free_body(), state(), order=p)
     for sample in range(SAMPLES):
@@ -88,7 +88,7 @@ def test_equations_082_to_106_each_term_is_its_integral(p, about):
 
 @pytest.mark.slow
 @ABOUT
-def test_equations_083_to_106_closed_forms_of_first_order(about):
+def test_equations_084_to_106_closed_forms_of_first_order(about):
     robot = free_body()
     terms, motion = jn.energy_terms(robot, state(), about=about), jn.forward_kinematics(robot, state(), "body")
     inertia = robot.links["body"].inertia
@@ -156,7 +156,7 @@ def test_equations_073_and_075_kinetic_energy_is_of_translation_and_of_rotation(
 
 
 @pytest.mark.slow
-def test_equations_109_to_114_of_a_robot_and_rates():
+def test_equations_110_to_115_of_a_robot_and_rates():
     robot = random_robot(7, 3, prismatic=0.4, fixed=0.4)
     q = np.random.default_rng(3).uniform(-1, 1, (1, 5, 3))
     terms = jn.energy_terms(robot, q)
@@ -179,8 +179,8 @@ def test_equations_109_to_114_of_a_robot_and_rates():
         R, a = motion.rotation[0, 0], motion.position[0, 2]
         w, e = motion.angular_velocity[0, :2]
         tensor = R @ whole.tensor @ R.T
-        right = [whole.mass / 2 * a @ a, 0.0, 0.0, e @ tensor @ e / 2]  # 111, 112
-        right += [e @ np.cross(w, tensor @ w), w @ w * (w @ tensor @ w) / 2]  # 113, 114
+        right = [whole.mass / 2 * a @ a, 0.0, 0.0, e @ tensor @ e / 2]  # 112, 113
+        right += [e @ np.cross(w, tensor @ w), w @ w * (w @ tensor @ w) / 2]  # 114, 111
         np.testing.assert_allclose(found_terms(terms, 0, k), right, rtol=0, atol=1e-12 * np.abs(right).max())
 
 

@@ -1,4 +1,4 @@
-"""The equations of motion in every form against virtual work in fifty digits: Negrean 2025, 121-135 and 144-146."""
+"""The equations of motion in every form against virtual work in fifty digits: Negrean 2025, 123-135 and 144-146."""
 
 import functools
 import math
@@ -345,7 +345,7 @@ def leibniz(product, n):
     return sum(math.comb(n, i) * product(i, n - i) for i in range(n + 1))
 
 
-def test_equations_121_to_123_rates_by_the_rates_of_the_jacobian():
+def test_equation_123_rates_by_the_rates_of_the_jacobian():
     robot, q, right = case(tree)
     bodies = [(name, link.inertia) for name, link in robot.links.items() if link.inertia is not None]
     found = sum(carried(robot, q[0], name, inertia, RATES) for name, inertia in bodies)

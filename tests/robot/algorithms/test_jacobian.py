@@ -1,10 +1,15 @@
 """Jacobians against differences of poses, joint by joint; the identities of their rates are in tests/contracts."""
 
+import math
+
 import numpy as np
 import pytest
+from mpmath import mp, mpf
 from scipy.spatial.transform import Rotation
 
 import jounce as jn
+from tests.dynamics.energy.test_equations import in_digits, tree
+from tests.oracles import mp_robot
 from tests.problems.robots import poses, robot_named
 
 POINT = [0.1, -0.2, 0.3]
@@ -67,3 +72,43 @@ def test_a_joint_that_is_followed_moves_by_all_its_followers():
     jacobian = jn.jacobian(robot, [[angle], [1.0]], "b", [-1, 0, 0])
     np.testing.assert_allclose(jacobian[0, :, 0], [-2 * np.sin(angle), 0, 0, 0, 0, -1], rtol=0, atol=1e-15)
     np.testing.assert_allclose(jacobian[1, :, 0], [-2 * np.cos(angle), 0, 0, 0, 0, 0], rtol=0, atol=1e-15)
+
+
+def slope_in_digits(robot, q, link, n, m):
+    """Return dr^(n) / dq^(m) of a point by differences of a series in fifty digits."""
+    with mp.workdps(50):
+        made, rows = in_digits(robot, q)
+        body = [b.name for b in made.bodies].index(link)
+        step, columns = mpf("1e-20"), []
+        for j in range(len(rows)):
+            sides = []
+            for sign in (1, -1):
+                moved = [list(row) for row in rows]
+                moved[j][m] += sign * step
+                point = mp_robot.State(made, [mp_robot.motion(row) for row in moved]).point(body, POINT)
+                sides.append([part.derivatives()[n] for part in point])
+            columns.append([float((a - b) / (2 * step)) for a, b in zip(*sides, strict=True)])
+        return np.array(columns).T
+
+
+@pytest.mark.parametrize("n, m", [(0, 0), (3, 0), (1, 1), (4, 4), (3, 1), (5, 3), (2, 4)])
+def test_equations_050_to_055_slopes_of_points_of_any_order(n, m):
+    robot, q = tree(), np.random.default_rng(3).uniform(-1, 1, (6, 3))
+    right = slope_in_digits(robot, q, "link_2", n, m)
+    found = jn.point_slope(robot, q, "link_2", POINT, n=n, m=m)
+    np.testing.assert_allclose(found, right, rtol=0, atol=1e-13 * max(1.0, np.abs(right).max()))
+    if n == m:  # 50; and 55, the velocity
+        np.testing.assert_array_equal(found, jn.point_slope(robot, q, "link_2", POINT))
+        velocity = jn.forward_kinematics(robot, q, "link_2", POINT).position[1]
+        np.testing.assert_allclose(found @ q[1], velocity, rtol=0, atol=1e-14)
+    if n > m:  # 52 and 54
+        rate = jn.jacobian(robot, q, "link_2", POINT)[n - m, :3]
+        np.testing.assert_allclose(found, math.comb(n, m) * rate, rtol=0, atol=1e-13 * np.abs(right).max())
+
+
+def test_slopes_of_points_are_refused_by_their_orders():
+    robot = tree()
+    with pytest.raises(jn.RobotError, match="needs derivatives of q to order 3"):
+        jn.point_slope(robot, np.zeros((1, 3, 3)), "link_2", n=4)
+    with pytest.raises(jn.RobotError, match=r"m.*must be a whole number, 0 or greater"):
+        jn.point_slope(robot, np.zeros((2, 3)), "link_2", m=-1)

@@ -1,4 +1,4 @@
-"""Generalised forces from balances of momentum: virtual work, Newton-Euler. Negrean 2025, equations 79-81, 121-125."""
+"""Generalised forces from balances of momentum: virtual work, Newton-Euler. Negrean 2025, equations 78-82, 123-125."""
 
 from typing import Any
 
@@ -73,7 +73,7 @@ def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
 
 
 def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
-    """Return the generalised inertia forces by the principle of d'Alembert-Lagrange: Negrean 2025, equations 121-124.
+    """Return the generalised inertia forces by d'Alembert-Lagrange: Negrean 2025, equations 81, 123 and 124.
 
     The work that inertia forces and moments of all bodies do along each coordinate, ``sum J^T F``. For the motion of
     a mechanism, J is how the bodies move with the laws of the drivers: the transposed Jacobian of the constraints.

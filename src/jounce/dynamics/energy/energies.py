@@ -1,4 +1,4 @@
-"""Kinetic energy and acceleration energies of any order, with their rates. Negrean 2025, equations 65-120.
+"""Kinetic energy and acceleration energies of any order, with their rates. Negrean 2025, equations 65-122.
 
 The acceleration energy of order p is the kinetic energy with derivatives of order p + 1 in the place of velocities,
 ``E_p = 1/2 integral |r^(p+1)|^2 dm``; order 0 is the kinetic energy. With the second moments S of a body about its
@@ -80,7 +80,7 @@ def summed(energies: Any) -> Any:
 def body_energy(
     pose: Pose | Frames, mass: Any, center_of_mass: Any, second_moments: Any, order: int = 1
 ) -> tuple[Jet, Jet]:
-    """Return the acceleration energy of rigid bodies as jets: Negrean 2025, equations 82-113.
+    """Return the acceleration energy of rigid bodies as jets: Negrean 2025, equations 83-110.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def acceleration_energy(
 ) -> Energy:
     """Return the acceleration energy of order p of a robot or of a moving mechanism, and its rates.
 
-    Negrean 2025, equations 73-78 for order 0, 82-113 for order 1, 107 for any order.
+    Negrean 2025, equations 73-77 for order 0, 83-115 for order 1, 107 for any order.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def energies_of(
 def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None, *, drives: bool = True) -> Energy:
     """Return the kinetic energy of a robot or of a moving mechanism, and its rates: `acceleration_energy` of order 0.
 
-    Negrean 2025, equations 65-78 (Koenig's theorem). Of a robot the armature inertia of its joints counts, unless
+    Negrean 2025, equations 65-77 (Koenig's theorem). Of a robot the armature inertia of its joints counts, unless
     `drives` is False.
 
     Examples

@@ -50,7 +50,7 @@ class AbstractEnergyOutput(AbstractMotionOutput):
 
 
 class KineticEnergyOutput(AbstractEnergyOutput):
-    """Kinetic energy of all bodies, J. Negrean 2025, equations 65-78."""
+    """Kinetic energy of all bodies, J. Negrean 2025, equations 65-77."""
 
     lost_orders = 1
 
@@ -59,7 +59,7 @@ class KineticEnergyOutput(AbstractEnergyOutput):
 
 
 class AccelerationEnergyOutput(AbstractEnergyOutput):
-    """Acceleration energy of order p of all bodies, J/s^(2 p). Negrean 2025, equations 82-122."""
+    """Acceleration energy of order p of all bodies, J/s^(2 p). Negrean 2025, equations 83-122."""
 
     order: Whole = eqx.field(static=True, default=1)
 
@@ -96,7 +96,7 @@ class BodyKineticEnergyOutput(KineticEnergyOutput):
 
 
 class BodyAccelerationEnergyOutput(AccelerationEnergyOutput):
-    """Acceleration energy of order p of a body, J/s^(2 p). Negrean 2025, equations 82-106."""
+    """Acceleration energy of order p of a body, J/s^(2 p). Negrean 2025, equations 83-122."""
 
     body: str = eqx.field(static=True, kw_only=True)
 

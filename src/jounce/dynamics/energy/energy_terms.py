@@ -1,8 +1,8 @@
-"""The acceleration energy term by term, as Negrean 2025 builds it up: equations 82-106 and 111-114, and for any order.
+"""The acceleration energy term by term, as Negrean 2025 builds it up: equations 83-106 and 112-115, and for any order.
 
 The derivative of order p + 1 of a point rho of a body is that of the origin, plus ``w^(p) x rho`` with the highest
 derivative of the angular velocity, plus what is left: ``sum C(p, j) w^(j) x rho^(p - j)`` over j < p, which for p = 1
-is ``w x (w x rho)`` (equation 83). The square of the three is six terms.
+is ``w x (w x rho)`` (below equation 83). The square of the three is six terms.
 """
 
 import dataclasses
@@ -41,11 +41,11 @@ class EnergyTerms:
     coupling_remaining : array
         ``m a . (w x (w x c))``: equation 86; zero about the centre of mass.
     leading : array
-        ``1/2 e . I e``, of the highest derivative of the angular velocity alone: equations 87 and 112.
+        ``1/2 e . I e``, of the highest derivative of the angular velocity alone: equations 87 and 113.
     mixed : array
-        ``e . (w x I w)``: equations 88-96 and 113.
+        ``e . (w x I w)``: equations 88-96 and 114.
     remaining : array
-        ``1/2 (w . w) (w . I w)``, without the highest derivative: equations 97-104 and 114.
+        ``1/2 (w . w) (w . I w)``, without the highest derivative: equations 97-104, 111 and 115.
     bodies : tuple of str
         Names along the last axis.
     order : int
@@ -77,8 +77,8 @@ def energy_terms(
 ) -> EnergyTerms:
     """Return the terms of the acceleration energy of order p apart: translation, and the three of rotation; with rates.
 
-    Negrean 2025, equations 82-106 and 111-114 for order 1, whose terms they are; for any order the same split, exact,
-    in the place of equations 116-121, which lack terms. They are those of the links alone: the armature inertia of
+    Negrean 2025, equations 83-106 and 110-115 for order 1, whose terms they are; for any order the same split, exact,
+    in the place of equations 117-122, which lack terms. They are those of the links alone: the armature inertia of
     joints, which `acceleration_energy` adds unless `drives` is False, has no such split.
 
     Parameters

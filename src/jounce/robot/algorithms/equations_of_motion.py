@@ -197,7 +197,7 @@ def mass_matrix(
     Notes
     -----
     By composite bodies on jets (Featherstone 2008, Rigid Body Dynamics Algorithms, section 6.2); the matrix of the
-    kinetic energy ``1/2 q'^T M q'`` of Negrean 2025, equations 75-78.
+    kinetic energy ``1/2 q'^T M q'`` of Negrean 2025, equations 75-77.
 
     Examples
     --------
@@ -252,7 +252,7 @@ def bias_forces(
 
     Notes
     -----
-    By the virtual work of inertia and weight: Negrean 2025, equations 81 and 124-125.
+    By the virtual work of inertia and weight: Negrean 2025, equations 81, 124 and 125.
 
     Examples
     --------

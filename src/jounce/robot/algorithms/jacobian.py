@@ -1,10 +1,12 @@
-"""Jacobians with their rates, and operational accelerations of any order. Negrean 2025, equations 55-59."""
+"""Jacobians with their rates, slopes of points, operational accelerations of any order. Negrean 2025, 50-59."""
 
+import math
 from typing import Any
 
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from jounce.errors import RobotError, whole_number
 from jounce.jet import Jet, concatenate, cross
 from jounce.jet.algebra import stacked
 from jounce.robot.model.arguments import checked_coordinates
@@ -73,6 +75,46 @@ def jacobian(
     [0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
     """
     return _jacobian(robot, (checked_coordinates(robot, q),), frame_at(robot, link, point))
+
+
+def point_slope(
+    robot: Robot, q: ArrayLike, link: str, point: ArrayLike = (0.0, 0.0, 0.0), *, n: int = 1, m: int = 1
+) -> Float[Numbers, "*batch 3 joint"]:
+    """Return ``dr^(n) / dq^(m)``: how the n-th derivative of a point changes with the m-th one of each coordinate.
+
+    Negrean 2025, equations 50-55: ``C(n, m)`` times the rate of order n - m of the Jacobian of the point; where n is
+    less than m it is zero, and for n = m it is the same for all orders.
+
+    Parameters
+    ----------
+    robot, q, link, point
+        As for `jacobian`, with q of order n - m or more.
+    n, m : int, default 1
+        Orders of the derivatives of the point and of the coordinates, 0 or more; all other derivatives are held.
+
+    Returns
+    -------
+    array of shape (..., 3, n)
+        In the frame of the base, m or m/rad, by s^(m - n).
+
+    Raises
+    ------
+    RobotError
+        If there is no such link, an order is none, or q does not fit the robot or has too few derivatives.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
+    >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
+    >>> robot = jn.Robot("one", links, [pin])
+    >>> jn.point_slope(robot, [[0.0], [3.0]], "rod", [2, 0, 0], n=3, m=2)[:, 0].tolist()  # 3 (dr/dq)'
+    [-18.0, 0.0, 0.0]
+    """
+    n, m = whole_number("n", n, error=RobotError), whole_number("m", m, error=RobotError)
+    rate = max(0, n - m)
+    rates = _jacobian(robot, (checked_coordinates(robot, q, rate, rate),), frame_at(robot, link, point))
+    return rates[..., rate, :3, :] * float(math.comb(n, m))
 
 
 def twist(tree: Tree, q: Series, frame_in_body: Frame) -> Jet:
