@@ -11,7 +11,16 @@ import pytest
 
 from jounce.errors import OutputError
 from jounce.papers import negrean_2025
-from jounce.papers.negrean_2025 import CASES, case, closed_forms, comparison, figures, reproduce, segment
+from jounce.papers.negrean_2025 import (
+    CASES,
+    case,
+    closed_forms,
+    comparison,
+    figures,
+    measured_data,
+    reproduce,
+    segment,
+)
 from jounce.papers.negrean_2025.history import difference, history
 from jounce.papers.negrean_2025.measured_data import given_cases
 from tests.oracles import negrean_energies
@@ -175,6 +184,50 @@ def test_measurements_say_their_unit(tmp_path):
     np.testing.assert_allclose(case.knots, 0.1 * np.arange(9), rtol=1e-15)
 
 
+def rest_to_rest(t):
+    """Return angle and angular acceleration from 0 to 1.2 rad in 0.8 s, at rest to the third derivative at the ends."""
+    s = t / 0.8
+    angle = 1.2 * (35 * s**4 - 84 * s**5 + 70 * s**6 - 20 * s**7)
+    return angle, 1.2 * 420 * s**2 * (1 - s) ** 2 * (1 - 2 * s) / 0.8**2
+
+
+@pytest.mark.parametrize("gravity", [False, True])
+@pytest.mark.parametrize("even", [True, False])
+def test_tangential_readings_with_a_radius(tmp_path, gravity, even):
+    """What an accelerometer at 0.25 m, 30 degrees on the link, reads of a motion in closed form."""
+    t = np.linspace(0.0, 0.8, 161)
+    if not even:
+        t[1:-1] += np.random.default_rng(0).uniform(-1e-3, 1e-3, 159)  # stamps of a logger, 5 ms apart
+    angle, acceleration = rest_to_rest(t)
+    reading = 0.25 * acceleration - (9.81 * np.cos(angle + np.pi / 6) if gravity else 0.0)
+    samples, link = tmp_path / "mine.csv", tmp_path / "link.yaml"
+    rows = zip((1e3 * t).tolist(), (1e2 * reading).tolist(), strict=True)
+    samples.write_text("time [ms],fast [cm/s^2]\n" + "".join(f"{x!r},{y!r}\n" for x, y in rows))
+    link.write_text(LINK + "radius: 250 mm\nsensor_angle: 30 deg\n")
+    found = given_cases(samples, link, remove_gravity=gravity)["fast"]
+    np.testing.assert_allclose(found.knots, t, rtol=0, atol=1e-15)
+    size = np.abs(acceleration).max()
+    np.testing.assert_allclose(found.accelerations, acceleration, rtol=0, atol=(1e-6 if gravity else 1e-13) * size)
+    np.testing.assert_allclose(found.motion.coefficients[0], angle[:-1], rtol=0, atol=1e-6)
+    told = measured_data.summary({"fast": found}, samples, link, remove_gravity=gravity)
+    assert ("Gravity is taken off" in told) == gravity
+    assert ("--remove-gravity" in told) != gravity
+
+
+def test_gravity_is_taken_off_tangential_readings_alone(tmp_path, run):
+    samples, link = tmp_path / "mine.csv", tmp_path / "link.yaml"
+    samples.write_text("time,slow\n" + "".join(f"{0.1 * k},1\n" for k in range(9)))
+    link.write_text(LINK + "radius: 250 mm\n")
+    for given, words in (
+        (("--samples", samples, "--masses", link), ("mine.csv", "slow", "tangential")),
+        ((), ("remove_gravity", "samples")),
+    ):
+        status, _, complaint = run("reproduce", "negrean-2025", "--out", tmp_path / "out", *given, "--remove-gravity")
+        assert status == 2
+        assert all(word in complaint for word in words), complaint
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize(
     "samples, masses, said, unsaid",
     [
@@ -201,7 +254,10 @@ def test_pictures_say_which_data_are_stand_ins(tmp_path, samples, masses, said, 
         ("time,a\n0,1\n", None, ("mine.csv", "a")),
         ("t,a\n0,1\n1,2\n", None, ("mine.csv", "time")),
         ("time,a [deg]\n0,1\n1,2\n", None, ("mine.csv", "a", "deg")),
-        ("time,a [m/s^2]\n0,1\n1,2\n", None, ("mine.csv", "a", "angular")),
+        ("time,a [m/s^2]\n0,1\n1,2\n", None, ("mine.csv", "a", "radius")),
+        ("time,a [m/s^2]\n0,1\n1,2\n", LINK, ("mine.csv", "a", "radius")),
+        ("time,a [m/s^3]\n0,1\n1,2\n", LINK, ("mine.csv", "a", "m/s^3")),
+        (None, LINK + "radius: 0 m\n", ("link.yaml", "line 5", "radius", "0")),
         (None, LINK.replace("mass: 4 kg\n", ""), ("link.yaml", "mass", "missing")),
         (None, LINK.replace("4 kg", "4 m"), ("link.yaml", "line 1", "mass", "4 m")),
         (None, LINK.replace("4 kg", "-4 kg"), ("link.yaml", "mass", "-4")),

@@ -105,6 +105,70 @@ def test_derivatives_at_both_ends(m):
         assert abs(found[k, -1] - value) <= 1e-11 * scale[k]
 
 
+def equation_064(segments, m=4):
+    """Return the conditions of equation 64, read literally, on the coefficients of segments of a unit of time.
+
+    Rows of all but the last two conditions, q and q^(m) at the last knot; then those.
+    """
+    size = m + 2
+
+    def value(segment, place, order):
+        row = np.zeros(segments * size)
+        row[segment * size : (segment + 1) * size] = [
+            math.perm(j, order) * float(place) ** (j - order) if j >= order else 0.0 for j in range(size)
+        ]
+        return row
+
+    rows = [value(0, 0, order) for order in range(m + 1)]
+    for i in range(1, segments):
+        rows += [value(i - 1, 1, order) - value(i, 0, order) for order in range(m + 1)]
+        rows.append(value(i, 0, 2))
+    return np.array(rows), np.array([value(segments - 1, 1, order) for order in (0, m)])
+
+
+def test_equation_064_as_printed_has_one_condition_more_than_unknowns():
+    """Errata: 255 conditions for the 254 unknowns of equation 63, with 51 segments and m = 4."""
+    s, m = 51, 4
+    continuity, at_the_ends, accelerations = m * (s - 1), m + 1, s - 1  # q^(m) is that of the knots on both sides
+    assert m * s + s - 1 == 254
+    assert continuity + at_the_ends + accelerations == 255
+    rows, last = equation_064(6)
+    assert len(rows) + len(last) == rows.shape[1] + 1
+    assert np.linalg.matrix_rank(np.concatenate([rows, last])) == rows.shape[1]
+
+
+def test_equation_064_without_its_last_position_grows_at_every_knot():
+    """An error of the jerk at the start grows by 2 + sqrt 3 a knot, as nothing at the end holds against it."""
+    rows, last = equation_064(12)
+    error = np.zeros(len(rows) + 1)
+    error[3] = 1.0
+    jerk = np.linalg.solve(np.concatenate([rows, last[1:]]), error).reshape(12, 6)[:, 3]
+    growth = jerk[2:8] / jerk[1:7]
+    assert np.abs(growth).max() > 3.7
+    np.testing.assert_allclose(growth[2:5], -(2 + math.sqrt(3)), rtol=0.02)
+    t = np.linspace(0.0, 1.7, 52)
+    zeros: dict[int, float] = dict.fromkeys((0, 1, 3, 4), 0.0)
+    for end in ({}, {4: 0.0}, {0: np.pi, 4: 0.0}):
+        with pytest.raises(TrajectoryError, match="conditions"):
+            PolynomialMotion.from_accelerations(t, np.sin(3 * t), 4, start=zeros, end=end)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_the_law_of_the_paper_from_accelerations_at_52_knots(noise):
+    """Section 4: 51 segments of degree 5 in 1.7 s from accelerations; noise of samples does not grow along them."""
+    t = np.linspace(0.0, 1.7, 52)
+    angle = lambda x, k: 9.0 * 3.0 ** (k - 2) * np.sin(3 * x + k * np.pi / 2)  # noqa: E731 - derivative k of sin 3 t
+    wrong = noise * np.random.default_rng(1).uniform(-1, 1, 52)
+    start, end = {0: 0.0, 3: angle(0.0, 3)}, {0: angle(1.7, 0), 3: angle(1.7, 3)}
+    law = PolynomialMotion.from_accelerations(t, angle(t, 2) + wrong, 4, start=start, end=end)
+    assert law.degree == 5
+    x = np.linspace(0.0, 1.7, 501)
+    found = derivatives(law, 4, x)
+    for k, bound in enumerate((3e-7, 1e-6, 1e-5, 2e-3, 0.1)):
+        grown = noise * (0.5, 1.0, 2.0, 500.0, 1e5)[k]  # of differences over 0.033 s from the third on
+        assert np.abs(found[k] - angle(x, k)).max() <= bound * 3.0**k + grown
+
+
 @pytest.mark.parametrize("m", [2, 3, 4, 6])
 def test_polynomial_of_the_degree_is_itself(m):
     polynomial = np.polynomial.Polynomial(RNG.uniform(-1, 1, m + 2))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from jounce.errors import JounceError, check_name
 from jounce.reporting.terminal import Bar, say
@@ -10,7 +11,15 @@ from jounce.reporting.terminal import Bar, say
 PAPERS = ("sommer-2024", "negrean-2025")
 
 
-def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: Path | None = None) -> int:
+def reproduce(
+    paper: str,
+    /,
+    *,
+    out: Path,
+    samples: Path | None = None,
+    masses: Path | None = None,
+    remove_gravity: bool = False,
+) -> int:
     """Reproduce the figures and tables of a paper.
 
     Parameters
@@ -20,10 +29,13 @@ def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: 
     out
         Folder for figures and tables; made if it does not exist.
     samples
-        Your own accelerations (.csv: time, then a column for each motion, rad/s^2) in the place of stand-ins;
-        negrean-2025 only.
+        Your own accelerations (.csv: time, then a column for each motion: angular, rad/s^2, or tangential with
+        its unit, as fast [m/s^2]) in the place of stand-ins; negrean-2025 only.
     masses
-        Your own link (.yaml, .toml, .json: mass, center_x, center_z, inertia_y); negrean-2025 only.
+        Your own link (.yaml, .toml, .json: mass, center_x, center_z, inertia_y; radius for tangential
+        samples); negrean-2025 only.
+    remove_gravity
+        Take gravity off tangential samples, as an accelerometer on an arm with a level axis reads it too.
 
     Examples
     --------
@@ -34,10 +46,12 @@ def reproduce(paper: str, /, *, out: Path, samples: Path | None = None, masses: 
     from jounce.reporting.text.summaries import count
 
     check_name("paper", paper, PAPERS, JounceError)
-    given = {name: path for name, path in (("samples", samples), ("masses", masses)) if path is not None}
+    given: dict[str, Any] = {"samples": samples, "masses": masses, "remove_gravity": remove_gravity or None}
+    given = {name: value for name, value in given.items() if value is not None}
     if given and paper != "negrean-2025":
         message = f"{paper} needs no data of yours; negrean-2025 takes samples and masses"
-        raise JounceError(message, name=f"--{next(iter(given))}", value=str(next(iter(given.values()))))
+        name, value = next(iter(given.items()))
+        raise JounceError(message, name=f"--{name.replace('_', '-')}", value=str(value))
     if paper == "negrean-2025":
         from jounce.papers import negrean_2025 as home
     else:

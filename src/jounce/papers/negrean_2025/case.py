@@ -11,6 +11,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
+from jounce.errors import TrajectoryError
 from jounce.rigid.inertia import Inertia
 from jounce.robot import JointAxis, Robot, from_screws
 from jounce.trajectory import PolynomialMotion
@@ -26,6 +27,7 @@ KNOTS = np.linspace(0.0, DURATION, SEGMENTS + 1)
 RIPPLE = ((0.08, 29.0, 0.7), (0.05, 41.0, 2.1))  # rad/s^2, rad/s, rad: what the accelerometer adds
 STOP = 0.9  # s, when braking begins
 BRAKING = 0.2  # s, how long it lasts
+TURNS, SETTLED = 500, 1e-13  # by which gravity is taken off readings
 RINGING = (6.0, 32.0, 8.0)  # rad/s^2, rad/s, 1/s: how the arm rings after it
 
 
@@ -43,6 +45,8 @@ class Link:
         About the centre of mass, kg m^2; y is along the axis.
     radius : float
         From the axis to the accelerometer, m.
+    sensor_angle : float, default 0
+        From x of the link to the accelerometer, in the sense in which the link turns, rad.
     """
 
     mass: float
@@ -52,6 +56,7 @@ class Link:
     inertia_y: float
     inertia_z: float
     radius: float
+    sensor_angle: float = 0.0
 
     def robot(self) -> Robot:
         """Return the robot of one joint: the link on its axis, y, horizontal."""
@@ -109,6 +114,32 @@ def law(accelerations: Samples, knots: Samples = KNOTS) -> PolynomialMotion:
     """Return the quintic segments through samples of the acceleration, from rest at zero, without jerk at the ends."""
     start = {0: 0.0, 1: 0.0}
     return PolynomialMotion.from_accelerations(knots, accelerations, CONTINUITY, start=start, ends="clamped")
+
+
+def without_gravity(readings: Samples, link: Link, knots: Samples) -> Samples:
+    """Return the angular accelerations of an arm, from tangential readings that contain gravity, rad/s^2.
+
+    An accelerometer reads ``r q'' - g cos(q + b)`` along the tangent, with its angle b on the link, which at angle zero
+    is level and turns down. The angle follows from the accelerations, so both are found in turns; as each angle
+    depends on earlier accelerations, this ends.
+
+    Raises
+    ------
+    TrajectoryError
+        If the accelerations do not settle.
+    """
+    weight = -float(link.robot().gravity[2])
+    accelerations = readings / link.radius
+    for _ in range(TURNS):
+        motion = law(accelerations, knots)
+        angle = np.append(motion.coefficients[0], end_of(motion)[0]) + link.sensor_angle
+        latest = (readings + weight * np.cos(angle)) / link.radius
+        change = np.max(np.abs(latest - accelerations))
+        accelerations = latest
+        if change <= SETTLED * np.max(np.abs(latest)):
+            return accelerations
+    message = "gravity cannot be taken off the readings: angles and accelerations do not settle; give a shorter motion"
+    raise TrajectoryError(message, name="samples", value=float(knots[-1] - knots[0]))
 
 
 def end_of(motion: PolynomialMotion) -> Float[np.ndarray, "2"]:

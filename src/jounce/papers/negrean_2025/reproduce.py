@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from jounce.errors import JounceError, flag
 from jounce.papers.negrean_2025.case import CASES
 from jounce.papers.negrean_2025.comparison import comparison
 from jounce.papers.negrean_2025.history import History, history
@@ -19,6 +20,7 @@ def reproduce(
     *,
     samples: str | os.PathLike[str] | None = None,
     masses: str | os.PathLike[str] | None = None,
+    remove_gravity: bool = False,
 ) -> list[Path]:
     """Compute the motions of section 4 of Negrean 2025 and write figures, `comparison.md`, energies and torques.
 
@@ -30,10 +32,14 @@ def reproduce(
         Called with the number of motions and figures done and their total.
     samples : path, optional
         One's own measurements in the place of the stand-ins: a CSV file with ``time``, s, and for each motion a column
-        of angular accelerations, rad/s^2.
+        of angular accelerations, rad/s^2, or of tangential ones with their unit, ``fast [m/s^2]``, and a radius among
+        the masses.
     masses : path, optional
         The link: a YAML, TOML or JSON file with mass, center_x, center_z and inertia_y, with units, and what else
         `Link` has.
+    remove_gravity : bool, default False
+        Take gravity off tangential samples: readings of an accelerometer on an arm whose axis is level, and which is
+        level at angle zero, contain it.
 
     Returns
     -------
@@ -53,8 +59,10 @@ def reproduce(
     >>> paths = reproduce("out")  # doctest: +SKIP
     """
     files = [None if path is None else Path(path) for path in (samples, masses)]
-    cases = CASES if files == [None, None] else given_cases(*files)
-    data = None if cases is CASES else summary(cases, *files)
+    remove_gravity = flag("remove_gravity", remove_gravity, error=JounceError)
+    own = files != [None, None] or remove_gravity
+    cases = given_cases(*files, remove_gravity=remove_gravity) if own else CASES
+    data = summary(cases, *files, remove_gravity=remove_gravity) if own else None
     directory = writable(Path(out_directory))
     from jounce.papers.negrean_2025 import figures  # imports matplotlib
 
