@@ -223,5 +223,6 @@ from jounce.trajectory import (
     continuity as continuity,
     motion_profile as motion_profile,
 )
+from jounce.written_equations import equations as equations
 
 __version__: str

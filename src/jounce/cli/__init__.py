@@ -42,6 +42,7 @@ from jounce.cli.starters import new
 from jounce.cli.sweeping import sweep
 from jounce.cli.tolerances import tolerance
 from jounce.cli.viewing import view
+from jounce.cli.written_equations import equations
 from jounce.errors import JounceError, SolveError
 from jounce.interrupts import end_on_signals, is_command
 from jounce.reporting.terminal import cautions, complain, unexpected
@@ -69,7 +70,7 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 COMMANDS = (
     new, inspect, run, trace, simulate, optimize, sweep, tolerance, modes, plot, report, view, servo, cam, check,
-    torques, retime, feedforward, export, convert, reproduce, schema, completion,
+    torques, retime, feedforward, export, convert, reproduce, equations, schema, completion,
 )  # fmt: skip
 LIGHT = (new, completion)  # they compute nothing
 GARBAGE = 50_000  # new objects before the collector looks: imports and traces leave none, and 700 take 0.2 s of a run

@@ -27,7 +27,7 @@ from jounce.jet import Jet
 from jounce.jet.derivatives import plain_derivatives
 from jounce.kinematics import Motion, Status
 from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
-from jounce.mechanism import Mechanism
+from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.element_indices import ElementIndex, element_indices
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.system import System
@@ -128,7 +128,7 @@ def constraint_equations(
         order = known = motion.order
     else:
         raise MechanismError("must be a jn.Motion, or a jn.Mechanism with a state", name="motion", value=motion)
-    labels = _labels(motion)
+    labels = {"time": motion.time} | equation_labels(motion.mechanism, motion.model)
     numbers = _numbers(motion, order)
     if isinstance(motion, MotionAtState):
         _check_finite(numbers, labels["row"], float(motion.time[0]))
@@ -159,40 +159,44 @@ def constraint_equations(
     return dataset.assign_coords(column_unit=("column", units))
 
 
-def _labels(motion: Motion) -> dict[str, Any]:
-    """Return the labels of all axes, rows in the order of the mechanism."""
-    mechanism = motion.mechanism
+def equation_labels(mechanism: Mechanism, model: Model) -> dict[str, np.ndarray]:
+    """Return the labels of all axes but the time, rows in the order of the mechanism."""
     columns = [f"{body}.{name}" for body in mechanism.bodies for name in COLUMNS[mechanism.space]]
-    rows = [f"{name}.{k + 1}" for name, index in _in_order(motion) for k in range(len(index.own_rows))]
+    rows = [f"{name}.{k + 1}" for name, index in _in_order(mechanism, model) for k in range(len(index.own_rows))]
     labels = {
         "row": rows,
         "column": columns,
         "other_column": columns,
         "body": list(mechanism.bodies),
-        "component": list("xyz"[: motion.model.pose_type.shifts]),
+        "component": list("xyz"[: model.pose_type.shifts]),
         "euler_parameter": ["e0", "e1", "e2", "e3"],
     }
-    return {"time": motion.time} | {axis: np.array(names, dtype=str) for axis, names in labels.items()}
+    return {axis: np.array(names, dtype=str) for axis, names in labels.items()}
 
 
-def _in_order(motion: Motion) -> list[tuple[str, ElementIndex]]:
+def _in_order(mechanism: Mechanism, model: Model) -> list[tuple[str, ElementIndex]]:
     """Return joints and drivers in the order of the mechanism, by name."""
-    indices = element_indices(motion.model)
-    return [(name, indices[name]) for name in (*motion.mechanism.joints, *motion.mechanism.drivers)]
+    indices = element_indices(model)
+    return [(name, indices[name]) for name in (*mechanism.joints, *mechanism.drivers)]
 
 
-def _row_order(motion: Motion) -> np.ndarray:
+def row_order(mechanism: Mechanism, model: Model) -> np.ndarray:
     """Return which row of the system each row is, in the order of the mechanism."""
-    return np.array([row for _, index in _in_order(motion) for row in index.own_rows], int)
+    return np.array([row for _, index in _in_order(mechanism, model) for row in index.own_rows], int)
+
+
+def in_si_units(model: Model) -> System:
+    """Return the constraints of a model alone, neither rows nor columns scaled."""
+    system = model.system
+    count = model.pose_type.shifts + model.pose_type.turns
+    ones = np.ones((system.shape[0], 1)), np.ones(count)
+    return dataclasses.replace(system, outputs=(), forces=(), row_scale=ones[0], column_scale=ones[1])
 
 
 def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
     """Return residual, Jacobian and right sides at all instants, the time first."""
     pose_type, coordinates = motion.poses
-    count = pose_type.shifts + pose_type.turns
-    system = motion.model.system
-    ones = np.ones((system.shape[0], 1)), np.ones(count)
-    plain = dataclasses.replace(system, outputs=(), forces=(), row_scale=ones[0], column_scale=ones[1])
+    plain = in_si_units(motion.model)
 
     def chunk(lanes: np.ndarray) -> Any:
         bodies = {name: values[..., lanes] for name, values in coordinates.items()}
@@ -204,7 +208,7 @@ def _numbers(motion: Motion, order: int) -> dict[str, np.ndarray]:
         return residual, jacobian, rights
 
     residual, jacobian, right_side = in_chunks(chunk, len(motion.time))
-    chosen = _row_order(motion)
+    chosen = row_order(motion.mechanism, motion.model)
     return {
         "residual": residual[chosen].T,
         "jacobian": np.moveaxis(jacobian[chosen], -1, 0),
@@ -227,8 +231,7 @@ def _without_unknowns(coordinates: Coordinates, order: int) -> Coordinates:
     return elements
 
 
-@compiled("pose_type")
-def _position_equations(
+def position_equations(
     system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]
 ) -> tuple[Rows, Jacobian]:
     """Return the residual and the Jacobian."""
@@ -236,11 +239,13 @@ def _position_equations(
     return system.residual(pose, time).coefficients[0], system.jacobian(pose, time)
 
 
-@compiled("pose_type")
-def _right_sides(
+_position_equations = compiled("pose_type")(position_equations)
+
+
+def right_sides(
     system: System, bodies: Coordinates, instants: Lanes, pose_type: type[Pose]
 ) -> Float[Numbers, "derivative row instant"]:
-    """Return the right sides from the states of `_without_unknowns`.
+    """Return the right sides, from states of which the coefficient that each belongs to is zero.
 
     The coefficient of order k of the residual is affine in that of the coordinates, with the Jacobian as its slope:
     what it is where that is zero is minus the right side, up to k!.
@@ -250,6 +255,9 @@ def _right_sides(
     parts = [c.reshape(len(c), order, c.shape[-1] // order)[:, k] for k, c in enumerate(residual.coefficients[1:])]
     factorials = np.array([math.factorial(k + 1) for k in range(order)], float)
     return -factorials[:, None, None] * jnp.stack(parts)
+
+
+_right_sides = compiled("pose_type")(right_sides)
 
 
 def _velocities(motion: Motion, order: int) -> Float[np.ndarray, "time derivative column"]:
@@ -293,7 +301,7 @@ def _forces(motion: Motion, jacobian: Float[np.ndarray, "time row column"]) -> d
     solved = MotionForces.of(motion)
     if solved.flanks:  # which the equations do not have: what the teeth press apart moves nothing
         solved = MotionForces(motion, flanks=False)
-    values = derivatives_along(motion, solved.unique_multipliers[:levels][:, _row_order(motion)])
+    values = derivatives_along(motion, solved.unique_multipliers[:levels][:, row_order(motion.mechanism, motion.model)])
     return forces | {"multipliers": (("time", "derivative", "row"), values, 0)}
 
 

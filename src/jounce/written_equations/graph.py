@@ -1,0 +1,252 @@
+"""A graph of operations on numbers: each one once, whatever is zero or known for certain left out."""
+
+import math
+import operator
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+REAL, WHOLE, TRUTH = "real", "whole", "truth"
+
+
+class Node(NamedTuple):
+    """One operation.
+
+    Parameters
+    ----------
+    operation : str
+        Its name: ``constant``, ``input``, ``lookup`` or one of `FUNCTIONS`.
+    operands : tuple of int
+        Numbers of the nodes that it reads.
+    detail : object
+        The value of a constant, the name of an input, the table of a lookup.
+    kind : str
+        ``real``, ``whole`` or ``truth``.
+    """
+
+    operation: str
+    operands: tuple[int, ...]
+    detail: Any
+    kind: str
+
+
+FUNCTIONS: dict[str, tuple[Callable[..., Any], str]] = {
+    "add": (operator.add, ""),
+    "sub": (operator.sub, ""),
+    "mul": (operator.mul, ""),
+    "div": (np.divide, REAL),
+    "neg": (operator.neg, ""),
+    "max": (np.maximum, ""),
+    "min": (np.minimum, ""),
+    "rem": (np.fmod, ""),
+    "abs": (np.abs, ""),
+    "sign": (np.sign, ""),
+    "pow": (np.power, REAL),
+    "atan2": (np.arctan2, REAL),
+    "lt": (operator.lt, TRUTH),
+    "le": (operator.le, TRUTH),
+    "gt": (operator.gt, TRUTH),
+    "ge": (operator.ge, TRUTH),
+    "eq": (operator.eq, TRUTH),
+    "ne": (operator.ne, TRUTH),
+    "and": (lambda a, b: bool(a) and bool(b), TRUTH),
+    "or": (lambda a, b: bool(a) or bool(b), TRUTH),
+    "not": (lambda a: not a, TRUTH),
+    "is_finite": (np.isfinite, TRUTH),
+    "where": (lambda c, a, b: a if c else b, ""),
+    "real": (float, REAL),
+    "whole": (int, WHOLE),
+} | {
+    name: (function, REAL)
+    for name, function in {
+        "sqrt": np.sqrt, "cbrt": np.cbrt, "exp": np.exp, "expm1": np.expm1, "log": np.log, "log1p": np.log1p,
+        "sin": np.sin, "cos": np.cos, "tan": np.tan, "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan,
+        "sinh": np.sinh, "cosh": np.cosh, "tanh": np.tanh, "asinh": np.arcsinh, "acosh": np.arccosh,
+        "atanh": np.arctanh, "erf": np.vectorize(math.erf), "erfc": np.vectorize(math.erfc), "floor": np.floor,
+        "ceil": np.ceil, "round": np.rint,
+    }.items()
+}  # fmt: skip
+"""Operations: what they do to numbers, and the kind of the result, that of the last operand where it is empty."""
+
+SYMMETRIC = frozenset({"add", "mul", "max", "min", "eq", "ne", "and", "or"})
+
+
+class Graph:
+    """Operations on numbers, each of which is there once.
+
+    Attributes
+    ----------
+    nodes : list of Node
+        Each reads those before it only.
+    ranges : dict of int to tuple of int
+        Between which whole numbers a node lies.
+    """
+
+    def __init__(self) -> None:
+        self.nodes: list[Node] = []
+        self.ranges: dict[int, tuple[int, int]] = {}
+        self._known: dict[Any, int] = {}
+        self._node(Node("nothing", (), None, REAL))  # so that the number of every other node counts as true
+
+    def constant(self, value: Any) -> int:
+        """Return the node of a number, a whole number or a truth value."""
+        if isinstance(value, bool | np.bool_):
+            return self._node(Node("constant", (), bool(value), TRUTH))
+        if isinstance(value, int | np.integer):
+            number = self._node(Node("constant", (), int(value), WHOLE))
+            self.ranges[number] = (int(value), int(value))
+            return number
+        value = float(value)
+        key = "constant", value.hex() if value else "0"  # zero has no sign here
+        return self._node(Node("constant", (), value or 0.0, REAL), key)
+
+    def input(self, name: str) -> int:
+        """Return the node of an input."""
+        return self._node(Node("input", (), name, REAL))
+
+    def lookup(self, table: Sequence[Any], index: int) -> int:
+        """Return the node of an entry of a table, by the node of its index."""
+        low, high = self.ranges[index]
+        found = set(table[low : high + 1])
+        if len(found) == 1:
+            return self.constant(next(iter(found)))
+        kind = TRUTH if isinstance(table[0], bool) else WHOLE if isinstance(table[0], int) else REAL
+        number = self._node(Node("lookup", (index,), tuple(table), kind))
+        if kind == WHOLE:
+            self.ranges[number] = (min(found), max(found))
+        return number
+
+    def is_constant(self, *numbers: int) -> bool:
+        """Tell whether nodes are all known numbers."""
+        return all(self.nodes[number].operation == "constant" for number in numbers)
+
+    def value(self, number: int) -> Any:
+        """Return the number that a constant is."""
+        return self.nodes[number].detail
+
+    def apply(self, name: str, *operands: int) -> int:
+        """Return the node of an operation, simplified."""
+        if (simpler := self._simplified(name, operands)) is not None:
+            return simpler
+        function, kind = FUNCTIONS[name]
+        kind = kind or self.nodes[operands[-1]].kind
+        if self.is_constant(*operands):
+            with np.errstate(all="ignore"):
+                found = function(*map(self.value, operands))
+            return self.constant({REAL: float, WHOLE: int, TRUTH: bool}[kind](found))
+        if name in SYMMETRIC:
+            operands = tuple(sorted(operands))
+        number = self._node(Node(name, tuple(operands), None, kind))
+        if kind == WHOLE and number not in self.ranges:
+            self.ranges[number] = self._range(name, operands)
+        return number
+
+    def total(self, numbers: Iterable[int]) -> int:
+        """Return the node of the sum of some nodes, which may be none."""
+        whole = list(numbers)
+        if not whole:
+            return self.constant(0.0)
+        found = whole[0]
+        for number in whole[1:]:
+            found = self.apply("add", found, number)
+        return found
+
+    def reached(self, roots: Iterable[int]) -> list[int]:
+        """Return all nodes that some need, themselves among them, each after those that it reads."""
+        seen: set[int] = set()
+        waiting = list(roots)
+        while waiting:
+            number = waiting.pop()
+            if number not in seen:
+                seen.add(number)
+                waiting += self.nodes[number].operands
+        return sorted(seen)
+
+    def _node(self, node: Node, key: Any = None) -> int:
+        key = node if key is None else key
+        if key not in self._known:
+            self._known[key] = len(self.nodes)
+            self.nodes.append(node)
+        return self._known[key]
+
+    def _is(self, number: int, value: int) -> bool:
+        node = self.nodes[number]
+        return node.operation == "constant" and node.kind != TRUTH and node.detail == value
+
+    def _simplified(self, name: str, operands: tuple[int, ...]) -> int | None:
+        """Return what an operation is where that takes none: exact, as rounding goes."""
+        a, b = operands[0], operands[-1]
+        if name in ("add", "sub"):
+            return self._sum(name, a, b)
+        if name == "mul":
+            return self._product(a, b)
+        if name == "where":
+            return self._selected(*operands)
+        if name in ("and", "or"):
+            return a if a == b else self._joined(name, a, b) or self._joined(name, b, a)
+        if name in ("real", "whole"):
+            return a if self.nodes[a].kind == {"real": REAL, "whole": WHOLE}[name] else None
+        if name == "neg":
+            return self.nodes[a].operands[0] if self.nodes[a].operation == "neg" else None
+        same = (
+            (name == "div" and (self._is(b, 1) or (self._is(a, 0) and not self._is(b, 0))))
+            or (name == "pow" and self._is(b, 1))
+            or (name in ("max", "min") and a == b)
+        )
+        return a if same else None
+
+    def _sum(self, name: str, a: int, b: int) -> int | None:
+        if name == "add":
+            return b if self._is(a, 0) else a if self._is(b, 0) else self._difference(b, a) or self._difference(a, b)
+        if self._is(b, 0):
+            return a
+        if a == b:
+            return self.constant(0.0 if self.nodes[a].kind == REAL else 0)
+        if self._is(a, 0):
+            return self.apply("neg", b)
+        return self.apply("add", a, self.nodes[b].operands[0]) if self.nodes[b].operation == "neg" else None
+
+    def _difference(self, negative: int, other: int) -> int | None:
+        if self.nodes[negative].operation != "neg" or self.is_constant(negative):
+            return None
+        return self.apply("sub", other, self.nodes[negative].operands[0])
+
+    def _product(self, a: int, b: int) -> int | None:
+        for x, y in ((a, b), (b, a)):
+            if self._is(x, 0):
+                return x
+            if self._is(x, 1):
+                return y
+            if self._is(x, -1):
+                return self.apply("neg", y)
+            if self.nodes[x].operation == "neg":
+                return self.apply("neg", self.apply("mul", self.nodes[x].operands[0], y))
+        return None
+
+    def _selected(self, condition: int, yes: int, no: int) -> int | None:
+        if yes == no:
+            return yes
+        return (yes if self.value(condition) else no) if self.is_constant(condition) else None
+
+    def _joined(self, name: str, known: int, other: int) -> int | None:
+        if not self.is_constant(known):
+            return None
+        return other if self.value(known) == (name == "and") else known
+
+    def _range(self, name: str, operands: Sequence[int]) -> tuple[int, int]:
+        """Return between which whole numbers the result of an operation on whole numbers lies."""
+        ranges = [self.ranges.get(number, (0, 0)) for number in operands]
+        if name == "where":
+            return min(r[0] for r in ranges[1:]), max(r[1] for r in ranges[1:])
+        if name == "neg":
+            return -ranges[0][1], -ranges[0][0]
+        if name in ("max", "min"):
+            choose = max if name == "max" else min
+            return choose(r[0] for r in ranges), choose(r[1] for r in ranges)
+        if name in ("add", "sub", "mul"):
+            ends = [FUNCTIONS[name][0](x, y) for x in ranges[0] for y in ranges[1]]
+            return min(ends), max(ends)
+        if name == "whole" and self.nodes[operands[0]].kind == TRUTH:
+            return 0, 1
+        raise KeyError(name)  # nothing is known of it

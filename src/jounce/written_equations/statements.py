@@ -1,0 +1,158 @@
+"""A graph as a sequence of statements: each operation that is used twice has a name, all others stand within others."""
+
+import keyword
+import re
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
+
+from jounce.written_equations.graph import Graph, Node
+
+LONGEST = 90  # characters of a statement, up to which operations stand within others
+RESERVED = frozenset(keyword.kwlist) | frozenset(
+    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
+    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while t q np "
+    "velocities orders residual jacobian right_side out shape y0 y1 yn j0 j1 jn gamma".split()
+)
+
+
+class Names:
+    """Names for inputs in a language: as near to the labels as its rules allow, no two of them alike."""
+
+    def __init__(self, taken: Iterable[str] = ()):
+        self._taken = set(RESERVED) | set(taken)
+        self._known: dict[str, str] = {}
+
+    def of(self, label: str) -> str:
+        """Return the name that stands for a label."""
+        if label not in self._known:
+            plain = re.sub(r"[^0-9a-zA-Z]+", "_", label.encode("ascii", "replace").decode()).strip("_") or "x"
+            plain = f"b_{plain}" if plain[0].isdigit() or re.fullmatch(r"[sk]\d+|table\d+", plain) else plain
+            name, count = plain, 1
+            while name in self._taken:
+                count += 1
+                name = f"{plain}_{count}"
+            self._taken.add(name)
+            self._known[label] = name
+        return self._known[label]
+
+
+class Text(NamedTuple):
+    """A text of an operation, and how tightly it holds together: `ATOM` most."""
+
+    text: str
+    tightness: int = 3
+
+
+COMPARISON, SUM, PRODUCT, ATOM = range(4)
+INFIX = {
+    "add": ("+", SUM), "sub": ("-", SUM), "mul": ("*", PRODUCT), "div": ("/", PRODUCT), "lt": ("<", COMPARISON),
+    "le": ("<=", COMPARISON), "gt": (">", COMPARISON), "ge": (">=", COMPARISON), "eq": ("==", COMPARISON),
+    "ne": ("!=", COMPARISON),
+}  # fmt: skip
+"""Operations between two others that Python and C write alike, and how tightly they hold."""
+
+
+def infix(left: Text, sign: str, tightness: int, right: Text) -> Text:
+    """Return the text of an operation between two others, with the brackets that it needs."""
+    first = left.text if left.tightness >= max(tightness, SUM) else f"({left.text})"
+    second = right.text if right.tightness > max(tightness, COMPARISON) else f"({right.text})"
+    return Text(f"{first} {sign} {second}", tightness)
+
+
+class Statements:
+    """Writes the operations that some results need.
+
+    Parameters
+    ----------
+    graph : Graph
+        The operations.
+    expression : callable
+        Of a node and the texts of its operands: its text.
+    inputs : callable
+        Of the label of an input: its name.
+    assignment : callable
+        Of a name, a text and a kind of numbers: a line.
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        expression: Callable[[Node, Sequence[Text]], Text],
+        inputs: Callable[[str], str],
+        assignment: Callable[[str, str, str], str],
+    ):
+        self._graph, self._expression, self._inputs, self._assignment = graph, expression, inputs, assignment
+        self._texts: dict[int, Text] = {}
+        self._named: set[int] = set()  # what is an input, a number, or has a name
+        self._count = 0
+        self._lines: list[str] = []
+
+    def shared(self, roots: Sequence[int]) -> dict[int, int]:
+        """Return how often each operation that results need is read."""
+        counts: dict[int, int] = {}
+        for number in self._graph.reached(roots):
+            for operand in self._graph.nodes[number].operands:
+                counts[operand] = counts.get(operand, 0) + 1
+        for number in roots:
+            counts[number] = counts.get(number, 0) + 1
+        return counts
+
+    def write(self, roots: Sequence[int], counts: dict[int, int]) -> list[str]:
+        """Return the lines that have to stand before some results are written, beside those written already."""
+        self._lines = []
+        for number in self._graph.reached(roots):
+            if number in self._texts:
+                continue
+            node = self._graph.nodes[number]
+            if node.operation == "input":
+                self._texts[number] = Text(self._inputs(node.detail))
+                self._named.add(number)
+                continue
+            self._texts[number] = self._written(node)
+            if node.operation == "constant":
+                self._named.add(number)
+            elif counts.get(number, 0) > 1:
+                self._name(number)
+        return self._lines
+
+    def text(self, number: int) -> str:
+        """Return how a result is read, once it was written."""
+        return self._texts[number].text
+
+    def _written(self, node: Node) -> Text:
+        """Return the text of an operation; operands get names until it is short enough."""
+        while True:
+            text = self._expression(node, [self._texts[x] for x in node.operands])
+            inner = [x for x in node.operands if x not in self._named]
+            if len(text.text) <= LONGEST or not inner:
+                return text
+            self._name(max(inner, key=lambda x: len(self._texts[x].text)))
+
+    def _name(self, number: int) -> None:
+        self._count += 1
+        name = f"s{self._count}"
+        self._lines.append(self._assignment(name, self._texts[number].text, self._graph.nodes[number].kind))
+        self._texts[number] = Text(name)
+        self._named.add(number)
+
+
+def used_inputs(graph: Graph, roots: Iterable[int]) -> set[Any]:
+    """Return the names of the inputs that results need."""
+    return {graph.nodes[n].detail for n in graph.reached(roots) if graph.nodes[n].operation == "input"}
+
+
+def wrapped(texts: Sequence[str], width: int = 110, indent: str = "    ") -> list[str]:
+    """Return texts with commas between them, in lines of at most a width."""
+    lines, line = [], indent
+    for text in texts:
+        if len(line) + len(text) + 2 > width and line.strip():
+            lines.append(line.rstrip())
+            line = indent
+        line += f"{text}, "
+    return [*lines, line.rstrip()] if line.strip() else lines
+
+
+def one_line(text: str) -> str:
+    """Return a title or a label for a comment: of ASCII, in one line, which ends no comment."""
+    plain = " ".join((text or "A mechanism").encode("ascii", "replace").decode().split())
+    return plain.replace("*/", "* /").replace("/*", "/ *").rstrip(".")

@@ -1,0 +1,51 @@
+"""The command ``equations``: what it writes, prints and refuses."""
+
+import functools
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from tests.problems.mechanisms import example
+from tests.problems.written import run as defined
+
+FOUR_BAR = example("four_bar")
+
+
+@pytest.fixture
+def run(run):
+    return functools.partial(run, "equations")
+
+
+def test_code_is_written_with_the_values_of_options(run, tmp_path):
+    out = tmp_path / "2-bars.py"
+    assert run(FOUR_BAR, "--out", out, "--set", "BC=11 cm", "--joint", "BC", "--order", "2")[0] == 0
+    code = defined(out.read_text())
+    assert (code["ORDER"], code["ROWS"]) == (2, ("BC.1",))
+    q = np.zeros(6)  # the rod from 4 cm to 20.31 cm on one line
+    np.testing.assert_allclose(code["residual"](0.0, q), [(0.2031 - 0.04) ** 2 - 0.11**2], rtol=1e-14)
+    assert run(FOUR_BAR, "--format", "c", "--out", tmp_path / "2-bars.c")[0] == 0
+    assert "void mechanism_residual(" in (tmp_path / "2-bars.c").read_text()
+
+
+def test_code_is_printed(run):
+    status, output, _ = run(FOUR_BAR)
+    assert status == 0
+    assert output == jn.equations(jn.load(FOUR_BAR))
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (("--joint", "XY"), "four_bar.yaml: joint: no joint or driver has this name, got 'XY'"),
+        (("--order", "40"), "--order: must be a whole number from 1 to 12, got 40"),
+        (("--out", "x.txt"), "x.txt: the kind of code is given by its extension; valid: .py"),
+        (("--format", "c", "--out", "x.py"), "x.py: the kind of code is given by its extension; valid: .c"),
+    ],
+)
+def test_bad_input(run, tmp_path, monkeypatch, options, words):
+    monkeypatch.chdir(tmp_path)
+    status, _, message = run(FOUR_BAR, *options)
+    assert status == 2
+    assert words in " ".join(message.split())
+    assert not list(tmp_path.iterdir())

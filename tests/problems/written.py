@@ -1,0 +1,67 @@
+"""Code that was written, run and compared with the equations as numbers."""
+
+import numpy as np
+
+import jounce as jn
+from jounce.dynamics.forward.mechanism_state import at_state
+
+
+def random_states(mechanism, order, random):
+    """Return a random state of all bodies, with so many derivatives, which fulfills no joint."""
+    components = 2 if mechanism.space == "planar" else 3
+    state = {}
+    for name in mechanism.bodies:
+        position = random.uniform(-1, 1, (order + 1, components))
+        if components == 2:
+            state[name] = {"position": position, "angle": random.uniform(-1, 1, order + 1)}
+            continue
+        quaternion = random.normal(size=4)
+        quaternion /= np.linalg.norm(quaternion)
+        spin = random.uniform(-1, 1, (order, 3))
+        state[name] = {"position": position, "orientation": {"quaternion": quaternion}, "angular_velocity": spin}
+        if not order:
+            del state[name]["angular_velocity"]
+    return state
+
+
+def between_free_bodies(element, space):
+    """Return a mechanism of an element between free bodies."""
+    size = 2 if space == "planar" else 3
+    bodies = {name: jn.Body([0.3 * k + 0.1, 0.2, 0.1][:size]) for k, name in enumerate(element.bodies)}
+    joints, drivers = ({}, {"it": element}) if element.role == "driver" else ({"it": element}, {})
+    return jn.Mechanism(space=space, bodies=bodies, joints=joints, drivers=drivers)
+
+
+def coordinates(equations):
+    """Return the coordinates q of code, (time, coordinate), from equations as numbers."""
+    attitude = equations.attitude.values if "attitude" in equations else equations.angle.values[..., None]
+    return np.concatenate([equations.position.values, attitude], axis=-1).reshape(len(equations.time), -1)
+
+
+def differences(module, equations):
+    """Return by how much code differs from numbers: residual, Jacobian, right sides, each over the size of its row."""
+    q, found = coordinates(equations), []
+    for k, t in enumerate(equations.time.values.tolist()):
+        pairs = (
+            (module["residual"](t, q[k]), equations.residual.values[k], ()),
+            (module["jacobian"](t, q[k]), equations.jacobian.values[k], (1,)),
+            (module["right_side"](t, q[k], equations.velocities.values[k]), equations.right_side.values[k], (0,)),
+        )
+        for got, expected, axis in pairs:
+            expected = np.nan_to_num(expected[: len(got)], nan=0.0)
+            size = np.max(np.abs(expected), axis=axis, keepdims=True, initial=1.0)
+            assert got.shape == expected.shape
+            found.append(np.max(np.abs(got - expected) / size, initial=0.0))
+    return np.array(found).reshape(-1, 3)
+
+
+def run(text):
+    """Return the names that a module of Python defines."""
+    names = {}
+    exec(compile(text, "<written>", "exec"), names)
+    return names
+
+
+def at(mechanism, state, time):
+    """Return a state as a motion of one instant, by which angles about axes are counted as the numbers have them."""
+    return at_state(mechanism, state, time)[0]
