@@ -37,7 +37,7 @@ def test_code_is_printed(run):
 @pytest.mark.parametrize(
     "options, words",
     [
-        (("--joint", "XY"), "four_bar.yaml: joint: no joint or driver has this name, got 'XY'"),
+        (("--joint", "XY"), "four_bar.yaml, joint: no joint or driver has this name, got 'XY'"),
         (("--order", "40"), "--order: must be a whole number from 1 to 12, got 40"),
         (("--out", "x.txt"), "x.txt: the kind of code is given by its extension; valid: .py"),
         (("--format", "c", "--out", "x.py"), "x.py: the kind of code is given by its extension; valid: .c"),

@@ -15,9 +15,9 @@ from tests.problems.mechanisms import example
 from tests.problems.own_types import taken_back
 from tests.problems.written import at, between_free_bodies, coordinates, differences, random_states, run
 
-QUICK = ("planar-joint-parallel2", "spatial-joint-dot1")
+QUICK = "planar-joint-parallel2"
 CASES = [
-    pytest.param(case, id=str(case), marks=[] if str(case) in QUICK else pytest.mark.slow)
+    pytest.param(case, id=str(case), marks=[] if str(case) == QUICK else pytest.mark.slow)
     for case in cases()
     if str(case) != "spatial-joint-gear"  # whose axes are held by other joints, see `worm`
 ]
@@ -130,7 +130,7 @@ LAWS = {
 }
 
 
-@pytest.mark.parametrize("law", [*LAWS])
+@pytest.mark.parametrize("law", [x if x == "samples" else pytest.param(x, marks=pytest.mark.slow) for x in LAWS])
 @pytest.mark.filterwarnings("ignore::jounce.errors.SampleWarning")
 def test_laws_with_tables_and_choices(law, tmp_path):
     crank = jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])
@@ -149,11 +149,12 @@ def test_laws_with_tables_and_choices(law, tmp_path):
 
 
 EXAMPLES = (
-    "rsur rssr camshaft epicyclic gear_pair hooke_joint inverted_slider_crank_distance wolfrom_train screw_press rccc"
+    "four_bar rsur rssr camshaft epicyclic gear_pair hooke_joint inverted_slider_crank_distance wolfrom_train screw_press rccc"
 ).split()
 
 
-@pytest.mark.parametrize("name", ["four_bar", *(pytest.param(name, marks=pytest.mark.slow) for name in EXAMPLES)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXAMPLES)
 def test_mechanisms_along_their_motions(name, tmp_path):
     mechanism = jn.load(example(name))
     motion = jn.solve(mechanism, order=6)

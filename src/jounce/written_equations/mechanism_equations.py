@@ -177,7 +177,7 @@ class _Inputs:
             if k >= own:
                 return np.full(moving.shape, zero)
             factor = graph.constant(math.factorial(k))
-            return np.frompyfunc(lambda x: graph.apply("div", x, factor), 1, 1)(moving).astype(np.int64)
+            return np.asarray(np.frompyfunc(lambda x: graph.apply("div", x, factor), 1, 1)(moving), np.int64)
 
         place, elements = self.place(), {}
         lanes = range(1, order + 1)

@@ -131,7 +131,8 @@ class GraphReader(ProgramReader):
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
         """Return what an operation makes of values."""
         name, parameters = equation.primitive.name, equation.params
-        dtypes = [v.aval.dtype for v in equation.outvars]
+        made: list[Any] = [v.aval for v in equation.outvars]
+        dtypes = [aval.dtype for aval in made]
         if name in _UNCHANGED:
             return operands[: len(dtypes)]
         if name in _COMPOSED:
