@@ -149,7 +149,8 @@ def test_laws_with_tables_and_choices(law, tmp_path):
 
 
 EXAMPLES = (
-    "four_bar rsur rssr camshaft epicyclic gear_pair hooke_joint inverted_slider_crank_distance wolfrom_train screw_press rccc"
+    "four_bar rsur rssr camshaft epicyclic gear_pair hooke_joint inverted_slider_crank_distance wolfrom_train rccc"
+    " screw_press"
 ).split()
 
 
