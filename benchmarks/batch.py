@@ -32,7 +32,7 @@ def pendulum() -> jn.Mechanism:
             "B": jn.planar.Revolute(("upper", "lower"), [1, 0], [0, 0]),
         },
         initial=start,
-        outputs={"upper": jn.AngleOutput("upper"), "lower": jn.AngleOutput("lower")},
+        outputs={"upper": jn.outputs.AngleOutput("upper"), "lower": jn.outputs.AngleOutput("lower")},
     )
 
 

@@ -32,7 +32,7 @@ def chain(count: int) -> jn.Mechanism:
         bodies=bodies,
         joints=pins | rods,
         drivers={"turn": jn.drivers.CoordinateDriver(("ground", "b0"), "angle", motion="pi/2+0.35*sin(t)")},
-        outputs={"last": jn.AngleOutput(f"b{count}")},
+        outputs={"last": jn.outputs.AngleOutput(f"b{count}")},
     )
 
 

@@ -1,4 +1,4 @@
-"""Optimised designs: what each problem of the literature or of the shop comes down to, from a poor start.
+"""Optimized designs: what each problem of the literature or of the shop comes down to, from a poor start.
 
 ``python benchmarks/designs.py [--figure FILE] [NAME ...]`` prints objective, conditions and parameters before and
 after, of all of them unless some are named. The figure shows the swing, the dwell, the press and the path of 18 points.
@@ -44,7 +44,7 @@ def four_bar(parameters, guess, law="2*pi*t", crank_pivot=(0, 0), rocker_pivot=(
             "D": pin(("ground", "rocker"), list(rocker_pivot), [0, 0]),
         },
         drivers={"theta": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion=law)},
-        outputs={"psi": jn.AngleOutput("rocker"), "P": jn.PointOutput("coupler", ["px", "py"])},
+        outputs={"psi": jn.outputs.AngleOutput("rocker"), "P": jn.outputs.PointOutput("coupler", ["px", "py"])},
         time=instants,
     )
 
@@ -54,7 +54,7 @@ def swing():
     lengths = {"AD": 1.0, "AB": 0.3, "BC": 0.9, "CD": 0.6, "px": 0.4, "py": 0.2}
     mechanism = four_bar(lengths, [(0, 0, 0), (0.3, 0, 0.6), (1, 0, 2.2)])
     bounds = {"AB": (0.1, 0.6), "BC": (0.4, 1.6), "CD": (0.3, 1.6)}
-    return jn.optimise(mechanism, "peak(psi, 4)", bounds, ["span(psi) == 60 deg"], starts=1)
+    return jn.optimize(mechanism, "peak(psi, 4)", bounds, ["span(psi) == 60 deg"], starts=1)
 
 
 def hoekens():
@@ -63,7 +63,7 @@ def hoekens():
     mechanism = four_bar(lengths, [(0, 0, 0), (1, 0, 1.2), (2, 0, 1.4)])
     bounds = {"BC": (1.8, 3.5), "CD": (1.8, 3.5), "px": (3.5, 6.0), "py": (-1.0, 1.0)}
     conditions = ["span(P_x, 0, 0.25, 0.75) >= 4"]
-    return jn.optimise(mechanism, "span(P_y, 0, 0.25, 0.75)", bounds, conditions, starts=1)
+    return jn.optimize(mechanism, "span(P_y, 0, 0.25, 0.75)", bounds, conditions, starts=1)
 
 
 def evans():
@@ -73,7 +73,7 @@ def evans():
     guess = [(0, 0, 1.57), (0, 1, 0.1), (1.2, 0.1, 2.2)]
     mechanism = four_bar(lengths, guess, law, rocker_pivot=("dx", "dy"))
     bounds = {"BC": (0.4, 1.5), "CD": (0.4, 1.5), "px": (-2.0, 2.5), "py": (-0.6, 0.6), "dx": (0.5, 1.8)}
-    return jn.optimise(mechanism, "span(P_x)", bounds | {"dy": (-0.5, 0.5)}, ["span(P_y) >= 0.5"], starts=1)
+    return jn.optimize(mechanism, "span(P_x)", bounds | {"dy": (-0.5, 0.5)}, ["span(P_y) >= 0.5"], starts=1)
 
 
 def dwell():
@@ -83,7 +83,7 @@ def dwell():
     poor = mechanism.with_parameters(PF=3.3 * r, xG=2.3 * r, yG=2.9 * r)
     bounds = {"PF": (2.8 * r, 3.5 * r), "FG": (1.8 * r, 3 * r), "xG": (2 * r, 3 * r), "yG": (2 * r, 3.5 * r)}
     conditions = ["span(output_angle) >= 25 deg"]
-    return jn.optimise(poor, "span(output_angle, 0, 1/3, 1)", bounds | {"gamma": (1.1, 1.4)}, conditions, starts=1)
+    return jn.optimize(poor, "span(output_angle, 0, 1/3, 1)", bounds | {"gamma": (1.1, 1.4)}, conditions, starts=1)
 
 
 def press():
@@ -96,7 +96,7 @@ def press():
         f"minimum(ram_y) == {float(ram.min())!r}",  # without it, none is as gentle as a press that does not press
     ]
     bounds |= {"throw": ("95 mm", "105 mm")}
-    return jn.optimise(mechanism, "peak(torque, 1)", bounds, conditions, starts=1)
+    return jn.optimize(mechanism, "peak(torque, 1)", bounds, conditions, starts=1)
 
 
 def law():
@@ -109,7 +109,7 @@ def law():
     masses = {"mass": 2.0, "inertia": 0.02, "center_of_mass": [0.1, 0]}
     bodies = {name: dataclasses.replace(body, **masses) for name, body in bare.bodies.items()}
     mechanism = dataclasses.replace(bare, bodies=bodies)
-    return jn.optimise(mechanism, "peak(torque(theta), 1)", dict.fromkeys(free, (-60.0, 60.0)), starts=1)
+    return jn.optimize(mechanism, "peak(torque(theta), 1)", dict.fromkeys(free, (-60.0, 60.0)), starts=1)
 
 
 def five_points():
@@ -118,7 +118,7 @@ def five_points():
     mechanism = four_bar(lengths, [(0, 0, 0.5), (1.7, 1, 0.5), (4, 0, 1.7)], instants=np.linspace(0, 1, 61))
     bounds = dict.fromkeys(("AD", "AB", "BC", "CD"), (0.5, 50.0)) | dict.fromkeys(("px", "py"), (-50.0, 50.0))
     curves = {"target": (np.arange(2, 7) / 24, FIVE)}  # pi/6 to pi/2
-    return jn.optimise(mechanism, "path_error(P, target)", bounds, curves=curves, starts=3)
+    return jn.optimize(mechanism, "path_error(P, target)", bounds, curves=curves, starts=3)
 
 
 def eighteen_points():
@@ -131,7 +131,7 @@ def eighteen_points():
     bounds = dict.fromkeys(("AB", "BC", "CD"), (0.05, 5.0)) | {"theta0": (-6.3, 6.3)}
     bounds |= dict.fromkeys(("px", "py", "x0", "y0", "dx", "dy"), (-5.0, 5.0))
     curves = {"target": (np.arange(18) / 18, EIGHTEEN)}
-    return jn.optimise(mechanism, "path_error(P, target)", bounds, curves=curves, starts=6)
+    return jn.optimize(mechanism, "path_error(P, target)", bounds, curves=curves, starts=6)
 
 
 def drawn(found, path):

@@ -50,7 +50,7 @@ def cases(quick: bool) -> Cases:
     """Yield the motor torques of many states."""
     robot, samples = arm(), 2000 if quick else 10_000
     q, torque = motion(samples)
-    drive = jn.Drive(stiffness=STIFFNESS, rotor_inertia=ROTOR, gear_ratio=GEAR)
+    drive = jn.planning.Drive(stiffness=STIFFNESS, rotor_inertia=ROTOR, gear_ratio=GEAR)
     drives = dict.fromkeys(robot.joint_names, drive)
     known = len(torque)
     springs = GEAR**2 * ROTOR * torque[:, 2] / STIFFNESS
@@ -59,7 +59,9 @@ def cases(quick: bool) -> Cases:
     def error(found: Any) -> float:
         return float(np.abs(np.asarray(found)[:known] - rigid - springs).max() / np.abs(springs).max())
 
-    ours = Contestant("jounce", ready(lambda: jn.feedforward(robot, q, drives, losses=False).torque[:, 0]), error)
+    ours = Contestant(
+        "jounce", ready(lambda: jn.planning.feedforward(robot, q, drives, losses=False).torque[:, 0]), error
+    )
     peer = Contestant("Pinocchio from Python, differenced", lambda: differenced(q), error, "pinocchio")
     name = f"motor torques of a panda with elastic joints, {samples:,} samples"
     yield Case(name, [ours, peer], count=samples, unit="sample", reference=REFERENCE)

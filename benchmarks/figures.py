@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from jounce.io.files.writing import replacing
-from jounce.plot.style import GREY, LINE_COLOURS, RESOLUTION, blank_figure, style
+from jounce.plot.style import GRAY, LINE_COLORS, RESOLUTION, blank_figure, style
 
 Rows = Sequence[Mapping[str, Any]]
 Lines = dict[str, list[tuple[float, float]]]
@@ -35,8 +35,8 @@ def _plot(axes: Any, lines: Lines, scale: str, *, ticks: bool = True) -> None:
     """Draw lines against a logarithmic axis; ticks of the other are where the points are, or as the scale has them."""
     from matplotlib.ticker import LogFormatter, NullLocator
 
-    for (name, points), marker, colour in zip(lines.items(), MARKERS, LINE_COLOURS, strict=False):
-        axes.plot(*zip(*points, strict=True), marker=marker, color=colour, label=name)
+    for (name, points), marker, color in zip(lines.items(), MARKERS, LINE_COLORS, strict=False):
+        axes.plot(*zip(*points, strict=True), marker=marker, color=color, label=name)
     axes.set_xscale(scale)
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(LogFormatter())
@@ -134,8 +134,8 @@ def obreshkov(rows: Rows) -> Any:
             _plot(below, {name: _over(points, jerk) for name, points in lines.items()}, "log")
             below.lines[0].set_visible(False)  # ones
             above.set_title(f"Free {title} under gravity")
-            below.axhline(10, color=GREY, linewidth=0.8, linestyle="--")
-            below.text(jerk[0][0], 10, "ten, as claimed", color=GREY, va="bottom")
+            below.axhline(10, color=GRAY, linewidth=0.8, linestyle="--")
+            below.text(jerk[0][0], 10, "ten, as claimed", color=GRAY, va="bottom")
             below.set_xlabel("step  (ms)")
         panels[0, 0].set_ylabel("largest error of an angle in 1 s  (rad)")
         panels[1, 0].set_ylabel("times the error with jerk")

@@ -1,7 +1,7 @@
 """Four-bar, position to jounce, beside routes that know this one mechanism.
 
 CasADi's ``rootfinder`` (fast_newton) with four directional derivatives is its general route; an unrolled Newton
-iteration with a hand-derived recursion is specialised by hand. SymPy differentiates the closed form of the angle.
+iteration with a hand-derived recursion is specialized by hand. SymPy differentiates the closed form of the angle.
 """
 
 import math
@@ -60,7 +60,7 @@ def general_route() -> Any:
     return casadi.Function("general", [time], results)
 
 
-def specialised_route() -> Any:
+def specialized_route() -> Any:
     """Return the same by seven unrolled Newton steps and a total derivative written for two unknowns."""
     import casadi
 
@@ -82,7 +82,7 @@ def specialised_route() -> Any:
     position = casadi.SX(start())
     for _ in range(7):
         position = newton(position, t)
-    return casadi.Function("specialised", [t], [position[1], *derivatives(position, t)], {"cse": True})
+    return casadi.Function("specialized", [t], [position[1], *derivatives(position, t)], {"cse": True})
 
 
 def casadi_run(route: Callable[[], Any], time: np.ndarray) -> Callable[[], Any]:
@@ -126,7 +126,7 @@ def cases(quick: bool) -> Cases:
             [
                 Contestant("jounce", ready(lambda time=time: jn.solve(mechanism, time)), of_motion),
                 Contestant("CasADi rootfinder and jtimes, C code", by(general_route), of_columns, "casadi", aim=1.0),
-                Contestant("CasADi, specialised by hand, C code", by(specialised_route), of_columns, "casadi"),
+                Contestant("CasADi, specialized by hand, C code", by(specialized_route), of_columns, "casadi"),
                 Contestant("SymPy, closed form, NumPy", lambda time=time: sympy_run(time), of_columns, "sympy"),
             ],
             count=count,

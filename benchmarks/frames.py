@@ -86,7 +86,7 @@ def cases(quick: bool) -> Cases:
             "pinocchio",
         ),
         "kinetic energy": (
-            lambda: jn.kinetic_energy(robot, two).total[:, 0],
+            lambda: jn.energy.kinetic_energy(robot, two).total[:, 0],
             lambda: pinocchio_energy(q),
             "pinocchio",
         ),

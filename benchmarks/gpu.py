@@ -22,7 +22,7 @@ from jounce.kinematics.continuation.instant_program import advance_instant
 
 os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")  # several processes share the device
 ON_CPU, ON_GPU = {"JAX_PLATFORMS": "cpu"}, {"JAX_PLATFORMS": "cuda,cpu"}
-NEIGHBOURS = 2001  # solved instants that the program alone starts from
+NEIGHBORS = 2001  # solved instants that the program alone starts from
 FACTORIALS = np.array([1.0, 1.0, 2.0, 6.0, 24.0])  # derivatives from Taylor coefficients
 
 
@@ -33,18 +33,18 @@ def solve(name: str, instants: int) -> Callable[[], Any]:
 
 
 def program(name: str, lanes: int) -> Callable[[], Any]:
-    """Return the compiled program alone: instants with all their derivatives from solved neighbours; within a worker.
+    """Return the compiled program alone: instants with all their derivatives from solved neighbors; within a worker.
 
     It returns what it solves, or raises ArithmeticError where an instant is not solved.
     """
-    mechanism, time = jn.load(EXAMPLES / f"{name}.yaml"), np.linspace(0.0, 2.0, NEIGHBOURS)
+    mechanism, time = jn.load(EXAMPLES / f"{name}.yaml"), np.linspace(0.0, 2.0, NEIGHBORS)
     motion = jn.solve(mechanism, time)
     model, groups = motion.model, motion._groups
     turning = [jets for jets, group in zip(groups.values(), model.system.outputs, strict=True) if group.element.turning]
     instants = np.linspace(0.0, 2.0, lanes)
-    source = np.rint(instants * (NEIGHBOURS - 1) / 2.0).astype(int)
+    source = np.rint(instants * (NEIGHBORS - 1) / 2.0).astype(int)
     coordinates = {part: motion.poses[1][part] for part in model.pose_type.predictor}
-    known = jax.tree.map(lambda x: x[..., source], (coordinates, tuple(turning), np.zeros(NEIGHBOURS)))
+    known = jax.tree.map(lambda x: x[..., source], (coordinates, tuple(turning), np.zeros(NEIGHBORS)))
     given = jax.device_put((known, instants - time[source], instants))
     place, names = next((k, names) for k, names in enumerate(groups) if "psi" in names)
 

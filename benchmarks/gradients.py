@@ -31,7 +31,7 @@ def chain(count: int) -> jn.Mechanism:
         bodies=bodies,
         joints=joints,
         drivers={"theta": driver},
-        outputs={f"psi{k}": jn.AngleOutput(f"rocker{k}") for k in range(count)},
+        outputs={f"psi{k}": jn.outputs.AngleOutput(f"rocker{k}") for k in range(count)},
         parameters=parameters,
     )
 

@@ -66,7 +66,7 @@ def cases(quick: bool) -> Cases:
     name = f"coordinates of the UR5 for {samples:,} poses"
     together = Contestant("jounce", ready(ours), error)
     yield Case(name, [together, loop], count=samples, unit="pose", reference=REFERENCE, rounds=5)
-    path = jn.ToolPath(
+    path = jn.planning.ToolPath(
         ["0.45 + 0.1*cos(2*t)", "0.1 + 0.1*sin(2*t)", 0.3], ("ZYX", ["0.3*sin(t)", 2.9, 0.2]), start=0.0, stop=6.0
     )
     time = np.linspace(0.0, 6.0, samples)
@@ -76,6 +76,6 @@ def cases(quick: bool) -> Cases:
         there = jn.forward_kinematics(robot, found.q, LINK).position
         return float((np.abs(there - wanted).max(axis=(0, 2)) / np.abs(wanted).max(axis=(0, 2))).max())
 
-    along = Contestant("jounce", ready(lambda: jn.follow_tool_path(robot, LINK, path, time, order=4)), off)
+    along = Contestant("jounce", ready(lambda: jn.planning.follow_tool_path(robot, LINK, path, time, order=4)), off)
     name = f"a path of the UR5 followed, with four derivatives at {samples:,} instants"
     yield Case(name, [along], count=samples, unit="instant", reference="the path and its derivatives", rounds=5)

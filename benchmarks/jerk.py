@@ -90,7 +90,7 @@ def four_bar():
             "D": planar.Revolute(("ground", "rocker"), [0.6, 0], [0, 0]),
         },
         initial={"start": drivers.CoordinateDriver(("ground", "crank"), "angle", "1 + 2*t")},
-        outputs={name: jn.AngleOutput(name) for name in ("crank", "coupler", "rocker")},
+        outputs={name: jn.outputs.AngleOutput(name) for name in ("crank", "coupler", "rocker")},
     )
 
 
@@ -111,7 +111,7 @@ def slider_crank():
             "guide": planar.Prismatic(("ground", "slider"), [0, 0], [0, 0], [1, 0], [1, 0]),
         },
         initial={"start": drivers.CoordinateDriver(("ground", "crank"), "angle", "1 + 5*t")},
-        outputs={"crank": jn.AngleOutput("crank"), "rod": jn.AngleOutput("rod")},
+        outputs={"crank": jn.outputs.AngleOutput("crank"), "rod": jn.outputs.AngleOutput("rod")},
     )
 
 

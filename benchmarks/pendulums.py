@@ -35,7 +35,7 @@ def chain(count: int) -> jn.Mechanism:
             f"start{k}": jn.drivers.CoordinateDriver(("ground", name), "angle", motion=str(LIFT - np.pi / 2))
             for k, name in enumerate(names[1:])
         },
-        outputs={"last": jn.AngleOutput(names[-1])},
+        outputs={"last": jn.outputs.AngleOutput(names[-1])},
     )
 
 

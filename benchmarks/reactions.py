@@ -2,7 +2,7 @@
 
 The peer is what one writes without this package: positions in closed form, the Jacobian and gamma of this one mechanism
 by hand, NumPy's batched LAPACK, and rates from central differences of fourth order of the multipliers, which take four
-more solves of every instant. jounce reads a file and takes no difference. Both are vectorised over all instants.
+more solves of every instant. jounce reads a file and takes no difference. Both are vectorized over all instants.
 """
 
 import dataclasses
@@ -31,7 +31,7 @@ def law(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def solved_by_hand(t: np.ndarray) -> np.ndarray:
     """Return the multipliers of all nine constraints, the driver's last, shape (instants, 9).
 
-    Coordinates are x, y, angle of crank (about its pin), rod and slider; centres of mass lie in the origins.
+    Coordinates are x, y, angle of crank (about its pin), rod and slider; centers of mass lie in the origins.
     """
     theta, speed, acceleration = law(t)
     s, c = np.sin(theta), np.cos(theta)
@@ -71,7 +71,7 @@ def differenced(t: np.ndarray) -> np.ndarray:
 
 
 def mechanism() -> jn.Mechanism:
-    """Return the example with masses, its centres of mass in the origins of the bodies."""
+    """Return the example with masses, its centers of mass in the origins of the bodies."""
     bare = jn.load(EXAMPLES / "slider_crank.yaml")
     bodies = {
         name: dataclasses.replace(body, mass=mass, inertia=inertia)

@@ -7,7 +7,7 @@ Each path goes through five random waypoints within its joints' ranges. Three ta
   (its rate along the path through two moving averages, the best of several lengths, then slowed until nothing is
   exceeded), and whether `check_limits` finds every limit kept;
 - straight lines in joint space with limits of velocity, acceleration and jerk: durations against Ruckig in the one
-  coordinate along the line. (Its joints synchronised in phase leave the line where that is faster.)
+  coordinate along the line. (Its joints synchronized in phase leave the line where that is faster.)
 
 Run: ``python benchmarks/retiming.py [--count 50] [--seed 0]`` for the table of all paths; ``python -m benchmarks --only
 retiming`` times some of them. Needs the extras ``planning`` and ``bench``.
@@ -201,8 +201,8 @@ def smoothed(robot, limits, path, times, s) -> float:
         law = path.start + (path.stop - path.start) * (1e-3 + 0.998 * law)  # splines swing beyond its ends
         factor = 1.0
         for _ in range(12):
-            rate = jn.SplineMotion(even * factor, law, 5, beyond="hold")
-            laws = {name: jn.FollowingMotion(own, rate) for name, own in path.laws.items()}
+            rate = jn.laws.SplineMotion(even * factor, law, 5, beyond="hold")
+            laws = {name: jn.laws.FollowingMotion(own, rate) for name, own in path.laws.items()}
             smooth = jn.JointTrajectory(laws, 0.0, float(even[-1] * factor))
             over = jn.check_limits(robot, smooth, limits).worst.ratio
             if over <= 1:

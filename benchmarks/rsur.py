@@ -1,6 +1,6 @@
 """RSUR mechanism to jounce, positions included, beside the bare linear algebra that it needs.
 
-The base is one LU factorisation and four solves of 18 x 18 systems that are already there, by LAPACK through JAX, in
+The base is one LU factorization and four solves of 18 x 18 systems that are already there, by LAPACK through JAX, in
 blocks of 512 that stay in the cache.
 """
 

@@ -1,7 +1,7 @@
 """Draw the pictures of the gallery: python docs/make_gallery.py [NAME ...] writes docs/images/gallery/NAME.png.
 
 Every mechanism file of examples/ and every robot of examples/robots has one, but for those that look like another one
-there; the paths of points are coloured by the size of their jerk.
+there; the paths of points are colored by the size of their jerk.
 """
 
 import dataclasses
@@ -34,7 +34,7 @@ class Picture:
 
     paths: tuple[str, ...]  # outputs, or points
     instant: float = 0.0  # s
-    order: int = 3  # of the derivative in the colour of the paths
+    order: int = 3  # of the derivative in the color of the paths
     points: Mapping[str, tuple] = dataclasses.field(
         default_factory=dict
     )  # name: body and place, m, besides the outputs
@@ -49,7 +49,7 @@ class Picture:
 
 
 def pitch_curve(values):
-    """Return the curve on which the roller centre of examples/own_joint/cam.yaml stays."""
+    """Return the curve on which the roller center of examples/own_joint/cam.yaml stays."""
     angle = np.linspace(0.0, 2 * np.pi, 181)
     radius = values["base"] + values["rise"] * np.cos(values["lobes"] * angle)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
@@ -68,8 +68,12 @@ def flat_face_cam(values):
 def disc_cam(values):
     """Return the profile of the cam of examples/camshaft.yaml for a roller of 6 mm."""
     turns = [("modified_sine", values["rise"]), ("dwell", None), ("modified_sine", 0.0), ("dwell", None)]
-    law = jn.SegmentedMotion([jn.Segment(profile, np.pi / 2, to=to) for profile, to in turns], beyond="repeat")
-    cam = jn.plate_cam(law, jn.TranslatingFollower("roller", radius=0.006), base_radius=values["base"] - 0.006)
+    law = jn.laws.SegmentedMotion(
+        [jn.laws.Segment(profile, np.pi / 2, to=to) for profile, to in turns], beyond="repeat"
+    )
+    cam = jn.cams.plate_cam(
+        law, jn.cams.TranslatingFollower("roller", radius=0.006), base_radius=values["base"] - 0.006
+    )
     return np.stack([cam.dataset["x"].values, cam.dataset["y"].values], axis=-1)
 
 
@@ -185,7 +189,7 @@ def module(path):
 
 def motion(name, picture):
     """Return the motion of a mechanism or a robot, with the points wanted among its outputs."""
-    points = {key: jn.PointOutput(body, place) for key, (body, place) in picture.points.items()}
+    points = {key: jn.outputs.PointOutput(body, place) for key, (body, place) in picture.points.items()}
     source = EXAMPLES / (picture.source or f"{name}.yaml")
     if source.suffix != ".yaml":
         machine = jn.load_robot(source)
@@ -193,7 +197,7 @@ def motion(name, picture):
         free = set(machine.joint_names) - set(laws.names if picture.trajectory else machine.joint_names)
         machine = machine.locked(dict.fromkeys(free, 0.0))
         on_bodies = {key: jn.robot.body_point(machine, *there) for key, there in picture.points.items()}
-        points = {key: jn.PointOutput(body, place) for key, (body, place) in on_bodies.items()}
+        points = {key: jn.outputs.PointOutput(body, place) for key, (body, place) in on_bodies.items()}
         time = np.linspace(0.0, picture.stop, 201) if picture.stop else None
         machine = machine.mechanism(drivers=laws, outputs=points, time=time)
         return jn.solve(dataclasses.replace(machine, title=picture.title), order=picture.order)
@@ -237,7 +241,7 @@ def draw(name):
         add_outline(figure, moved, picture)
     drawn, packed = io.BytesIO(), io.BytesIO()
     figure.savefig(drawn, format="png", dpi=RESOLUTION)
-    few = Image.open(drawn).convert("RGB").quantize(96, dither=Image.Dither.NONE)  # line art needs few colours
+    few = Image.open(drawn).convert("RGB").quantize(96, dither=Image.Dither.NONE)  # line art needs few colors
     few.save(packed, format="png", optimize=True)
     if packed.tell() > LARGEST:
         raise SystemExit(f"{name}: {packed.tell()} bytes, more than {LARGEST}")

@@ -59,7 +59,7 @@ PICTURES = {
     "view_four_bar": (["examples/four_bar.yaml"], four_bar),
     "view_failure": (["examples/four_bar.yaml"], failure),
     "view_forces": (["examples/press.yaml"], forces),
-    "view_cam": ([jn.load_cam("examples/cams/intake.yaml")], cam),
+    "view_cam": ([jn.cams.load_cam("examples/cams/intake.yaml")], cam),
     "view_spatial": (["examples/rsur.yaml"], spatial),
     "view_robot": (["examples/robots/panda.urdf", "examples/trajectories/panda_wave.yaml"], robot),
 }

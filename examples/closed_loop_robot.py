@@ -25,6 +25,6 @@ for name in ("left_motor", "right_motor"):
     print(f"{name}: at most {torque[0]:.3f} N m and {torque[1]:.2f} N m/s")
 force = np.linalg.norm(jn.joint_reaction(motion, "tip").force.values[:, 0], axis=-1)
 print(f"the forearms press on each other at the tip with {force.min():.2f} to {force.max():.2f} N")
-balance = jn.power_balance(motion)
+balance = jn.energy.power_balance(motion)
 worst = abs(balance["residual"][:, 0]).max() / balance["scale"][:, 0].max()
 print(f"what the motors put in is what the arm gains, to {float(worst):.0e} of the largest power")

@@ -13,11 +13,11 @@ import jounce as jn
 from jounce import jet
 
 
-class AirDrag(jn.AbstractForce, type="air_drag"):
+class AirDrag(jn.forces.AbstractForce, type="air_drag"):
     """Drag ``-c |v| v`` at a point of a body that moves through air at rest, in the plane or in space."""
 
-    point: jn.Vector  # m, in the frame of the body
-    coefficient: jn.Scalar  # kg/m: half the density of air times area times drag coefficient
+    point: jn.joints.Vector  # m, in the frame of the body
+    coefficient: jn.joints.Scalar  # kg/m: half the density of air times area times drag coefficient
 
     body_count = 1
 
@@ -47,7 +47,7 @@ def main() -> None:
 
     mass, drag, speed = (mechanism.parameter_values[name] for name in ("mass", "drag", "speed"))
     exact = falling(simulation.time - simulation.time[0], 9.81, drag / mass, speed)
-    print("derivative   largest value        largest error against the closed form, normalised")
+    print("derivative   largest value        largest error against the closed form, normalized")
     for k, expected in enumerate(exact):
         largest = np.max(np.abs(expected))
         error = np.max(np.abs(height.sel(derivative=k).values - expected)) / largest

@@ -13,14 +13,14 @@ import jounce as jn
 from jounce import jet
 
 
-class HarmonicCam(jn.AbstractConstraint, type="harmonic_cam", space="planar"):
-    """The roller centre on body j stays on the curve r = base + lift cos(lobes angle) of the cam, body i."""
+class HarmonicCam(jn.joints.AbstractConstraint, type="harmonic_cam", space="planar"):
+    """The roller center on body j stays on the curve r = base + lift cos(lobes angle) of the cam, body i."""
 
-    point_i: jn.Vector  # m, centre of the cam, in the frame of body i
-    point_j: jn.Vector  # m, centre of the roller, in the frame of body j
-    base: jn.Scalar  # m
-    lift: jn.Scalar  # m
-    lobes: jn.Scalar = 1.0
+    point_i: jn.joints.Vector  # m, center of the cam, in the frame of body i
+    point_j: jn.joints.Vector  # m, center of the roller, in the frame of body j
+    base: jn.joints.Scalar  # m
+    lift: jn.joints.Scalar  # m
+    lobes: jn.joints.Scalar = 1.0
 
     dimensions = {"base": "length", "lift": "length"}  # units that a mechanism file may give
 
@@ -39,7 +39,7 @@ def main() -> None:
     # the cam turns at `speed` under a follower straight above it, so the lift is known in closed form
     base, rise, lobes, speed = (mechanism.parameter_values[name] for name in ("base", "rise", "lobes", "speed"))
     angle = lobes * (np.pi / 2 - speed * motion.time)
-    print("derivative   largest value        largest error against the closed form, normalised")
+    print("derivative   largest value        largest error against the closed form, normalized")
     for k in range(order + 1):
         exact = (base if k == 0 else 0.0) + rise * (lobes * speed) ** k * np.cos(angle - k * np.pi / 2)
         largest = np.max(np.abs(exact))

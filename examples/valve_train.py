@@ -13,19 +13,19 @@ import jounce as jn
 from jounce import jet
 
 
-class FlatFaceCam(jn.AbstractConstraint, type="flat_face_cam", space="planar"):
-    """The flat face of body j touches the cam of body i: it is as far from its centre as the support function says.
+class FlatFaceCam(jn.joints.AbstractConstraint, type="flat_face_cam", space="planar"):
+    """The flat face of body j touches the cam of body i: it is as far from its center as the support function says.
 
     The cam is the curve whose tangent across the direction at an angle a from the x axis of body i is
-    ``base + lift ((1 + cos a) / 2)^sharpness`` from its centre: a base circle and one nose, smooth to any order.
+    ``base + lift ((1 + cos a) / 2)^sharpness`` from its center: a base circle and one nose, smooth to any order.
     """
 
-    point_i: jn.Vector  # m, centre of the cam, in the frame of body i
-    point_j: jn.Vector  # m, a point of the face, in the frame of body j
-    normal: jn.Vector  # of the face, away from the cam, in the frame of body j
-    base: jn.Scalar  # m
-    lift: jn.Scalar  # m
-    sharpness: jn.Scalar
+    point_i: jn.joints.Vector  # m, center of the cam, in the frame of body i
+    point_j: jn.joints.Vector  # m, a point of the face, in the frame of body j
+    normal: jn.joints.Vector  # of the face, away from the cam, in the frame of body j
+    base: jn.joints.Scalar  # m
+    lift: jn.joints.Scalar  # m
+    sharpness: jn.joints.Scalar
 
     dimensions = {"base": "length", "lift": "length", "normal": "ratio", "sharpness": "ratio"}
 

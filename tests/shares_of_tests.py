@@ -15,7 +15,7 @@ import pytest
 
 SLOW_EXAMPLES = frozenset(
     """
-    jounce.design.optimise.optimise
+    jounce.design.optimize.optimize
     jounce.design.tolerance.tolerance
     jounce.dynamics.inverse.reactions.applied_force
     jounce.integrate.mechanisms.batch.simulate_batch

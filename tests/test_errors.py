@@ -83,11 +83,11 @@ def test_suggestions_come_before_the_list():
 
 def test_a_flag_is_true_or_false_and_nothing_that_only_counts_as_one():
     for value in (True, np.bool_(True)):
-        assert flag("drives", value, error=jn.RobotError) is True
-    assert flag("drives", np.bool_(False), error=jn.RobotError) is False
+        assert flag("drives", value, error=jn.errors.RobotError) is True
+    assert flag("drives", np.bool_(False), error=jn.errors.RobotError) is False
     for value in ("no", 2, 0, None, np.array([True]), np.float64(1.0)):
-        with pytest.raises(jn.RobotError, match=r"drives.*True or False"):
-            flag("drives", value, error=jn.RobotError)
+        with pytest.raises(jn.errors.RobotError, match=r"drives.*True or False"):
+            flag("drives", value, error=jn.errors.RobotError)
 
 
 def test_messages_are_bounded_whatever_a_file_says():

@@ -4,15 +4,16 @@ Importing this package has no side effect but a mark that a process gets when it
 The settings of JAX are left alone; everything is computed in double precision all the same, see `jounce.settings`.
 What the package offers stands in the stub beside this file, ``__init__.pyi``, and each name of it is imported when it
 is first used: importing the package alone takes no time, and a command that computes nothing, such as
-``jounce --help``, does not wait for JAX either.
+``jounce --help``, does not wait for JAX either. Names of release 0.4 work for one release, with a DeprecationWarning.
 """
 
+import functools
 import importlib
 import importlib.util
 import os
 import re
 import sys
-from functools import lru_cache
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from jounce import alterations as _alterations, errors as errors, importing as _
 from jounce.display import Displayed as _Displayed, show_by as _show_by
 from jounce.interrupts import end_on_signals as _end_on_signals, is_command as _is_command, mark_forks as _mark_forks
 from jounce.jax_options import OPTIONS as _OPTIONS
+from jounce.moved_names import new_name as _new_name
 from jounce.version import __version__ as __version__
 
 if _is_command():
@@ -34,6 +36,9 @@ def __getattr__(name: str) -> Any:
     if name == "__all__":
         return [*_offered(), "__version__"]
     room = None if name.startswith("_") else _offered().get(name)
+    if room is None and (moved := _new_name(name)) is not None:
+        warnings.warn(f"jounce.{name} is jounce.{moved} from release 0.5 on", DeprecationWarning, stacklevel=2)
+        return functools.reduce(getattr, moved.split("."), sys.modules[__name__])
     if room is None and (name.startswith("_") or importlib.util.find_spec(f"{__name__}.{name}") is None):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     with _importing.lock, _importing.uncollected():
@@ -41,8 +46,6 @@ def __getattr__(name: str) -> Any:
             value = importlib.import_module(f"{__name__}.{name}")
         else:
             value = getattr(importlib.import_module(room), name)
-        if name == "AbstractConstraint":  # a joint of the user's own must not take the type of one of robots
-            importlib.import_module(f"{__name__}.robot")
         if "jounce.settings" in sys.modules:
             from jounce.settings import cover_new_modules
 
@@ -55,7 +58,7 @@ def __dir__() -> list[str]:
     return sorted({*_offered(), *(name for name in globals() if name.startswith("__"))})
 
 
-@lru_cache(maxsize=1)
+@functools.lru_cache(maxsize=1)
 def _offered() -> dict[str, str]:
     """Return the names in the stub, each with the room that it is imported from."""
     stub = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")

@@ -20,13 +20,13 @@ Numbers = jax.Array | np.ndarray
 
 
 @runtime_checkable
-class Labelled(Protocol):
+class Labeled(Protocol):
     """What NumPy makes an array of: a column of a table, an array with labels, a quantity with a unit."""
 
     def __array__(self, *args: Any, **options: Any) -> np.ndarray: ...
 
 
-ArrayLike = Numbers | Sequence | np.floating | np.integer | float | int | Labelled
+ArrayLike = Numbers | Sequence | np.floating | np.integer | float | int | Labeled
 """What becomes an array of numbers: an array, lists or tuples of numbers in any nesting, a number."""
 
 Real = Numbers | np.floating | np.integer | float | int

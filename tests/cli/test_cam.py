@@ -25,13 +25,13 @@ def test_the_table_has_the_units_of_the_file_and_reads_back_as_samples(tmp_path,
         rows = list(csv.reader(stream))
     assert rows[0][:4] == ["angle [deg]", "lift [mm]", "x [mm]", "y [mm]"]
     assert len(rows) == 92
-    cam = jn.load_cam(INTAKE, count=91)
+    cam = jn.cams.load_cam(INTAKE, count=91)
     np.testing.assert_allclose(float(rows[46][0]), 180.0)
     np.testing.assert_allclose([float(x) for x in rows[46][1:4]], 1e3 * np.array([0.009, *cam.table.profile[:, 45]]))
     text = pathlib.Path(INTAKE).read_text()
     again = text[: text.index("law:")] + "law: {samples: cam.csv, time: angle, value: lift}\n"
     (tmp_path / "again.yaml").write_text(again)
-    sampled = jn.load_cam(tmp_path / "again.yaml")  # degrees and millimetres, as the heading says
+    sampled = jn.cams.load_cam(tmp_path / "again.yaml")  # degrees and millimeters, as the heading says
     assert sampled.table.lift.max() == pytest.approx(0.009, rel=1e-12)
     np.testing.assert_allclose(sampled.at(2.5).profile, cam.at(2.5).profile, atol=1e-6)
 
@@ -88,8 +88,8 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path, old, new, name, words):
     text = pathlib.Path(INTAKE).read_text()
     assert old in text
     (tmp_path / "cam.yaml").write_text(text.replace(old, new, 1))
-    with pytest.raises(jn.MechanismFileError, match=words) as caught:
-        jn.load_cam(tmp_path / "cam.yaml")
+    with pytest.raises(jn.errors.MechanismFileError, match=words) as caught:
+        jn.cams.load_cam(tmp_path / "cam.yaml")
     assert caught.value.line is not None
     assert caught.value.name == name
 

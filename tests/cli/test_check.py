@@ -196,7 +196,7 @@ def test_the_degree_of_the_splines_is_an_option(run, files):
     assert run(robot, trajectory, "--degree", "3", "--hand-over")[0] == 0
 
 
-def test_a_terminal_gets_a_coloured_table(run, monkeypatch, files):
+def test_a_terminal_gets_a_colored_table(run, monkeypatch, files):
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.setenv("COLUMNS", "100")

@@ -154,10 +154,10 @@ OWN_JOINT = '''
 import jounce as jn
 from jounce.constraints.base import MotionLaw
 
-class Pull(jn.AbstractConstraint, type="test_cli_pull", space="planar", role="driver"):
+class Pull(jn.joints.AbstractConstraint, type="test_cli_pull", space="planar", role="driver"):
     """A point of body j at a height over a point of body i."""
-    point_i: jn.Vector
-    point_j: jn.Vector
+    point_i: jn.joints.Vector
+    point_j: jn.joints.Vector
     motion: MotionLaw
 
     def residual(self, body_i, body_j, time):
@@ -311,7 +311,7 @@ def test_an_interrupt_ends_quietly_with_130(run, monkeypatch):
 
 def test_a_result_that_cannot_be_written_after_all_ends_with_1(run, monkeypatch, tmp_path):
     def full(*_, **_options):
-        raise jn.OutputError("cannot be written: No space left on device", path="motion.csv")
+        raise jn.errors.OutputError("cannot be written: No space left on device", path="motion.csv")
 
     monkeypatch.setattr("jounce.io.write", full)
     status, out, err = run("run", FOUR_BAR, "--order", "0", "--out", tmp_path / "motion.csv")

@@ -138,7 +138,7 @@ def test_initial_conditions_place_the_bodies(facts):
     _, data, _ = facts("inspect", EXAMPLES / "simple_pendulum.yaml")
     mechanism = jn.load(EXAMPLES / "simple_pendulum.yaml")
     law = next(iter(mechanism.initial.values())).motion
-    wanted = jn.Expression(getattr(law, "text", str(law))).evaluate(mechanism.parameter_values | {"t": 0.0})
+    wanted = jn.laws.Expression(getattr(law, "text", str(law))).evaluate(mechanism.parameter_values | {"t": 0.0})
     assert data["bodies"][0]["pose"]["angle"] == pytest.approx(float(wanted), abs=1e-12)
 
 

@@ -38,7 +38,7 @@ def test_inside_is_si_and_what_is_shown_says_its_units(four_bar, tmp_path):
         np.testing.assert_array_equal(again["C"], shown["C"])
         assert again["C"].attrs["units"] == "mm"
         assert again["psi"].attrs["units"] == "deg"
-    with pytest.raises(jn.UnitError, match="measures a length"):
+    with pytest.raises(jn.errors.UnitError, match="measures a length"):
         io.in_units(plain, {"psi": "mm"})
 
 
@@ -105,12 +105,12 @@ def test_a_file_in_degrees_is_never_taken_for_radians(four_bar, tmp_path):
         values = np.asarray(law(column)(jn.Jet([motion.time])).coefficients[0])
         np.testing.assert_allclose(values, motion.outputs["psi"][:, 0], rtol=1e-13)
     for column, words in (("C_x", "measures a length, not an angle"), ("psi_d1", "angle/time, not an angle")):
-        with pytest.raises(jn.MechanismFileError, match=words) as caught:
+        with pytest.raises(jn.errors.MechanismFileError, match=words) as caught:
             law(column)
         assert "motion.csv" in str(caught.value)
     text = (tmp_path / "motion.csv").read_text().replace("[deg]", "[degx]", 1)
     (tmp_path / "motion.csv").write_text(text)
-    with pytest.raises(jn.MechanismFileError, match="unknown unit"):
+    with pytest.raises(jn.errors.MechanismFileError, match="unknown unit"):
         law("psi")
 
 
@@ -123,10 +123,10 @@ def test_trajectories_of_robots_read_units(tmp_path):
     elbow, slide = (np.asarray(found.laws[name](jn.Jet([np.array([2.0])])).coefficients[0]) for name in found.names)
     np.testing.assert_allclose([elbow[0], slide[0]], [math.radians(60), 1.0], rtol=1e-12)
     path.write_text("time,elbow [deg/s]\n" + "".join(f"{t},30\n" for t in range(8)))
-    with pytest.raises(jn.TrajectoryError, match="angle/time, not an angle or a length"):
+    with pytest.raises(jn.errors.TrajectoryError, match="angle/time, not an angle or a length"):
         jn.load_trajectory(path, degree=3)
     path.write_text("time [mm],elbow\n" + "".join(f"{t},30\n" for t in range(8)))
-    with pytest.raises(jn.TrajectoryError, match="measures a length, not a time"):
+    with pytest.raises(jn.errors.TrajectoryError, match="measures a length, not a time"):
         jn.load_trajectory(path, degree=3)
 
 

@@ -368,27 +368,27 @@ class TestConstruction:
     """Wrong words and bodies are refused when the joint is written down."""
 
     def test_number_of_bodies(self):
-        with pytest.raises(jn.MechanismError, match="revolute joins 2 bodies"):
+        with pytest.raises(jn.errors.MechanismError, match="revolute joins 2 bodies"):
             planar.Revolute(("a", "b", "c"), [0, 0], [0, 0])
 
     def test_a_body_with_itself(self):
-        with pytest.raises(jn.MechanismError, match="not a body with itself"):
+        with pytest.raises(jn.errors.MechanismError, match="not a body with itself"):
             planar.Revolute(("a", "a"), [0, 0], [0, 0])
 
     def test_gear_needs_its_frame(self):
-        with pytest.raises(jn.MechanismError, match="the third body is the frame that carries both"):
+        with pytest.raises(jn.errors.MechanismError, match="the third body is the frame that carries both"):
             planar.Gear(("a", "b"), -0.5)
 
     def test_unknown_coordinate(self):
-        with pytest.raises(jn.MechanismError, match="angle, x, y"):
+        with pytest.raises(jn.errors.MechanismError, match="angle, x, y"):
             jn.drivers.CoordinateDriver(("a", "b"), "z", "t")
 
     def test_one_vector_of_two(self):
-        with pytest.raises(jn.MechanismError, match="two vectors"):
+        with pytest.raises(jn.errors.MechanismError, match="two vectors"):
             jn.drivers.RotationDriver(("a", "b"), [0, 0, 1], "t", vector_i=[1, 0, 0])
 
     def test_a_joint_without_a_residual_is_abstract(self):
-        class Nothing(jn.AbstractConstraint):
+        class Nothing(jn.joints.AbstractConstraint):
             pass
 
         with pytest.raises(TypeError, match="abstract"):

@@ -38,7 +38,7 @@ def shafts(coupling, drawn=(1.0, 0.0, 0.0, 0.0), **extra):
         drivers={"motor": drivers.RotationDriver(("ground", "first"), Z, LAW)},
         forces={"load": forces.SpatialTorque(("ground", "second"), AXIS.tolist(), "-5 - 2*v")},
         outputs={
-            "turn": jn.RelativeAngleOutput(("ground", "second"), AXIS.tolist()),
+            "turn": jn.outputs.RelativeAngleOutput(("ground", "second"), AXIS.tolist()),
             "motor": DriverTorqueOutput("motor"),
             "moment": JointTorqueOutput("coupling"),
         },
@@ -125,7 +125,7 @@ def test_a_tripod_joint_is_that_of_three_rollers_in_mpmath():
             "tripod": spatial.Tripod(("first", "second"), ORIGIN, ORIGIN, Z, Z, X, X, radius),
         },
         drivers={"motor": drivers.RotationDriver(("ground", "first"), Z, LAW)},
-        outputs={"roller": jn.PointOutput("second", [radius, 0, 0])},
+        outputs={"roller": jn.outputs.PointOutput("second", [radius, 0, 0])},
     )
     found = jn.solve(made, TIME, order=4).outputs["roller"]
     for place in (0, 3):
@@ -147,8 +147,8 @@ def test_the_disc_of_an_oldham_coupling_runs_round_twice_a_turn():
         },
         drivers={"motor": drivers.RotationDriver(("ground", "first"), Z, LAW)},
         outputs={
-            "turn": jn.RelativeAngleOutput(("first", "second"), Z),
-            "disc": jn.PointOutput("disc", ORIGIN),
+            "turn": jn.outputs.RelativeAngleOutput(("first", "second"), Z),
+            "disc": jn.outputs.PointOutput("disc", ORIGIN),
         },
     )
     found = jn.solve(made, TIME, order=2).outputs
@@ -174,7 +174,8 @@ def test_a_weld_carries_what_the_welded_body_weighs_and_takes_to_move():
             "weld": planar.Fixed(("arm", "load"), [arm, 0], [0, 0]),
         },
         drivers={"motor": drivers.CoordinateDriver(("ground", "arm"), "angle", LAW)},
-        outputs={"force": JointForceOutput("weld"), "moment": JointTorqueOutput("weld"), "end": jn.AngleOutput("load")},
+        outputs={"force": JointForceOutput("weld"), "moment": JointTorqueOutput("weld"),
+                 "end": jn.outputs.AngleOutput("load")},
     )  # fmt: skip
     found = jn.solve(made, TIME, order=4).outputs
     angle = law()
@@ -208,7 +209,7 @@ def test_a_body_on_a_plane_of_a_moving_one_slides_and_turns():
             "along": drivers.SpatialSlideDriver(("table", "puck"), ORIGIN, ORIGIN, X, "0.2 + 0.1*t"),
             "across": drivers.SpatialSlideDriver(("table", "puck"), ORIGIN, ORIGIN, Y, "0.1*cos(t)"),
         },
-        outputs={"rim": jn.PointOutput("puck", [0.05, 0.0, 0.0])},
+        outputs={"rim": jn.outputs.PointOutput("puck", [0.05, 0.0, 0.0])},
     )
     found = jn.solve(made, TIME, order=3).outputs["rim"]
 

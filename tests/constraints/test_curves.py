@@ -14,7 +14,7 @@ from jounce.kinematics import Status
 ORIGIN, X, Z = [0.0, 0.0], [1.0, 0.0], [0.0, 0.0, 1.0]
 TIME = np.linspace(0.0, 1.5, 7)
 MASS, GRAVITY = 1.5, 9.81
-HILL = jn.ParametricCurve(["s", "0.1*s**2"], range=[-1, 1])
+HILL = jn.joints.ParametricCurve(["s", "0.1*s**2"], range=[-1, 1])
 
 
 def bead(curve, place, *, law="", speed="", start=None, **extra):
@@ -30,7 +30,7 @@ def bead(curve, place, *, law="", speed="", start=None, **extra):
         },
         drivers={"x": hold} if law else {},
         initial={"x": hold} if speed else {},
-        outputs={"place": jn.PointOutput("bead", ORIGIN), "s": jn.ParameterOutput("track"), **extra},
+        outputs={"place": jn.outputs.PointOutput("bead", ORIGIN), "s": jn.outputs.ParameterOutput("track"), **extra},
     )
 
 
@@ -119,7 +119,7 @@ def test_the_normal_force_of_a_curve_has_the_closed_form_with_its_rates_and_the_
 def test_a_bead_falls_along_a_cycloid_in_the_time_of_huygens():
     """On a cycloid the period does not depend on the height, and the length along it swings as a cosine."""
     radius = 0.3
-    cycloid = jn.ParametricCurve([f"{radius}*(s + sin(s))", f"-{radius}*(1 + cos(s))"], range=[-3, 3])
+    cycloid = jn.joints.ParametricCurve([f"{radius}*(s + sin(s))", f"-{radius}*(1 + cos(s))"], range=[-3, 3])
     for start in (0.5, 2.5):
         place = [radius * (start + np.sin(start)), -radius * (1 + np.cos(start))]
         made = bead(cycloid, place, speed=f"{float(place[0])!r}", start=start)
@@ -136,7 +136,7 @@ def test_a_bead_falls_along_a_cycloid_in_the_time_of_huygens():
 def test_a_barrel_cam_by_the_flank_of_its_groove_has_the_torque_of_its_lift():
     """Axial force times dz/dtheta is the torque; the surface has one equation, and no row of it is redundant."""
     radius, stroke, speed, mass, rate = 0.04, 0.012, 3.0, 0.8, 2000.0
-    flank = jn.ParametricCurve(["v*cos(u)", "v*sin(u)", f"{stroke}*sin(2*u)"], range=[[-9, 9], [0.03, 0.05]])
+    flank = jn.joints.ParametricCurve(["v*cos(u)", "v*sin(u)", f"{stroke}*sin(2*u)"], range=[[-9, 9], [0.03, 0.05]])
     made = jn.Mechanism(
         space="spatial",
         bodies={
@@ -151,8 +151,8 @@ def test_a_barrel_cam_by_the_flank_of_its_groove_has_the_torque_of_its_lift():
         drivers={"motor": drivers.RotationDriver(("ground", "drum"), Z, f"{speed}*t")},
         forces={"spring": forces.Spring(("ground", "slide"), [radius, 0, 0.1], [0, 0, 0], rate, 0.12)},
         outputs={
-            "pin": jn.PointOutput("slide", [0, 0, 0]),
-            "around": jn.ParametersOutput("groove"),
+            "pin": jn.outputs.PointOutput("slide", [0, 0, 0]),
+            "around": jn.outputs.ParametersOutput("groove"),
             "torque": DriverTorqueOutput("motor"),
             "flank": JointForceOutput("groove"),
         },
@@ -188,7 +188,7 @@ def test_a_bead_on_a_helix_of_a_turning_body_goes_by_matrices():
             "turn": drivers.RotationDriver(("ground", "rotor"), x, "0.4*t**2"),
             "up": drivers.SpatialSlideDriver(("rotor", "bead"), [0, 0, 0], [0, 0, 0], z, "0.2*t + 0.05*sin(3*t)"),
         },
-        outputs={"place": jn.PointOutput("bead", [0, 0, 0]), "s": jn.ParameterOutput("helix")},
+        outputs={"place": jn.outputs.PointOutput("bead", [0, 0, 0]), "s": jn.outputs.ParameterOutput("helix")},
     )
     found = jn.solve(made, TIME, order=4).outputs
 
@@ -211,7 +211,7 @@ class TestEnds:
 
     def test_a_driven_motion_ends_there_and_at_the_end_itself_it_is_solved(self):
         made = bead(HILL, [0.5, 0.02], law="0.5 + 0.5*t", start=0.5)
-        with pytest.raises(jn.SolveError, match=r"joints\.track at its end s = 1: end of curve") as caught:
+        with pytest.raises(jn.errors.SolveError, match=r"joints\.track at its end s = 1: end of curve") as caught:
             jn.solve(made, TIME, order=2)
         assert caught.value.status == Status.END_OF_CURVE
         found = jn.solve(made, TIME, order=2, strict=False)
@@ -225,10 +225,10 @@ class TestEnds:
         assert found.status.tolist() == [0, 0, int(Status.END_OF_CURVE), int(Status.NOT_REACHED)]
 
     def test_a_start_beyond_an_end_is_told_before_anything_is_computed(self):
-        with pytest.raises(jn.MechanismError, match="between the ends of the curve, -1 and 1") as caught:
+        with pytest.raises(jn.errors.MechanismError, match="between the ends of the curve, -1 and 1") as caught:
             jn.solve(bead(HILL, [0.5, 0.02], law="0.5", start=3.0), [0.0, 1.0])
         assert caught.value.name == "joints.track.start"
-        with pytest.raises(jn.SolveError, match="at its end s = 1"):
+        with pytest.raises(jn.errors.SolveError, match="at its end s = 1"):
             jn.solve(bead(HILL, [0.9, 0.08], law="1.1 + 0*t", start=0.9), [0.0, 1.0])
 
     def test_a_simulation_ends_there(self):
@@ -236,26 +236,29 @@ class TestEnds:
         found = jn.simulate(made, TIME, order=1, strict=False)
         assert int(Status.END_OF_CURVE) in found.status[1:].tolist()
         assert "joints.track at its end s = 1 at t = " in found.faults[int(np.argmax(found.status))]
-        with pytest.raises(jn.SolveError, match="end of curve"):
+        with pytest.raises(jn.errors.SolveError, match="end of curve"):
             jn.simulate(made, TIME, order=1)
 
 
 @pytest.mark.parametrize(
     "curve, words",
     [
-        (jn.ParametricCurve(["s", "abs(s)"], range=[-1, 1]), "a corner at s = 0"),
-        (jn.ParametricCurve(["s", "abs(s)*s"], range=[-1, 1]), "a jump of its curvature at s = 0"),
+        (jn.joints.ParametricCurve(["s", "abs(s)"], range=[-1, 1]), "a corner at s = 0"),
+        (jn.joints.ParametricCurve(["s", "abs(s)*s"], range=[-1, 1]), "a jump of its curvature at s = 0"),
         (["s", "abs(s)"], "abs may have kinks or ends; give the range of s"),
         (["s", "s**0.5"], "a power may have kinks or ends; give the range of s"),
         (["s**2", "s**3"], "a cusp at s = 0"),
         (["cos(s)**3", "sin(s)**3"], "a cusp at s = "),
-        (jn.ParametricCurve(["s", "1/(s - 0.3)"], range=[-1, 1]), "a gap at s = 0.3"),
-        (jn.ParametricCurve(["cos(s)", "sin(s)"], range=[0, 6], closed=True), "does not close: there is a gap of 0.28"),
-        (jn.ParametricCurve(["s", "sqrt(1 - s**2)"], range=[-1, 1]), "not finite at s = -1"),
-        (jn.ParametricCurve(["1", "2"], range=[0, 1]), "a single point"),
+        (jn.joints.ParametricCurve(["s", "1/(s - 0.3)"], range=[-1, 1]), "a gap at s = 0.3"),
+        (
+            jn.joints.ParametricCurve(["cos(s)", "sin(s)"], range=[0, 6], closed=True),
+            "does not close: there is a gap of 0.28",
+        ),
+        (jn.joints.ParametricCurve(["s", "sqrt(1 - s**2)"], range=[-1, 1]), "not finite at s = -1"),
+        (jn.joints.ParametricCurve(["1", "2"], range=[0, 1]), "a single point"),
         (["s"], "must be 2 expressions"),
         (["s", "w"], "unknown name 'w'"),
-        (jn.ParametricCurve(["s", "s**2"], range=[1, 0]), "the first value must be below the last"),
+        (jn.joints.ParametricCurve(["s", "s**2"], range=[1, 0]), "the first value must be below the last"),
     ],
     ids=lambda x: x if isinstance(x, str) else "",
 )
@@ -284,13 +287,15 @@ def ring(count=60, turns=1.0):
     ids=lambda x: x if isinstance(x, str) else "",
 )
 def test_points_that_make_no_smooth_curve_are_named(points, closed, words):
-    with pytest.raises(jn.MechanismError, match=words):
-        jn.SampledCurve(points, closed)
+    with pytest.raises(jn.errors.MechanismError, match=words):
+        jn.joints.SampledCurve(points, closed)
 
 
 def test_a_start_that_is_near_two_branches_asks_for_one():
     eight = ["sin(s)", "sin(s)*cos(s)"]
-    with pytest.raises(jn.MechanismError, match=r"two parts of the curve are about as near .* give start") as caught:
+    with pytest.raises(
+        jn.errors.MechanismError, match=r"two parts of the curve are about as near .* give start"
+    ) as caught:
         jn.solve(bead(eight, [0.0, 0.0], law="0.1*t"), [0.0, 0.1])
     assert caught.value.name == "joints.track.start"
 
@@ -312,7 +317,7 @@ def test_a_curve_that_crosses_itself_is_followed_through_the_crossing():
 @pytest.mark.slow
 def test_many_laps_of_a_curve_through_points():
     """A bead on a ring by samples, weightless, keeps its speed over the knots; laps count on."""
-    ellipse = jn.SampledCurve(ring(80), closed=True)
+    ellipse = jn.joints.SampledCurve(ring(80), closed=True)
     made = dataclasses.replace(bead(ellipse, [1.0, 0.0], speed="1 + 0*t"), gravity=[0.0, 0.0])
     made = dataclasses.replace(made, initial={"y": drivers.CoordinateDriver(("ground", "bead"), "y", "4*t")})
     found = jn.simulate(made, np.linspace(0.0, 5.0, 6), order=1)
@@ -348,5 +353,5 @@ def test_a_bead_rests_at_the_foot_of_its_curve_and_swings_with_its_curvature():
     rest = jn.equilibrium(made)
     assert list(rest.poses) == ["bead"]
     np.testing.assert_allclose(rest.poses["bead"]["position"], [0.0, -1.0], atol=1e-12)
-    modes = jn.linearise(made).modes
+    modes = jn.linearize(made).modes
     assert float(np.abs(modes.eigenvalues[0])) == pytest.approx(np.sqrt(GRAVITY / 4), rel=1e-10)  # radius of 4 m

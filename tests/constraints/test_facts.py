@@ -8,7 +8,7 @@ from jounce import planar, spatial
 from jounce.constraints.base import MotionLaw, catalogue
 from jounce.constraints.facts import dimension_of_field, facts_of, symbols
 from jounce.io.mechanisms.keys import file_keys
-from jounce.kinematics.curves.transmission import recognised
+from jounce.kinematics.curves.transmission import recognized
 from jounce.mechanism import build
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.plot.driver_symbols import DRIVERS_AND_FORCES
@@ -18,14 +18,14 @@ from jounce.plot.joint_symbols import _PLANAR, _SPATIAL
 BOTH = ("one", "two")
 
 
-class Rail(jn.AbstractConstraint, space="planar"):
+class Rail(jn.joints.AbstractConstraint, space="planar"):
     """A guide whose fields have names of their own."""
 
-    point_i: jn.Vector
-    point_j: jn.Vector
-    rail_i: jn.Vector
-    rail_j: jn.Vector
-    length: jn.Scalar = 0.0
+    point_i: jn.joints.Vector
+    point_j: jn.joints.Vector
+    rail_i: jn.joints.Vector
+    rail_j: jn.joints.Vector
+    length: jn.joints.Scalar = 0.0
 
     dimensions = {"rail": "direction"}
     signs = {"rail": "not zero", "length": "any"}
@@ -36,7 +36,7 @@ class Rail(jn.AbstractConstraint, space="planar"):
         del time
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         along = body_i.direction(self.rail_i)
-        return jn.rows(jn.jet.cross(along, body_j.direction(self.rail_j)), jn.jet.cross(along, d) - self.length)
+        return jn.joints.rows(jn.jet.cross(along, body_j.direction(self.rail_j)), jn.jet.cross(along, d) - self.length)
 
 
 class Pin(planar.Revolute):
@@ -70,11 +70,11 @@ def test_facts_of_a_residual_go_with_it():
 
 
 def test_fields_of_usual_names_have_usual_facts():
-    class Own(jn.AbstractConstraint, space="spatial"):
-        axis_i: jn.Vector
-        radius: jn.Scalar
-        lead: jn.Scalar
-        other: jn.Scalar
+    class Own(jn.joints.AbstractConstraint, space="spatial"):
+        axis_i: jn.joints.Vector
+        radius: jn.joints.Scalar
+        lead: jn.joints.Scalar
+        other: jn.joints.Scalar
 
         def residual(self, body_i, body_j, time): ...
 
@@ -85,8 +85,12 @@ def test_fields_of_usual_names_have_usual_facts():
 
 def own(name, **stated):
     """Return a class that states a fact."""
-    values = {"residual": lambda *_: None, "__annotations__": {"point_i": jn.Vector, "size": jn.Scalar}, **stated}
-    return type(jn.AbstractConstraint)(name, (jn.AbstractConstraint,), values)
+    values = {
+        "residual": lambda *_: None,
+        "__annotations__": {"point_i": jn.joints.Vector, "size": jn.joints.Scalar},
+        **stated,
+    }
+    return type(jn.joints.AbstractConstraint)(name, (jn.joints.AbstractConstraint,), values)
 
 
 @pytest.mark.parametrize(
@@ -110,12 +114,12 @@ def own(name, **stated):
             "symbol: the class Own: no symbol has this name, .*'spherical'",
         ),
         ({"symbol": "rolling"}, "symbol rolling: the class Own: no field has this name.*'radius'"),
-        ({"__annotations__": {"symbol": jn.Scalar}}, "field: no field of Own may have this name"),
+        ({"__annotations__": {"symbol": jn.joints.Scalar}}, "field: no field of Own may have this name"),
     ],
 )
 def test_a_fact_that_cannot_be_is_refused_in_words(stated, words):
     kind = own("Own", **stated)
-    with pytest.raises(jn.MechanismError, match=words):
+    with pytest.raises(jn.errors.MechanismError, match=words):
         kind(BOTH, *[1.0] * len(kind.__annotations__))
 
 
@@ -132,7 +136,7 @@ def mechanism(**joints):
     ],
 )
 def test_signs_are_those_of_the_class(kind, values, words):
-    with pytest.raises(jn.MechanismError, match=words):
+    with pytest.raises(jn.errors.MechanismError, match=words):
         build(mechanism(J=kind(BOTH, *values)))
     build(mechanism(J=Rail(BOTH, [0, 0], [0, 0], [1, 0], [1, 0], -2.0)))
 
@@ -150,13 +154,13 @@ def test_a_part_is_not_put_together_turned_over_where_a_class_says_what_is_paral
         bodies={"two": jn.Body([0.5, 0.0], angle=2.0)},
         joints={"guide": guide},
         drivers={"push": jn.drivers.SlideDriver(("ground", "two"), [0, 0], [0, 0], [1, 0], "0.5")},
-        outputs={"angle": jn.AngleOutput("two")},
+        outputs={"angle": jn.outputs.AngleOutput("two")},
     )
     angle = float(jn.solve(mechanism, [0.0], order=0).dataset["angle"].values[0, 0])
     assert angle == pytest.approx(turned, abs=1e-12)
 
 
-def test_linkages_are_recognised_by_their_pairs():
+def test_linkages_are_recognized_by_their_pairs():
     def four_bar(pin):
         ends = {"A": [0, 0], "D": [3, 0]}
         bodies = {"crank": jn.Body([0, 0], 1.0), "rocker": jn.Body([3, 0], 1.5)}
@@ -169,10 +173,10 @@ def test_linkages_are_recognised_by_their_pairs():
             drivers={"turn": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "t")},
         )
 
-    known = recognised(four_bar(planar.Revolute), "turn")
+    known = recognized(four_bar(planar.Revolute), "turn")
     assert known is not None
-    assert recognised(four_bar(Pin), "turn") == known
-    assert recognised(four_bar(OffsetPin), "turn") is None
+    assert recognized(four_bar(Pin), "turn") == known
+    assert recognized(four_bar(OffsetPin), "turn") is None
 
 
 def test_each_symbol_of_the_catalogue_can_be_drawn():
@@ -187,8 +191,8 @@ def test_each_symbol_of_the_catalogue_can_be_drawn():
 
 
 def test_dimensions_of_laws_and_keys_are_those_of_the_class():
-    class Winch(jn.AbstractConstraint, space="planar", role="driver"):
-        drum: jn.Scalar
+    class Winch(jn.joints.AbstractConstraint, space="planar", role="driver"):
+        drum: jn.joints.Scalar
         motion: MotionLaw
 
         dimensions = {"drum": "length", "motion": "length"}

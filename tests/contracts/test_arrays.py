@@ -38,8 +38,8 @@ def column(values):
 PARAMETER = next(iter(MECHANISM.parameters))
 TIME_DOORS = {
     "solve": lambda t: jn.solve(MECHANISM, t, order=1).time,
-    "samples of a law": lambda t: jn.SplineMotion(t, TIMES).samples.value[0],
-    "knots": lambda t: jn.HermiteMotion(t, np.zeros((8, 3))) and None,
+    "samples of a law": lambda t: jn.laws.SplineMotion(t, TIMES).samples.value[0],
+    "knots": lambda t: jn.laws.HermiteMotion(t, np.zeros((8, 3))) and None,
     "instants of a trajectory": lambda t: jn.JointTrajectory({"a": "t"}, 0.0, 1.0, t).times,
     "samples of a trajectory": lambda t: jn.JointTrajectory.from_samples(t, column(TIMES), ["a", "b"]).times,
     "derivatives of a trajectory": lambda t: TRAJECTORY.derivatives(t, 1)[:, 0, 0],
@@ -48,11 +48,11 @@ TIME_DOORS = {
     "attitudes": lambda t: jn.rigid.AttitudeSamples(t, np.tile([1.0, 0, 0, 0], (8, 1))) and None,
     "simulation of a robot": lambda t: jn.simulate(ROBOT, t, order=2, state=np.zeros((2, 2))).time,
     "jet of time": lambda t: jn.Jet.variable(t, 2).coefficients[0],
-    "tool path": lambda t: jn.ToolPath.through(t, np.stack([TIMES, TIMES, TIMES], axis=1)) and None,
+    "tool path": lambda t: jn.planning.ToolPath.through(t, np.stack([TIMES, TIMES, TIMES], axis=1)) and None,
 }
 NUMBER_DOORS = {
     "parameters of a batch": lambda x: jn.solve_batch(MECHANISM, {PARAMETER: x}, [0.0], order=0),
-    "samples of a law": lambda x: jn.SplineMotion(TIMES, x),
+    "samples of a law": lambda x: jn.laws.SplineMotion(TIMES, x),
     "samples of a trajectory": lambda x: jn.JointTrajectory.from_samples(TIMES, column(x), ["a", "b"]),
     "positions": lambda x: jn.mass_matrix(ROBOT, x[:2]),
     "coordinates": lambda x: jn.inverse_dynamics(ROBOT, column(x)[:3]),
@@ -60,7 +60,7 @@ NUMBER_DOORS = {
     "torques": lambda x: jn.forward_dynamics(ROBOT, np.zeros((2, 2)), column(x)[:1]),
     "state": lambda x: jn.forward_dynamics(ROBOT, column(x)[:2], np.zeros((1, 2))),
     "state of a simulation": lambda x: jn.simulate(ROBOT, [0.0, 0.1], state=column(x)[:2]),
-    "energies": lambda x: jn.kinetic_energy(ROBOT, column(x)[:2]),
+    "energies": lambda x: jn.energy.kinetic_energy(ROBOT, column(x)[:2]),
     "waypoints": lambda x: jn.retime(ROBOT, column(x)),
     "point": lambda x: jn.forward_kinematics(ROBOT, np.zeros((1, 2)), "end", x[:3]),
     "mass": lambda x: jn.Inertia(1.0, center_of_mass=x[:3]),
@@ -96,7 +96,7 @@ SINGLE_DOORS = {
     "coordinate": lambda x: ROBOT.coordinates(a=x),
     "limit": lambda x: jn.Limits(velocity=x),
     "law": lambda x: jn.JointTrajectory({"a": x}, 0.0, 1.0),
-    "end of a profile": lambda x: jn.motion_profile("cycloidal", 0.0, x, 1.0),
+    "end of a profile": lambda x: jn.laws.motion_profile("cycloidal", 0.0, x, 1.0),
     "position of a body": lambda x: jn.solve(
         jn.Mechanism(space="planar", bodies={"a": jn.Body([x, 0.0])}, joints={}), [0.0], order=0
     ),
@@ -172,12 +172,12 @@ def test_numbers_of_every_kind_are_taken(read):
 
 
 def test_a_missing_duration_is_told():
-    with pytest.raises(jn.MechanismError, match="or is missing"):
+    with pytest.raises(jn.errors.MechanismError, match="or is missing"):
         jn.solve(MECHANISM, np.array([0, "NaT"], "timedelta64[s]"), order=0)
 
 
 def test_a_quantity_that_is_no_time_is_refused():
-    with pytest.raises(jn.MechanismError, match="have the unit meter, which is none of time"):
+    with pytest.raises(jn.errors.MechanismError, match="have the unit meter, which is none of time"):
         jn.solve(MECHANISM, UNITS.Quantity([0.0, 1.0], "m"), order=0)
 
 

@@ -58,7 +58,7 @@ def by_local_variable():
 
 def only_asked_for(x: rigid.SpatialPose) -> spatial.Revolute:
     assert isinstance(x, spatial.Cylindrical)
-    with pytest.raises(jn.MobilityError):
+    with pytest.raises(jn.errors.MobilityError):
         return x
     return x
 
@@ -100,7 +100,7 @@ def test_what_is_used_is_found(function, expected):
         (only_asked_for, spatial.Cylindrical),
         (only_asked_for, spatial.Revolute),
         (only_asked_for, rigid.SpatialPose),
-        (only_asked_for, jn.MobilityError),
+        (only_asked_for, jn.errors.MobilityError),
         (only_called_alike, PlanarPose.point),
         (shadowed, rigid.rotation_matrix),
         (shadowed, jn.load),

@@ -51,7 +51,7 @@ def crank(motion: Any = "t", **parts: Any) -> jn.Mechanism:
         "bodies": {"rod": jn.Body([0, 0], mass=1.0, inertia=0.1)},
         "joints": {"pin": jn.planar.Revolute(GROUND, [0, 0], [0, 0])},
         "drivers": {"motor": jn.drivers.CoordinateDriver(GROUND, "angle", motion=motion)},
-        "outputs": {"angle": jn.AngleOutput("rod")},
+        "outputs": {"angle": jn.outputs.AngleOutput("rod")},
     }
     return jn.Mechanism(**whole | parts)
 
@@ -155,14 +155,14 @@ def motion_doors() -> dict[str, tuple[Any, Callable[[float], Any]]]:
         "bound method": (wave.method, set_wave),
         "list": (of_list, set_list),
         "global": (lambda t: gain * jnp.sin(t), set_global),
-        "law of a function": (jn.FunctionMotion(of_list), set_list),
+        "law of a function": (jn.laws.FunctionMotion(of_list), set_list),
         "branch": (of_branch, set_wave),
         "compiled by its user": (compiled, set_list),
         "compiled by Equinox": (compiled_by_equinox, set_list),
         "universal function": (lambda t: universal(t), set_list),
         "table": (table, set_list),
-        "part of a law": (jn.PiecewiseMotion([jn.FunctionMotion(of_list), "t"], until=[1.0]), set_list),
-        "leader": (jn.FollowingMotion(jn.ExpressionMotion("t"), jn.FunctionMotion(of_list)), set_list),
+        "part of a law": (jn.laws.PiecewiseMotion([jn.laws.FunctionMotion(of_list), "t"], until=[1.0]), set_list),
+        "leader": (jn.laws.FollowingMotion(jn.laws.ExpressionMotion("t"), jn.laws.FunctionMotion(of_list)), set_list),
         "class": (ClassMotion(), changed(ClassMotion)),
         "class that picks": (PickingMotion(), changed(PickingMotion)),
         "not compared": (WordedMotion(words), lambda a: words.amplitude.__setitem__(0, a)),
@@ -184,7 +184,7 @@ def test_laws_of_drivers(door):
 @pytest.mark.parametrize("door", ["list", "class", "class that picks"])
 def test_laws_of_trajectories(door):
     law, change = motion_doors()[door]
-    law = jn.FunctionMotion(law) if callable(law) and not isinstance(law, jn.trajectory.AbstractMotion) else law
+    law = jn.laws.FunctionMotion(law) if callable(law) and not isinstance(law, jn.trajectory.AbstractMotion) else law
     trajectory = jn.JointTrajectory({"pin": law}, start=0.0, stop=1.0)
     for amplitude in (1.0, 2.0):
         change(amplitude)
@@ -196,7 +196,7 @@ def test_laws_of_trajectories(door):
 # -- forces -----------------------------------------------------------------------------------------------------------
 
 
-class Drag(jn.AbstractForce):
+class Drag(jn.forces.AbstractForce):
     body_count = 1
     c = 0.1
 
@@ -207,7 +207,7 @@ class Drag(jn.AbstractForce):
         return -self.c * velocity
 
 
-class Lever(jn.AbstractForce):
+class Lever(jn.forces.AbstractForce):
     """A moment of a constant size, on a part of the angle."""
 
     body_count = 1
@@ -244,7 +244,7 @@ def test_law_of_a_force():
 @pytest.mark.slow  # `.ci/run` runs it each time
 def test_law_of_time_of_a_force():
     wave = Wave()
-    torque = jn.forces.Torque(GROUND, jn.FunctionMotion(lambda t: wave.amplitude * jnp.cos(t)))
+    torque = jn.forces.Torque(GROUND, jn.laws.FunctionMotion(lambda t: wave.amplitude * jnp.cos(t)))
     for wave.amplitude in (1.0, 2.0):
         assert rate_after_half(torque) == pytest.approx(1 + 10 * wave.amplitude * np.sin(0.5), abs=1e-12)
 
@@ -282,8 +282,8 @@ def test_a_method_of_this_package_that_is_replaced(monkeypatch):
 
 @pytest.mark.slow
 def test_a_class_that_is_defined_again():
-    def defined(c: float) -> type[jn.AbstractForce]:
-        class Brake(jn.AbstractForce):
+    def defined(c: float) -> type[jn.forces.AbstractForce]:
+        class Brake(jn.forces.AbstractForce):
             body_count = 1
 
             def displacement(self, body, time):
@@ -298,11 +298,11 @@ def test_a_class_that_is_defined_again():
         assert rate_after_half(defined(c)(("rod",))) == pytest.approx(np.exp(-5 * c), abs=1e-13)
 
 
-class Scaling(jn.AbstractForce):
+class Scaling(jn.forces.AbstractForce):
     """A brake whose size is a parameter, times a number of the class."""
 
     body_count = 1
-    size: jn.Scalar
+    size: jn.joints.Scalar
     part = 0.1
 
     def displacement(self, body, time):
@@ -329,7 +329,7 @@ def test_batches_and_gradients_of_forces(monkeypatch):
 # -- joints, drivers and outputs --------------------------------------------------------------------------------------
 
 
-class Hook(jn.AbstractConstraint):
+class Hook(jn.joints.AbstractConstraint):
     """A pin at a place of the rod that the class knows."""
 
     place = 0.5
@@ -340,7 +340,7 @@ class Hook(jn.AbstractConstraint):
 
 with taken_back():
 
-    class Geared(jn.AbstractConstraint, type="captured_ratio", space="planar", role="driver"):
+    class Geared(jn.joints.AbstractConstraint, type="captured_ratio", space="planar", role="driver"):
         """A driver of a gear whose ratio the class knows."""
 
         motion: MotionLaw
@@ -353,7 +353,7 @@ with taken_back():
             return abs(self.ratio) * jnp.ones_like(time.coefficients[0]) < 5.0
 
 
-class Scaled(jn.AbstractOutput):
+class Scaled(jn.outputs.AbstractOutput):
     """The angle in a unit that the class knows."""
 
     unit = "rad"
@@ -364,7 +364,7 @@ class Scaled(jn.AbstractOutput):
 
 
 def test_class_and_residual_of_a_joint(monkeypatch):
-    tip = {"tip": jn.PointOutput("rod", [1.0, 0.0])}
+    tip = {"tip": jn.outputs.PointOutput("rod", [1.0, 0.0])}
     held = crank(joints={"pin": Hook(GROUND)}, outputs=tip)
     for place in (0.5, 0.25):
         monkeypatch.setattr(Hook, "place", place)
@@ -386,7 +386,7 @@ def test_class_of_a_driver(monkeypatch):
         found = jn.solve(driven, [0.0, 0.5], order=1).outputs["angle"][1, 0]
         assert found == pytest.approx(ratio * np.sin(0.5), abs=1e-14)
     monkeypatch.setattr(Geared, "ratio", 7.0)
-    with pytest.raises(jn.SolveError):
+    with pytest.raises(jn.errors.SolveError):
         jn.solve(driven, [0.0, 0.5], order=1)
 
 
@@ -410,7 +410,7 @@ def test_gradients_of_a_law_follow_its_function():
     moved = crank(
         drivers={"motor": jn.drivers.CoordinateDriver(GROUND, "angle", lambda t: cell[0] * t, offset="start")},
         parameters={"start": 0.0},
-        outputs={"tip": jn.PointOutput("rod", [1.0, 0.0])},
+        outputs={"tip": jn.outputs.PointOutput("rod", [1.0, 0.0])},
     )
 
     def height(start: Any) -> Any:
@@ -484,7 +484,7 @@ def test_controllers(name):
 
     def run(c: Controller) -> float:
         if name == "driven":
-            law = jn.FunctionMotion(lambda t: c.stiffness * t**2)
+            law = jn.laws.FunctionMotion(lambda t: c.stiffness * t**2)
             return last_angle(driven={"pin": law})
         return last_angle(torque=c.torque if name == "torque" else {"pin": c.single})
 
@@ -498,21 +498,27 @@ def test_controllers(name):
 @pytest.mark.slow  # `.ci/run` runs it each time
 def test_wrenches():
     controller = Controller()
-    pushes = [jn.Wrench("rod", force=controller.force, point=[1.0, 0, 0]), jn.Wrench("rod", force=controller.of_state)]
+    pushes = [
+        jn.robot.Wrench("rod", force=controller.force, point=[1.0, 0, 0]),
+        jn.robot.Wrench("rod", force=controller.of_state),
+    ]
     for controller.stiffness in (2.0, 5.0):
         torque = jn.inverse_dynamics(ARM, [[0.0], [0.0], [0.0]], wrenches=pushes[:1], time=0.0)
         assert torque[0, 0] == pytest.approx(9.81 / 2 - controller.stiffness, abs=1e-13)
         found = jn.forward_dynamics(ARM, [[0.0], [0.0]], [[0.0]], wrenches=pushes[:1], time=0.0)
         assert np.ravel(found)[-1] == pytest.approx((controller.stiffness - 9.81 / 2) * 3, rel=1e-13)
         other = fresh(controller.stiffness)
-        both = [jn.Wrench("rod", force=other.force, point=[1.0, 0, 0]), jn.Wrench("rod", force=other.of_state)]
+        both = [
+            jn.robot.Wrench("rod", force=other.force, point=[1.0, 0, 0]),
+            jn.robot.Wrench("rod", force=other.of_state),
+        ]
         assert last_angle(wrenches=pushes) == pytest.approx(last_angle(wrenches=both), abs=1e-14)
 
 
 @pytest.mark.slow
 def test_a_run_keeps_the_wrenches_that_it_had():
     controller = Controller()
-    runs = [jn.simulate(ARM, [0.0, 0.5], order=3, state=START, wrenches=[jn.Wrench("rod", force=f)])
+    runs = [jn.simulate(ARM, [0.0, 0.5], order=3, state=START, wrenches=[jn.robot.Wrench("rod", force=f)])
             for f in (controller.force, controller.of_state)]  # fmt: skip
     controller.stiffness = 1000.0
     assert all(np.abs(run.torque[:, 0]).max() < 1e-10 for run in runs)
@@ -520,7 +526,7 @@ def test_a_run_keeps_the_wrenches_that_it_had():
 
 def test_events_of_joints():
     controller = Controller()
-    event = jn.JointEvent(controller.crossing)
+    event = jn.integrate.JointEvent(controller.crossing)
     for controller.stiffness in (0.2, -0.2):
         run = jn.simulate(ARM, [0.0, 0.5], order=1, state=START, events=[event])
         crossed = run.at([run.events[0][0]]).q[0, 0, 0]
@@ -528,7 +534,7 @@ def test_events_of_joints():
 
 
 def test_feedback_of_motors():
-    drives = {"pin": jn.Drive(stiffness=1000.0, rotor_inertia=0.01, gear_ratio=10)}
+    drives = {"pin": jn.planning.Drive(stiffness=1000.0, rotor_inertia=0.01, gear_ratio=10)}
     controller, found = Controller(), []
     for controller.stiffness in (10.0, 100.0):
         for c in (controller, fresh(controller.stiffness)):
@@ -640,8 +646,8 @@ def test_two_hundred_controllers_compile_once(monkeypatch):
     def run(stop: float = 0.1) -> float:
         parts: dict[str, Any] = {
             "torque": lambda t, q, rate: controller.torque(t, q, rate),
-            "wrenches": [jn.Wrench("rod", force=controller.of_state)],
-            "events": [jn.JointEvent(lambda t, q, rate: q[0] - 0.01 * controller.stiffness)],
+            "wrenches": [jn.robot.Wrench("rod", force=controller.of_state)],
+            "events": [jn.integrate.JointEvent(lambda t, q, rate: q[0] - 0.01 * controller.stiffness)],
         }
         return float(jn.simulate(ARM, [0.0, stop], order=1, state=START, **parts).q[-1, 0, 0])
 

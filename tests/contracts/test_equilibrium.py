@@ -22,17 +22,17 @@ RATES_OF_ONE = {"planar": RATES, "spatial": 2}  # of a joint alone: in space, an
 ORDER = RATES + 2  # of motions: forces use up two
 
 
-class OwnRatio(jn.AbstractConstraint, space="planar"):
+class OwnRatio(jn.joints.AbstractConstraint, space="planar"):
     """A place along x that follows the product of a height over a line and the angle of another body, all global."""
 
     def residual(self, body_i, body_j, time):
         return body_j.position[0] - body_i.angle * (0.5 + body_j.position[1])
 
 
-class OwnPush(jn.AbstractForce, space="planar"):
+class OwnPush(jn.forces.AbstractForce, space="planar"):
     """A force along x by how far a point of one body is beyond the origin of another."""
 
-    point_j: jn.Vector
+    point_j: jn.joints.Vector
 
     def displacement(self, body_i, body_j, time):
         return body_j.point(self.point_j)[0] - body_i.position[0]
@@ -41,7 +41,7 @@ class OwnPush(jn.AbstractForce, space="planar"):
         return time - 3.0 * displacement - 0.2 * velocity
 
 
-class OwnHeight(jn.AbstractConstraint, space="spatial"):
+class OwnHeight(jn.joints.AbstractConstraint, space="spatial"):
     """A height over the ground by the way that another body has gone along x."""
 
     def residual(self, body_i, body_j, time):
@@ -153,7 +153,7 @@ def loop():
     links = [jn.Link("base"), *(jn.Link(name, rod) for name in ("crank", "rod", "rocker"))]
     joints = [jn.Joint("A", "base", "crank"), jn.Joint("B", "crank", "rod", position=[1, 0, 0])]
     joints.append(jn.Joint("D", "base", "rocker", position=[1, 1, 0]))
-    tip = jn.Closure("C", ("rod", "rocker"), points=[[1, 0, 0], [1, 0, 0]])
+    tip = jn.robot.Closure("C", ("rod", "rocker"), points=[[1, 0, 0], [1, 0, 0]])
     robot = jn.Robot("four-bar", links, joints, gravity=[1.0, -9.0, -2.0], closures=[tip])
     spring = forces.Spring(("ground", "rod"), [0, 2, 0.3], [0.4, 0.1, 0], 20.0, 1.0, 0.5)
     return robot.mechanism({"B": 0.4}, drivers={"A": "0.1 + 0.4*sin(t)"}, forces={"spring": spring})
@@ -174,7 +174,7 @@ def test_momentum_changes_by_what_is_applied_and_what_the_ground_gives(name):
     assert (motion.status == 0).all()
     point = np.array([0.3, -0.2, 0.4])[: 2 if motion.mechanism.space == "planar" else 3]
     changes, applied = balance_of_bodies(motion, point), loads(motion, point)
-    ground = [taylor(x.values) for x in dataclasses.astuple(jn.ground_reaction(motion, point))]
+    ground = [taylor(x.values) for x in dataclasses.astuple(jn.dynamics.ground_reaction(motion, point))]
     for change, load, part in zip(changes, applied, ground, strict=True):
         size = np.abs(change).max(axis=(1, 2)) + np.abs(load).max(axis=(1, 2)) + np.abs(part).max(axis=(1, 2))
         assert (size > 0).all()
@@ -227,8 +227,8 @@ def attitudes(motion):
 def balance_of_bodies(motion, point):
     """Taylor coefficients of the rates of momentum, and of angular momentum about a fixed point, less their weights.
 
-    Momentum is that of mass elements: of a body with second moments S about its centre, ``x x'^T`` sums up to
-    ``A S A'^T`` besides that of the centre.
+    Momentum is that of mass elements: of a body with second moments S about its center, ``x x'^T`` sums up to
+    ``A S A'^T`` besides that of the center.
     """
     size = len(point)
     turned, origins = attitudes(motion), np.asarray(motion.poses[1]["position"])
@@ -265,7 +265,7 @@ def loads(motion, point):
     for name, load in motion.mechanism.forces.items():
         if len(load.bodies) > 1:
             continue
-        push = taylor(jn.applied_force(motion, name).values)
+        push = taylor(jn.dynamics.applied_force(motion, name).values)
         index = [*motion.mechanism.bodies].index(load.bodies[0]) + 1
         matrix = turned[:, :, :, index]
         if getattr(load, "frame", "") == "body":

@@ -66,7 +66,7 @@ def rotor(quaternion, vectors=None, tilt=0.0):
             "bearing": JointTorqueOutput("axle"),
             "motor": DriverTorqueOutput("motor"),
             "on_rotor": JointTorqueOutput("motor"),
-            "angle": jn.RelativeAngleOutput(bodies, z, *(vectors or ())),
+            "angle": jn.outputs.RelativeAngleOutput(bodies, z, *(vectors or ())),
         },
     )
 
@@ -98,7 +98,7 @@ def test_nor_does_it_where_a_vector_of_the_driver_points_beside_the_plane_of_the
 
 
 def solid(random):
-    """Mass, centre of mass and inertia of a body in space."""
+    """Mass, center of mass and inertia of a body in space."""
     spread = random.normal(size=(3, 3))
     spread = 0.05 * spread @ spread.T + 0.05 * np.eye(3)
     tensor = (np.trace(spread) * np.eye(3) - spread).tolist()
@@ -113,7 +113,7 @@ def wave(start, rate, swing, frequency):
     """A law of a driver; all of them are one formula, and what moves by it is compiled once."""
     values = (float(value) for value in (start, rate, swing, frequency))
     parameters = dict(zip(("start", "rate", "swing", "frequency"), values, strict=True))
-    return jn.ExpressionMotion("start + rate*t + swing*sin(frequency*t)", parameters)
+    return jn.laws.ExpressionMotion("start + rate*t + swing*sin(frequency*t)", parameters)
 
 
 def in_space(seed, bodies, **elements):
@@ -146,11 +146,11 @@ def arm():
             "torque": forces.SpatialTorque(("ground", "tube"), Z, "2*sin(x) - 0.3*v"),
         },
         outputs={
-            "angle": jn.RelativeAngleOutput(("ground", "rotor"), Z),
-            "tilted": jn.RelativeAngleOutput(("ground", "tube"), Z),
-            "between": jn.RelativeAngleOutput(("ground", "tube"), Z, A, B),
-            "rate": jn.AngularVelocityOutput("tube"),
-            "own_rate": jn.AngularVelocityOutput("tube", "body"),
+            "angle": jn.outputs.RelativeAngleOutput(("ground", "rotor"), Z),
+            "tilted": jn.outputs.RelativeAngleOutput(("ground", "tube"), Z),
+            "between": jn.outputs.RelativeAngleOutput(("ground", "tube"), Z, A, B),
+            "rate": jn.outputs.AngularVelocityOutput("tube"),
+            "own_rate": jn.outputs.AngularVelocityOutput("tube", "body"),
         },
     )
 
@@ -194,12 +194,12 @@ def linkage():
             "thrust": forces.SpatialPointForce("link", C, ["1 + t - vx", "0.2*x*vz", "-0.7*z"], "body"),
         },
         outputs={
-            "distance": jn.DistanceOutput(("ram", "link"), C, A),
+            "distance": jn.outputs.DistanceOutput(("ram", "link"), C, A),
             "slide": SlideOutput(("ram", "link"), C, A, B),
-            "caster": jn.ProjectedAngleOutput(("ram", "link", "link"), B, A, ZERO, C),
-            "center": jn.SpatialInstantCenterOutput(("ram", "link"), C, B),
-            "own_center": jn.SpatialInstantCenterOutput(("ram", "link"), C, B, "body"),
-            "roll_center": jn.RollCenterOutput(("ground", "ram", "link"), A, B, C),
+            "caster": jn.outputs.ProjectedAngleOutput(("ram", "link", "link"), B, A, ZERO, C),
+            "center": jn.outputs.SpatialInstantCenterOutput(("ram", "link"), C, B),
+            "own_center": jn.outputs.SpatialInstantCenterOutput(("ram", "link"), C, B, "body"),
+            "roll_center": jn.outputs.RollCenterOutput(("ground", "ram", "link"), A, B, C),
         },
     )
 
@@ -291,7 +291,7 @@ def tracks():
             "along": drivers.SpatialSlideDriver(("rotor", "puck"), ZERO, ZERO, x, wave(0.2, 0.1, 0.05, 2.0)),
             "across": drivers.SpatialSlideDriver(("rotor", "puck"), ZERO, ZERO, y, wave(0.2, 0.1, 0.05, 1.0)),
         },
-        outputs={"place": jn.ParameterOutput("groove"), "places": jn.ParametersOutput("bowl")},
+        outputs={"place": jn.outputs.ParameterOutput("groove"), "places": jn.outputs.ParametersOutput("bowl")},
     )
 
 
@@ -405,15 +405,15 @@ def all_in_the_plane():
             "thrust": forces.PointForce("second", x, ["1 + t - 0.1*vx", "0.2*cos(x)*vy"], "body"),
         },
         outputs={
-            "angle": jn.AngleOutput("gear"),
-            "between": jn.PlanarRelativeAngleOutput(("rocker", "gear")),
-            "distance": jn.DistanceOutput(("planet", "pin"), x, y),
+            "angle": jn.outputs.AngleOutput("gear"),
+            "between": jn.outputs.PlanarRelativeAngleOutput(("rocker", "gear")),
+            "distance": jn.outputs.DistanceOutput(("planet", "pin"), x, y),
             "slide": SlideOutput(("planet", "pin"), x, y, y),
-            "rate": jn.AngularVelocityOutput("rocker"),
-            "own_rate": jn.AngularVelocityOutput("rocker", "body"),
-            "place": jn.ParameterOutput("track"),
-            "centrode": jn.InstantCenterOutput(("crank", "rocker")),
-            "own_centrode": jn.InstantCenterOutput(("crank", "rocker"), "body"),
+            "rate": jn.outputs.AngularVelocityOutput("rocker"),
+            "own_rate": jn.outputs.AngularVelocityOutput("rocker", "body"),
+            "place": jn.outputs.ParameterOutput("track"),
+            "centrode": jn.outputs.InstantCenterOutput(("crank", "rocker")),
+            "own_centrode": jn.outputs.InstantCenterOutput(("crank", "rocker"), "body"),
         },
     )
 
@@ -443,7 +443,7 @@ def test_an_angle_between_bodies_in_any_motion_changes_by_a_constant_with_their_
     found = []
     for motion, around in ((first, axis), (drawn(first, turned), frames[0].inv().apply(axis))):
         pose = pose_of(motion)
-        output = jn.RelativeAngleOutput(("one", "two"), around.tolist())
+        output = jn.outputs.RelativeAngleOutput(("one", "two"), around.tolist())
         start = {"quaternion": np.array(pose.quaternion.coefficients[0])}
         (group,) = with_datums([group_of([output], "spatial")], start)
         plain = group_of([output], "spatial").evaluate(pose.truncate(0)).coefficients[0]
@@ -496,7 +496,7 @@ def test_no_quantity_depends_on_how_frames_are_drawn(name):
     mechanism, random = with_all_outputs(MECHANISMS[name]()), np.random.default_rng(2)
     same, order = dict.fromkeys(counted(mechanism), 0.0), ORDERS.get(name, 0)
     kept = jn.solve(redrawn(mechanism, as_drawn(mechanism), same), INSTANTS, order)
-    balance = jn.power_balance(kept)
+    balance = jn.energy.power_balance(kept)
     assert float(balance["scale"].min()) > 0
     assert (np.abs(balance["residual"]) <= 1e-12 * balance["scale"].max("time")).all(), balance["residual"].values
     for _ in range(2):
@@ -535,8 +535,8 @@ def test_every_joint_driver_force_and_output_has_its_frames_drawn_otherwise(spac
                 missing[type(element)] = missing.get(type(element), set()) - forms_of(element)
     # a cam is made of coordinates of other elements, a derivative of other outputs: tests/dynamics/test_cams.py and
     # tests/mechanism/test_linkage_outputs.py
-    for kind in (CamForceOutput, CamTorqueOutput, jn.DerivativeOutput):
+    for kind in (CamForceOutput, CamTorqueOutput, jn.outputs.DerivativeOutput):
         missing[kind] -= {"without"}
-    missing.pop(jn.SymmetricRollCenterOutput, None)  # its image is in a plane through the origin of the ground
+    missing.pop(jn.outputs.SymmetricRollCenterOutput, None)  # its image is in a plane through the origin of the ground
     missing[GroundTorqueOutput] -= {"without"}  # about the origin, which is another point of the ground then
     assert {kind.__name__: left for kind, left in missing.items() if left} == {}

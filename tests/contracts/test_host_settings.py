@@ -185,7 +185,7 @@ for name in ("abacus", "cuda"):
     ):
         try:
             ask()
-        except jn.UnsupportedError as error:
+        except jn.errors.UnsupportedError as error:
             assert "JAX_PLATFORMS" in str(error) and repr(name) in str(error), error
             print(error)
 """
@@ -203,7 +203,7 @@ def test_a_device_that_is_not_there_is_refused():
 
 
 def test_a_device_that_is_not_there_by_default():
-    with jax.default_device("tpu"), pytest.raises(jn.UnsupportedError, match=r"jax_default_device: .* 'tpu'"):
+    with jax.default_device("tpu"), pytest.raises(jn.errors.UnsupportedError, match=r"jax_default_device: .* 'tpu'"):
         jn.Jet.variable(0.1, 3)
 
 

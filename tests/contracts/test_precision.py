@@ -83,7 +83,7 @@ joints = [jn.Joint("a", "base", "one", axis=[0, -1, 0])]
 joints += [jn.Joint("b", "one", "two", position=[0.3, 0, 0], axis=[0, -1, 0])]
 links = [jn.Link("base"), jn.Link("one", jn.Inertia(1.0, [0.15, 0, 0])), jn.Link("two", jn.Inertia(0.7, [0.1, 0, 0]))]
 arm = jn.Robot("arm", links, joints)
-spin = jn.FunctionMotion(lambda t: jnp.sin(0.7 * t))
+spin = jn.laws.FunctionMotion(lambda t: jnp.sin(0.7 * t))
 q = np.array([[0.3, 0.1], [0.7, -0.2], [0.1, 0.9], [0.3, 0.4]])
 
 
@@ -94,7 +94,7 @@ def numbers():
     moved = jn.simulate(arm, [0.0, 0.1], torque=lambda time, q, rate: -0.3 * jnp.sin(q))
     found = {
         "jet": (2 * t**2 + 0.1).derivatives(), "sine": jn.jet.sin(0.7 * t).derivatives(),
-        "compose": jn.compose(lambda x: jnp.exp(-0.3 * x), t).derivatives(), "law": spin(t).derivatives(),
+        "compose": jn.jet.compose(lambda x: jnp.exp(-0.3 * x), t).derivatives(), "law": spin(t).derivatives(),
         "narrow": jn.jet.sin(jn.Jet.variable(np.float32(0.25), 2)).derivatives(),
         "turn": jn.rigid.rotation_matrix("ZYX", jn.Jet.constant([0.1, 0.2, 0.3], 1)).derivatives(),
         "solve": motion.outputs["psi"], "point": motion.point("rocker", [0.1, 0.0]).values,
@@ -149,9 +149,9 @@ def test_a_transformation_in_single_precision_is_refused(name, single_precision)
     def jounce_of(length):
         return jn.solve(mechanism.with_parameters(BC=length), [0.0, 0.1], order=4).outputs["psi"][-1, 4]
 
-    with pytest.raises(jn.UnsupportedError, match=r'jax.config.update\("jax_enable_x64", True\)'):
+    with pytest.raises(jn.errors.UnsupportedError, match=r'jax.config.update\("jax_enable_x64", True\)'):
         TRANSFORMED[name](jounce_of)
-    with pytest.raises(jn.UnsupportedError, match=r"with jax.enable_x64\(True\):"):
+    with pytest.raises(jn.errors.UnsupportedError, match=r"with jax.enable_x64\(True\):"):
         TRANSFORMED[name](lambda x: jn.Jet.variable(x, 2).derivatives()[1])
 
 

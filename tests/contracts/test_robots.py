@@ -60,8 +60,8 @@ def last_link(robot):
 def test_power_balances_energy_with_rates(robot, data):
     q = data.draw(states(robot))
     torque = jn.inverse_dynamics(robot, q, drives=False)  # damping and friction take energy away
-    kinetic = jn.kinetic_energy(robot, q, drives=False).total
-    potential = -robot.mass * jn.center_of_mass(robot, q) @ robot.gravity
+    kinetic = jn.energy.kinetic_energy(robot, q, drives=False).total
+    potential = -robot.mass * jn.robot.center_of_mass(robot, q) @ robot.gravity
     levels = ORDER - 1
     power = np.stack([leibniz(torque, q[:, 1:], level) for level in range(levels)], axis=1)
     near(power, kinetic[:, 1 : levels + 1] + potential[:, 1 : levels + 1])
@@ -93,7 +93,7 @@ def test_derivatives_follow_each_other(robot, data):
         motion.position,
         motion.rotation,
         motion.angular_velocity,
-        jn.center_of_mass(robot, q),
+        jn.robot.center_of_mass(robot, q),
         jn.jacobian(robot, q, last_link(robot), [0.1, -0.2, 0.3]),
         jn.inverse_dynamics(robot, q, drives=False),  # friction jumps where a velocity changes its sign
     )
@@ -125,7 +125,7 @@ def test_operational_accelerations_are_sums_of_jacobian_rates(robot, data):
     q = data.draw(states(robot))
     place = last_link(robot), [0.1, -0.2, 0.3]
     jacobian = jn.jacobian(robot, q, *place)
-    found = jn.operational_accelerations(robot, q, *place)
+    found = jn.robot.operational_accelerations(robot, q, *place)
     motion = jn.forward_kinematics(robot, q, *place)
     near(found, np.concatenate([motion.position[:, 1:], motion.angular_velocity], axis=-1))
     for m in range(1, ORDER + 1):  # Negrean 2025, equation 59
@@ -141,7 +141,7 @@ def test_the_mass_matrix_is_symmetric_and_positive(robot, data):
     matrix = jn.mass_matrix(robot, q, rates=True)[0, 0]
     near(matrix, matrix.T, 1e-13)
     assert np.linalg.eigvalsh(matrix).min() > 0
-    energy = jn.kinetic_energy(robot, q).total[0, 0]
+    energy = jn.energy.kinetic_energy(robot, q).total[0, 0]
     near(energy, q[0, 1] @ matrix @ q[0, 1] / 2, 1e-13)
 
 

@@ -30,7 +30,11 @@ def pendulum():
     joints = {"pin": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])}
     rod = jn.Body([0, 0], -1.5, mass=1.0, inertia=0.1, center_of_mass=[0.5, 0])
     return jn.Mechanism(
-        space="planar", gravity=[0, -9.81], bodies={"rod": rod}, joints=joints, outputs={"a": jn.AngleOutput("rod")}
+        space="planar",
+        gravity=[0, -9.81],
+        bodies={"rod": rod},
+        joints=joints,
+        outputs={"a": jn.outputs.AngleOutput("rod")},
     )
 
 
@@ -45,13 +49,15 @@ MAKERS = {
     "CurveBranch": lambda: made("Curve").branches[0],
     "Simulation": lambda: jn.simulate(pendulum(), [0.0, 0.1], order=2),
     "RobotSimulation": lambda: jn.simulate(ROBOT, [0.0, 0.1], order=2, state=np.zeros((2, 2))),
-    "Batch": lambda: jn.Batch(U, {"l": U[:2]}, {"a": np.zeros((2, 9, 3))}, np.zeros((2, 9), int), np.ones(2, int)),
+    "Batch": lambda: jn.integrate.Batch(
+        U, {"l": U[:2]}, {"a": np.zeros((2, 9, 3))}, np.zeros((2, 9), int), np.ones(2, int)
+    ),
     "Equilibrium": lambda: jn.equilibrium(pendulum()),
-    "Linearisation": lambda: jn.linearise(pendulum()),
-    "Modes": lambda: made("Linearisation").modes,
+    "Linearization": lambda: jn.linearize(pendulum()),
+    "Modes": lambda: made("Linearization").modes,
     "LimitReport": lambda: jn.check_limits(ROBOT, TRAJECTORY),
     "LimitReport, no limits": lambda: jn.check_limits(FREE, TRAJECTORY),
-    "OptimisedDesign": lambda: jn.OptimisedDesign(
+    "OptimizedDesign": lambda: jn.OptimizedDesign(
         four_bar(),
         {"BC": 0.142},
         1.3,
@@ -65,14 +71,18 @@ MAKERS = {
         20,
     ),
     "RetimedTrajectory": lambda: jn.retime(ROBOT, [[0.0, 0.0], [1.0, 1.0]]),
-    "ToolPath": lambda: jn.ToolPath(["1.5 - 0.3*t", "0.3*t", "0"], start=0.0, stop=1.0),
-    "ToolPathMotion": lambda: jn.follow_tool_path(
+    "ToolPath": lambda: jn.planning.ToolPath(["1.5 - 0.3*t", "0.3*t", "0"], start=0.0, stop=1.0),
+    "ToolPathMotion": lambda: jn.planning.follow_tool_path(
         ROBOT, "end", made("ToolPath"), point=[1.0, 0, 0], start=[0.7, -1.4], time=[0.5], order=1
     ),
     "JointPoses": lambda: jn.inverse_kinematics(ROBOT, "end", [1.5, 0.1, 0.0], point=[1.0, 0, 0]),
-    "Feedforward": lambda: jn.feedforward(ROBOT, TRAJECTORY, {"a": jn.Drive(stiffness=100.0, rotor_inertia=0.1)}),
+    "Feedforward": lambda: jn.planning.feedforward(
+        ROBOT, TRAJECTORY, {"a": jn.planning.Drive(stiffness=100.0, rotor_inertia=0.1)}
+    ),
     "Mobility": lambda: jn.mobility(four_bar()),
-    "PlateCam": lambda: jn.plate_cam("0.01*(1 - cos(t))", jn.TranslatingFollower("roller", radius=0.005), 0.03),
+    "PlateCam": lambda: jn.cams.plate_cam(
+        "0.01*(1 - cos(t))", jn.cams.TranslatingFollower("roller", radius=0.005), 0.03
+    ),
 }
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import jounce as jn
 
 q, law = np.zeros((3, 2)), jn.JointTrajectory({"pin": "t"}, start=0.0, stop=1.0)
-path = jn.ToolPath(["t", 0.0, 0.0], start=0.0, stop=1.0)
+path = jn.planning.ToolPath(["t", 0.0, 0.0], start=0.0, stop=1.0)
 calls = {
     "mass_matrix": (q[0],), "bias_forces": (q,), "inverse_dynamics": (q,), "forward_dynamics": (q[:2], q[:1]),
     "forward_kinematics": (q, "hand"), "jacobian": (q, "hand"), "center_of_mass": (q,), "joint_wrenches": (q,),
@@ -30,7 +30,7 @@ for name, arguments in calls.items():
             told.setdefault(name, set()).add(str(error).partition(", got ")[0])
 try:
     jn.bias_forces(jn.load_robot("examples/robots/ur5.urdf"), np.zeros((2, 6)), parts=None)
-except jn.RobotError as error:
+except jn.errors.RobotError as error:
     told["parts"] = {str(error)}
 print(json.dumps({name: sorted(words) for name, words in told.items()}))
 """

@@ -40,7 +40,7 @@ def test_of_a_lower_bound_the_sides_are_turned():
 
 
 @pytest.mark.parametrize(
-    "minimise, subject_to, kind, words",
+    "minimize, subject_to, kind, words",
     [
         ("peak(phi, 4)", [], ExpressionError, "unknown name 'phi'.*quantities: psi, C_x, C_y"),
         ("peak(C, 4)", [], ExpressionError, "'C' has components; take C_x or C_y"),
@@ -64,9 +64,9 @@ def test_of_a_lower_bound_the_sides_are_turned():
         ("__import__('os')", [], ExpressionError, "a string is not allowed|unknown function"),
     ],
 )
-def test_what_cannot_be_read_is_told_before_anything_is_solved(minimise, subject_to, kind, words):
+def test_what_cannot_be_read_is_told_before_anything_is_solved(minimize, subject_to, kind, words):
     with pytest.raises(kind, match=words):
-        jn.optimise(FOUR_BAR, minimise, LENGTHS, subject_to)
+        jn.optimize(FOUR_BAR, minimize, LENGTHS, subject_to)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_what_cannot_be_read_is_told_before_anything_is_solved(minimise, subject
 )
 def test_bounds_are_checked(vary, words):
     with pytest.raises(JounceError, match=words):
-        jn.optimise(FOUR_BAR, "peak(psi)", vary)
+        jn.optimize(FOUR_BAR, "peak(psi)", vary)
 
 
 LIKE_NAMED = jn.Mechanism(
@@ -94,16 +94,16 @@ LIKE_NAMED = jn.Mechanism(
     joints={"O": jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])},
     drivers={"theta": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion="angle + rate*t")},
     outputs={
-        "angle": jn.AngleOutput("crank"),
-        "other": jn.AngleOutput("crank"),
-        "tip": jn.PointOutput("crank", ["L", 0]),
+        "angle": jn.outputs.AngleOutput("crank"),
+        "other": jn.outputs.AngleOutput("crank"),
+        "tip": jn.outputs.PointOutput("crank", ["L", 0]),
     },
     time=jn.TimeGrid(0.0, 1.0, count=5),
 )
 
 
 @pytest.mark.parametrize(
-    "minimise, words",
+    "minimize, words",
     [
         ("peak(angle, 1)", "'angle' is a parameter and an output of this mechanism; give one of them another name"),
         ("rate*angle", "'angle' is a parameter and an output"),
@@ -114,9 +114,9 @@ LIKE_NAMED = jn.Mechanism(
         ("peak(other_d9999)", "unknown name 'other_d9999'"),
     ],
 )
-def test_names_that_mean_two_things_and_derivatives_that_are_too_high_are_refused(minimise, words):
+def test_names_that_mean_two_things_and_derivatives_that_are_too_high_are_refused(minimize, words):
     with pytest.raises(ExpressionError, match=words):
-        jn.optimise(LIKE_NAMED, minimise, {"rate": (1.0, 3.0)})
+        jn.optimize(LIKE_NAMED, minimize, {"rate": (1.0, 3.0)})
 
 
 @pytest.mark.parametrize(
@@ -138,7 +138,7 @@ def test_the_side_without_a_measure_is_the_bound(text, bound_left):
 
 def test_bounds_may_be_one_text_as_on_the_command_line():
     with pytest.raises(ExpressionError, match="unknown name 'psii'"):
-        jn.optimise(FOUR_BAR, "peak(psii)", {"BC": "12cm:16cm"})
+        jn.optimize(FOUR_BAR, "peak(psii)", {"BC": "12cm:16cm"})
 
 
 def test_instants_must_be_the_same_in_all_designs():
@@ -148,8 +148,8 @@ def test_instants_must_be_the_same_in_all_designs():
         bodies={"crank": jn.Body([0.0, 0.0])},
         joints={"O": jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])},
         drivers={"theta": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion="t/tau")},
-        outputs={"angle": jn.AngleOutput("crank")},
+        outputs={"angle": jn.outputs.AngleOutput("crank")},
         time=jn.TimeGrid(0.0, "tau", count=11),
     )
     with pytest.raises(MechanismError, match="must be the same in all designs"):
-        jn.optimise(crank, "peak(angle)", {"tau": (1.0, 2.0)})
+        jn.optimize(crank, "peak(angle)", {"tau": (1.0, 2.0)})

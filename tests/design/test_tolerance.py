@@ -136,7 +136,7 @@ def test_euler_angles_next_to_half_a_turn_have_the_spread_of_any_others():
         bodies={"rod": rod},
         joints={"O": rod_pin},
         drivers={"turn": motor},
-        outputs={"attitude": jn.EulerAnglesOutput("rod", "zyx")},
+        outputs={"attitude": jn.outputs.EulerAnglesOutput("rod", "zyx")},
     )
     spread = jn.tolerance(mechanism, {"e": "normal:0.02"}, [0.0, 1.0], 0, samples=16, linear=False)
     alpha = spread.sel(euler_angle="alpha", derivative=0)

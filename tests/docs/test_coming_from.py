@@ -62,7 +62,7 @@ def crank(law="0.3*sin(2*t)", **more):
         gravity=[0, -9.81],
         bodies={"crank": jn.Body([0, 0], mass=2.0, inertia=0.1, center_of_mass=[0.5, 0])},
         joints={"O": jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])},
-        outputs={"tip": jn.PointOutput("crank", [1.0, 0.0]), "angle": jn.AngleOutput("crank")},
+        outputs={"tip": jn.outputs.PointOutput("crank", [1.0, 0.0]), "angle": jn.outputs.AngleOutput("crank")},
         time=TIME,
         **({"drivers": {"theta": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", law)}} if law else {}),
         **more,
@@ -181,7 +181,7 @@ def _():
     joints = {name: jn.planar.Revolute(("ground", name), [k, 0], [0, 0]) for k, name in enumerate(wheels)}
     joints["gear"] = jn.planar.Gear(("sun", "planet", "ground"), ratio=-2.0)
     turn = {"turn": jn.drivers.CoordinateDriver(("ground", "sun"), "angle", "3*t")}
-    outputs = {name: jn.AngleOutput(name) for name in wheels}
+    outputs = {name: jn.outputs.AngleOutput(name) for name in wheels}
     found = jn.solve(jn.Mechanism(space="planar", bodies=wheels, joints=joints, drivers=turn, outputs=outputs), TIME)
     assert abs(found.outputs["planet"][1, 1] / found.outputs["sun"][1, 1]) in (pytest.approx(2.0), pytest.approx(0.5))
     assert found.outputs["planet"][1, 1] < 0
@@ -418,7 +418,7 @@ def _(panda):
 @row(PINOCCHIO, "`computeKineticEnergy`")
 def _(panda):
     expected = pin.computeKineticEnergy(panda.model, panda.model.createData(), *panda.q[:2])
-    near(jn.kinetic_energy(panda.robot, panda.q[:2], drives=False).total[0], expected)
+    near(jn.energy.kinetic_energy(panda.robot, panda.q[:2], drives=False).total[0], expected)
 
 
 @row(PINOCCHIO, "`centerOfMass`")
@@ -426,7 +426,7 @@ def _(panda):
     robot, base = panda.robot, panda.robot.base_inertia
     there = pin.centerOfMass(panda.model, panda.model.createData(), panda.q[0])
     moving, fixed = robot.mass - base.mass, base.mass * base.center_of_mass
-    near(jn.center_of_mass(robot, panda.q)[0], (moving * there + fixed) / robot.mass)
+    near(jn.robot.center_of_mass(robot, panda.q)[0], (moving * there + fixed) / robot.mass)
 
 
 @row(PINOCCHIO, "a continuous joint as (cos, sin)")
@@ -613,13 +613,13 @@ def _():
     for law, angle in (
         ("2*t", 2 * TIME),
         (lambda t: t * t, TIME**2),
-        (jn.SplineMotion(times, times**2), TIME**2),
-        (jn.CycloidalMotion(0.0, 1.0, 1.0), TIME - np.sin(2 * np.pi * TIME) / (2 * np.pi)),
+        (jn.laws.SplineMotion(times, times**2), TIME**2),
+        (jn.laws.CycloidalMotion(0.0, 1.0, 1.0), TIME - np.sin(2 * np.pi * TIME) / (2 * np.pi)),
     ):
         near(resolve_motion(crank(law).drivers["theta"].motion, {})(jn.Jet.variable(TIME, 0)).coefficients[0], angle)
 
 
-row(LINKAGES, "optimisation over dimensions")(HELD[ADAMS, "design variables"])
+row(LINKAGES, "optimization over dimensions")(HELD[ADAMS, "design variables"])
 row(LINKAGES, "planar")(HELD[MATLAB, "Revolute Joint, Prismatic Joint"])
 
 

@@ -14,6 +14,7 @@ ROOT = pathlib.Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs" / "reference").glob("*.md"))
 PACKAGES = ("design", "dynamics", "forces", "integrate", "jet", "kinematics", "papers", "planning", "plot", "rigid")
 PACKAGES += ("robot", "sweeps", "trajectory", "viewer")
+MODULES = ("cams", "energy", "joints", "laws", "outputs")  # names of several packages, under subjects
 CATALOGUES = ("planar", "spatial", "drivers")
 ALIASES = {"Scalar", "Vector", "Law", "Laws"}  # annotations of fields, told of in the text
 HELPERS = {"check_animation", "check_figure", "check_report", "raise_for_status", "takes_stretches"}
@@ -45,12 +46,23 @@ def public():
     """Every public name, as short as it can be written."""
     top = {n for n in jn.__all__ if not n.startswith("_") and not isinstance(getattr(jn, n), types.ModuleType)}
     names = {f"jounce.{name}" for name in top - ALIASES}
+    for module in MODULES:
+        there = {n for n, value in vars(getattr(jn, module)).items() if not isinstance(value, types.ModuleType)}
+        there = {name for name in there - top - ALIASES - HELPERS if not name.startswith("_")}
+        names |= {f"jounce.{module}.{name}" for name in there}
+        top |= there
+    classes = {
+        name
+        for name, value in vars(jn.errors).items()
+        if getattr(value, "__module__", "") == "jounce.errors" and isinstance(value, type)
+    }
+    names |= {f"jounce.errors.{name}" for name in classes - top if not name.startswith("_")}
     for package in (*PACKAGES, *CATALOGUES):
         module = importlib.import_module(f"jounce.{package}") if package in PACKAGES else getattr(jn, package)
         for name, value in vars(module).items():
             mine = package in PACKAGES or getattr(value, "__module__", None) == module.__name__
             if mine and not name.startswith(("_", "jax")) and not isinstance(value, types.ModuleType):
-                names |= set() if name in top | HELPERS else {f"jounce.{package}.{name}"}
+                names |= set() if name in top | HELPERS | ALIASES else {f"jounce.{package}.{name}"}
     return names
 
 

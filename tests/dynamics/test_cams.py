@@ -125,21 +125,23 @@ def test_what_is_written_reads_the_same(tmp_path):
     ],
 )
 def test_what_cannot_lead_a_cam_is_named(tmp_path, motion, leader, words):
-    with pytest.raises(jn.MechanismFileError, match=words):
+    with pytest.raises(jn.errors.MechanismFileError, match=words):
         load(tmp_path, motion, leader)
 
 
 def test_a_joint_without_a_leader_and_a_driver_of_what_moves_freely_are_named(tmp_path):
-    with pytest.raises(jn.MechanismFileError, match=r"joints.cam.motion.of: a law under joints is a cam"):
+    with pytest.raises(jn.errors.MechanismFileError, match=r"joints.cam.motion.of: a law under joints is a cam"):
         load(tmp_path, text=FILE.replace(", of: LEADER", ""))
     text = FILE.replace("motion: w*t + 0.3*sin(5*t)", "motion: {expression: t, of: theta}")
-    with pytest.raises(jn.MechanismFileError, match=r"drivers.shaft.motion.of: is no driver: what moves by itself"):
+    with pytest.raises(
+        jn.errors.MechanismFileError, match=r"drivers.shaft.motion.of: is no driver: what moves by itself"
+    ):
         load(tmp_path, text=text)
 
 
 def test_a_law_that_ends_before_its_leader_is_named_before_any_computing(tmp_path):
     mechanism = load(tmp_path, "piecewise: [{until: 90 deg, expression: rise}]")
-    with pytest.raises(jn.MechanismError, match=r"joints.cam.motion: its leader goes from 0 to "):
+    with pytest.raises(jn.errors.MechanismError, match=r"joints.cam.motion: its leader goes from 0 to "):
         jn.solve(mechanism, [0.0, 1.0])
 
 
@@ -153,12 +155,12 @@ def test_breaks_of_a_cam_are_found_where_its_shaft_passes_them(tmp_path):
 
 def test_what_is_no_cam_is_refused():
     pin = planar.Revolute(("ground", "a"), [0, 0], [0, 0])
-    with pytest.raises(jn.MechanismError, match="must be a driver, whose law is that of the cam"):
-        jn.Cam(pin, pin)
+    with pytest.raises(jn.errors.MechanismError, match="must be a driver, whose law is that of the cam"):
+        jn.joints.Cam(pin, pin)
     lift = drivers.CoordinateDriver(("ground", "b"), "y", "t")
-    with pytest.raises(jn.MechanismError, match="has no coordinate that a cam could follow"):
-        jn.Cam(lift, planar.DoubleRevolute(("a", "b"), [0, 0], [0, 0], 1.0))
-    renamed = dataclasses.replace(jn.Cam(lift, pin), bodies=("ground", "c", "d"))
+    with pytest.raises(jn.errors.MechanismError, match="has no coordinate that a cam could follow"):
+        jn.joints.Cam(lift, planar.DoubleRevolute(("a", "b"), [0, 0], [0, 0], 1.0))
+    renamed = dataclasses.replace(jn.joints.Cam(lift, pin), bodies=("ground", "c", "d"))
     assert (renamed.follower.bodies, renamed.leader.bodies) == (("ground", "c"), ("ground", "d"))
 
 

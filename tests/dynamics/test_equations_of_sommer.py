@@ -233,7 +233,7 @@ def test_appendix_17_to_34_the_spherical(ball):
 
 def test_driver_of_equation_056():
     start, delta, tau = 0.5, 1.1, 2.0
-    law = jn.ExpressionMotion("start + delta*sin(2*pi*t/tau)", {"start": start, "delta": delta, "tau": tau})
+    law = jn.laws.ExpressionMotion("start + delta*sin(2*pi*t/tau)", {"start": start, "delta": delta, "tau": tau})
     found = np.array(law(jn.Jet.variable(0.37, order=4)).derivatives())
     near(found, planar.equation_056(0.37, start, delta, tau))
     pair = Pair(lambda p: jn.drivers.CoordinateDriver(("i", "j"), "angle", "0.5 + 1.1*sin(pi*t)"), "planar")

@@ -28,7 +28,7 @@ def test_sprung_four_bar_stands_where_lagrange_says_in_any_unit_and_frame(size, 
     expected, square = SprungFourBar().rest(crank_angle(found, turn))
     assert abs(crank_angle(found, turn) - expected) < 1e-12
     assert square > 0
-    assert isinstance(found, jn.Equilibrium)
+    assert isinstance(found, jn.dynamics.Equilibrium)
     assert found.stable
     assert found.stability == "stable"
     assert found.cautions == ()
@@ -49,7 +49,7 @@ def test_settling_goes_where_energy_falls_and_newton_to_any_equilibrium():
 
 @pytest.mark.slow
 def test_all_equilibria_of_a_double_pendulum_are_found():
-    found = jn.equilibria(hanging_chain(2), starts=25, seed=3)
+    found = jn.dynamics.equilibria(hanging_chain(2), starts=25, seed=3)
     places = {tuple(np.round(np.sin([p["angle"] for p in one.poses.values()]), 9)): one.stability for one in found}
     assert places == {(-1, -1): "stable", (1, -1): "unstable", (-1, 1): "unstable", (1, 1): "unstable"}
     assert found[0].stability == "stable"
@@ -59,11 +59,11 @@ def test_all_equilibria_of_a_double_pendulum_are_found():
 def test_a_rod_turned_over_in_its_hinge_is_no_equilibrium():
     rod = jn.Body([0, 0, 0], mass=1.0, center_of_mass=[0, 0, -1.0], inertia=[0.1, 0.1, 0.1])
     pin = spatial.Revolute(("ground", "rod"), [0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 1, 0])
-    tip = jn.PointOutput("rod", [1, 0, -1])
+    tip = jn.outputs.PointOutput("rod", [1, 0, -1])
     pendulum = jn.Mechanism(
         space="spatial", bodies={"rod": rod}, joints={"pin": pin}, outputs={"tip": tip}, gravity=[0, 0, -9.81]
     )
-    found = jn.equilibria(pendulum, starts=12)
+    found = jn.dynamics.equilibria(pendulum, starts=12)
     assert [one.stability for one in found] == ["stable", "unstable"]
     np.testing.assert_allclose([one.outputs["tip"] for one in found], [[1, 0, -1], [-1, 0, 1]], atol=1e-12)
 
@@ -71,7 +71,7 @@ def test_a_rod_turned_over_in_its_hinge_is_no_equilibrium():
 @pytest.mark.slow
 def test_all_equilibria_of_a_robot():
     robot = jn.load_robot("examples/robots/planar_arm.xml")
-    found = jn.equilibria(robot, starts=10, hold="ram")  # each link straight up or down
+    found = jn.dynamics.equilibria(robot, starts=10, hold="ram")  # each link straight up or down
     angles = np.array([[one.outputs[name] for name in ("shoulder", "elbow")] for one in found])
     directions = {tuple(np.round(np.sin(np.cumsum(row)), 9)) for row in angles}
     assert directions == {(-1, -1), (1, 1), (1, -1), (-1, 1)}
@@ -83,7 +83,7 @@ def test_all_equilibria_of_a_robot():
 
 @pytest.mark.slow
 def test_all_equilibria_of_the_sprung_four_bar_are_zeros_of_the_slope_of_its_energy():
-    found = jn.equilibria(sprung_four_bar(), starts=12, seed=1)
+    found = jn.dynamics.equilibria(sprung_four_bar(), starts=12, seed=1)
     above = [one for one in found if one.outputs["C"][1] > 0 and abs(crank_angle(one) - 2.0) < 1.5]
     assert len(above) >= 1
     for one in above:
@@ -170,8 +170,8 @@ def test_bad_input_is_named_before_anything_is_computed():
         (lambda: jn.equilibrium(pendulum, np.inf), "time"),
         (lambda: jn.equilibrium(pendulum, method="fall"), "method"),
         (lambda: jn.equilibrium(pendulum, without=["motor"]), "without"),
-        (lambda: jn.equilibria(pendulum, starts=-1), "starts"),
-        (lambda: jn.equilibria(pendulum, seed=0.5), "seed"),
+        (lambda: jn.dynamics.equilibria(pendulum, starts=-1), "starts"),
+        (lambda: jn.dynamics.equilibria(pendulum, seed=0.5), "seed"),
     ):
         with pytest.raises(MechanismError) as caught:
             call()
@@ -199,7 +199,7 @@ def test_a_spring_that_only_pushes_is_told_of_where_it_just_touches():
     found = jn.equilibrium(block)
     assert any("forces.bumper has a kink" in caution for caution in found.cautions)
     with pytest.raises(MechanismError, match="kink") as caught:
-        jn.linearise(found)
+        jn.linearize(found)
     assert caught.value.name == "forces.bumper"
 
 
@@ -211,7 +211,7 @@ def test_a_simulation_from_the_placed_mechanism_stays_there():
 
 
 @pytest.mark.slow
-def test_a_change_point_is_told_as_singular_and_not_linearised():
+def test_a_change_point_is_told_as_singular_and_not_linearized():
     # a parallelogram that hangs along its base, where it may turn into its crossed form
     body = {"mass": 1.0, "inertia": 0.1}
     place = [np.cos(0.7), np.sin(0.7)]
@@ -235,4 +235,4 @@ def test_a_change_point_is_told_as_singular_and_not_linearised():
     assert (found.stability, found.stable) == ("undetermined", None)
     assert np.allclose([pose["angle"] for pose in found.poses.values()], 0.0, atol=1e-9)
     with pytest.raises(MobilityError, match="the position is singular"):
-        jn.linearise(found)
+        jn.linearize(found)

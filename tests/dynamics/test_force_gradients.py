@@ -22,7 +22,7 @@ def arm(m, c, stiffness):
         joints={"O": jn.planar.Revolute(("ground", "arm"), [0, 0], [0, 0])},
         drivers={"turn": jn.drivers.CoordinateDriver(("ground", "arm"), "angle", motion="t**3")},
         forces={"spring": jn.forces.TorsionalSpring(("ground", "arm"), stiffness=stiffness, angle=0.0)},
-        outputs={"torque": jn.DriverTorqueOutput("turn"), "energy": jn.KineticEnergyOutput()},
+        outputs={"torque": jn.outputs.DriverTorqueOutput("turn"), "energy": jn.outputs.KineticEnergyOutput()},
     )
 
 
@@ -52,9 +52,9 @@ def test_energies_springs_and_bearings_of_an_arm():
         pin = jn.joint_reaction(motion, "O", frame="body")
         return {
             "kinetic": motion.outputs["energy"][:, 0],
-            "total": jn.kinetic_energy(motion).total.sel(derivative=0).data,
+            "total": jn.energy.kinetic_energy(motion).total.sel(derivative=0).data,
             "potential": jn.dynamics.potential_energy(motion).sel(derivative=0).data,
-            "spring": jn.applied_force(motion, "spring").sel(derivative=0).data,
+            "spring": jn.dynamics.applied_force(motion, "spring").sel(derivative=0).data,
             "along": pin.force.sel(derivative=0, component="x").data,
         }
 
@@ -84,7 +84,7 @@ def point_masses(name, masses):
         bodies=bodies,
         joints=known.joints,
         drivers=known.drivers,
-        outputs={"torque": jn.DriverTorqueOutput("theta")},
+        outputs={"torque": jn.outputs.DriverTorqueOutput("theta")},
         parameters=known.parameters,
     )
 

@@ -127,7 +127,7 @@ def test_a_rack_presses_its_pinion_away_whichever_way_it_is_loaded(load):
 
 
 def test_a_pinion_off_the_pitch_line_of_its_rack_is_told_with_how_far():
-    with pytest.raises(jn.MechanismError, match=r"-0\.052 m to the left of the line.*-0\.05 m"):
+    with pytest.raises(jn.errors.MechanismError, match=r"-0\.052 m to the left of the line.*-0\.05 m"):
         jn.driver_force(jn.solve(rack("100", height=0.052), [0.0], 3), "motor")
 
 
@@ -165,7 +165,7 @@ def test_gradients_by_pitch_radii_count_all_turns():
         gears = wolfrom()
         out = dataclasses.replace(gears.joints["out"], radius_i=-0.046 + step, radius_j=0.016 - step)
         moved = dataclasses.replace(
-            gears, joints={**gears.joints, "out": out}, outputs={"ring": jn.AngleOutput("ring")}
+            gears, joints={**gears.joints, "out": out}, outputs={"ring": jn.outputs.AngleOutput("ring")}
         )
         return jn.solve(moved, [0.0, 2.0], 1).outputs["ring"][1, 0]
 
@@ -185,7 +185,7 @@ def test_centers_that_are_not_at_the_sum_of_radii_are_told_with_the_gap():
         ({"sp": dataclasses.replace(gears.joints["sp"], pressure_angle=20.0)}, "from 0 to 45 deg"),
         ({"sp": dataclasses.replace(gears.joints["sp"], radius_i=0.0)}, "must not be zero"),
     ):
-        with pytest.raises(jn.MechanismError, match=words):
+        with pytest.raises(jn.errors.MechanismError, match=words):
             jn.solve(dataclasses.replace(gears, joints={**gears.joints, **change}), [0.0], 1)
 
 
@@ -199,7 +199,7 @@ def test_centers_that_are_not_at_the_sum_of_radii_are_told_with_the_gap():
     ],
 )
 def test_a_gear_has_one_of_two_forms(values, words):
-    with pytest.raises(jn.MechanismError, match=words):
+    with pytest.raises(jn.errors.MechanismError, match=words):
         planar.Gear(("a", "b"), **values)
 
 
@@ -217,7 +217,7 @@ def worm(ratio=-1 / 40, **joints):
         joints={**hinges, "mesh": spatial.Gear(("worm", "wheel", "ground"), X, Y, ratio), **joints},
         drivers={"motor": drivers.RotationDriver(("ground", "worm"), X, "100*t + 300*t**2")},
         forces={"load": forces.SpatialTorque(("ground", "wheel"), Y, "-10 - 0.5*v")},
-        outputs={"wheel": jn.RelativeAngleOutput(("ground", "wheel"), Y)},
+        outputs={"wheel": jn.outputs.RelativeAngleOutput(("ground", "wheel"), Y)},
     )
 
 
@@ -245,7 +245,7 @@ def test_what_carries_shafts_is_told_where_it_does_not():
         (worm(mesh=spatial.Gear(("worm", "wheel", "ground"), X, [0, 1, 0.1], 0.5)), "the second gear does not turn"),
         (worm(math.sqrt(2)), "whole numbers up to 1000"),
     ):
-        with pytest.raises(jn.MechanismError, match=words):
+        with pytest.raises(jn.errors.MechanismError, match=words):
             jn.solve(mechanism, [0.0], 1)
 
 
@@ -273,9 +273,9 @@ def differential():
         },
         forces={name: forces.SpatialTorque(("ground", name), Y, -180.0) for name in ("left", "right")},
         outputs={
-            "left": jn.RelativeAngleOutput(("ground", "left"), Y),
-            "right": jn.RelativeAngleOutput(("ground", "right"), Y),
-            "planet": jn.RelativeAngleOutput(("cage", "pin"), X),
+            "left": jn.outputs.RelativeAngleOutput(("ground", "left"), Y),
+            "right": jn.outputs.RelativeAngleOutput(("ground", "right"), Y),
+            "planet": jn.outputs.RelativeAngleOutput(("cage", "pin"), X),
         },
     )
 

@@ -39,7 +39,7 @@ def test_a_driver_takes_from_the_ground_what_it_gives_to_a_body(kind):
     np.testing.assert_allclose(on_ground.torque, -3.0 * pushed(), atol=1e-11)  # about the origin
     moved = jn.joint_reaction(motion, "motor", "ground", frame="ground", point=[2.0, 0.7])
     np.testing.assert_allclose(moved.torque, -pushed(), atol=1e-11)
-    np.testing.assert_allclose(jn.ground_reaction(motion).torque, -3.0 * pushed(), atol=1e-11)
+    np.testing.assert_allclose(jn.dynamics.ground_reaction(motion).torque, -3.0 * pushed(), atol=1e-11)
 
 
 def gears(load=10.0, cut=(-20.0, 0.0), **outputs):
@@ -64,7 +64,7 @@ def gears(load=10.0, cut=(-20.0, 0.0), **outputs):
 
 
 def test_a_ratio_acts_on_the_housing():
-    motion = jn.solve(gears(bearing=jn.JointForceOutput("a")), INSTANTS, order=2)
+    motion = jn.solve(gears(bearing=jn.outputs.JointForceOutput("a")), INSTANTS, order=2)
 
     def reaction(name, body):
         found = jn.joint_reaction(motion, name, body, point=ORIGIN)
@@ -77,8 +77,10 @@ def test_a_ratio_acts_on_the_housing():
     np.testing.assert_allclose(reaction("teeth", "pinion"), [0, 0, 2], atol=1e-12)
     np.testing.assert_allclose(reaction("teeth", "ground"), [-20, 0, 0], atol=1e-12)  # 0.1 m * 20 N - 2 N m about O
     np.testing.assert_allclose(reaction("load", "ground"), [0, 0, -10], atol=1e-12)
-    np.testing.assert_allclose(jn.ground_reaction(motion).force.values[0, 0], [-20, 0], atol=1e-12)
-    np.testing.assert_allclose(jn.ground_reaction(motion).torque.values[:, 0], [2, 2], atol=1e-12)  # 20 N at y = 0.1 m
+    np.testing.assert_allclose(jn.dynamics.ground_reaction(motion).force.values[0, 0], [-20, 0], atol=1e-12)
+    np.testing.assert_allclose(
+        jn.dynamics.ground_reaction(motion).torque.values[:, 0], [2, 2], atol=1e-12
+    )  # 20 N at y = 0.1 m
     assert motion.dataset["bearing"].attrs["comment"] == (
         "mesh, teeth are given by a ratio alone: bearings show no tooth forces"
     )
@@ -87,7 +89,7 @@ def test_a_ratio_acts_on_the_housing():
 
 
 def test_gears_without_load_are_not_told_of():
-    idle = gears(0.0, (0.0, -3.0), bearing=jn.JointForceOutput("a"))
+    idle = gears(0.0, (0.0, -3.0), bearing=jn.outputs.JointForceOutput("a"))
     assert "comment" not in jn.solve(idle, INSTANTS, order=2).dataset["bearing"].attrs
 
 
@@ -95,7 +97,7 @@ def test_the_total_is_unique_where_its_parts_are_not():
     pins = {f"pin_{x}": planar.Revolute(("ground", "lift"), [3.0 + x, 0], [float(x), 0]) for x in (0, 1)}
     motion = jn.solve(lift(joints=pins), [0.0], order=2)
     assert np.isnan(jn.joint_reaction(motion, "pin_0", "ground").force.values).any()
-    total = jn.ground_reaction(motion)
+    total = jn.dynamics.ground_reaction(motion)
     np.testing.assert_allclose(total.force.values[0, 0], [0, -20.0], atol=1e-12)
     np.testing.assert_allclose(total.torque.values[0, 0], -60.0, atol=1e-11)
 
@@ -110,7 +112,7 @@ def test_the_ground_carries_all_weight_at_rest():
     )
     motion = jn.equilibrium(held).motion
     np.testing.assert_allclose(jn.joint_reaction(motion, "spring", "ground").force.values[0, 0], [0, -20.0], atol=1e-9)
-    total = jn.ground_reaction(motion, [1.0, 5.0])
+    total = jn.dynamics.ground_reaction(motion, [1.0, 5.0])
     np.testing.assert_allclose(total.force.values[0, 0], [0, -20.0], atol=1e-9)
     np.testing.assert_allclose(total.torque.values[0, 0], -40.0, atol=1e-9)
 

@@ -108,7 +108,7 @@ def test_gear_pair_adds_the_inertia_of_the_other_shaft():
 
 @pytest.mark.slow
 def test_rolling_disc_needs_friction_for_its_spin():
-    # a disc of 3 kg, 0.5 kg m^2 and radius 0.4 on the x axis, pushed at its centre
+    # a disc of 3 kg, 0.5 kg m^2 and radius 0.4 on the x axis, pushed at its center
     bodies = ("ground", "disc")
     mechanism = jn.Mechanism(
         space="planar",
@@ -151,7 +151,7 @@ def test_free_motion_has_the_reactions_of_the_driven_one():
     for frame in ("global", "body"):
         expected, found = (jn.joint_reaction(m, "pin", frame=frame).force for m in (driven, motion))
         np.testing.assert_allclose(found, expected, atol=1e-11)
-    balance = jn.power_balance(motion)
+    balance = jn.energy.power_balance(motion)
     assert (np.abs(balance["residual"]) <= 1e-12 * balance["scale"].max()).all()
 
 
@@ -164,8 +164,8 @@ def test_springs_are_balanced_by_the_driver():
     angle = rates(law, TIME, 5)
     expected = 3.0 * (angle - [0.1, 0, 0, 0, 0])[:, :3] + 0.5 * angle[:, 1:4]
     np.testing.assert_allclose(jn.driver_force(motion, "turn"), expected, rtol=1e-12)
-    np.testing.assert_allclose(jn.applied_force(motion, "spring"), -expected, rtol=1e-12)
-    assert jn.applied_force(motion, "spring").attrs["units"] == "N*m"
+    np.testing.assert_allclose(jn.dynamics.applied_force(motion, "spring"), -expected, rtol=1e-12)
+    assert jn.dynamics.applied_force(motion, "spring").attrs["units"] == "N*m"
 
 
 @pytest.mark.slow
@@ -191,7 +191,7 @@ def test_bearing_of_an_unbalanced_rotor_in_space():
     force = mass * (a * along + w2 * np.cross(axis, along))
     np.testing.assert_allclose(bearing.force, force, atol=1e-12 * np.abs(force).max())
     moment = a * tensor[2] + w2 * np.cross(axis, tensor[2])
-    found = bearing.torque.values + torque[..., None] * axis  # about the centre of mass, bearing and motor together
+    found = bearing.torque.values + torque[..., None] * axis  # about the center of mass, bearing and motor together
     np.testing.assert_allclose(found, moment, atol=1e-12 * np.abs(moment).max())
     about_axis = (tensor[2, 2] + mass * (center[0] ** 2 + center[1] ** 2)) * a[..., 0]
     np.testing.assert_allclose(torque, about_axis, rtol=1e-12)
@@ -200,8 +200,8 @@ def test_bearing_of_an_unbalanced_rotor_in_space():
 @pytest.mark.slow
 def test_a_joint_of_ones_own_has_reactions():
     # a bead of 1.5 kg on y = 2 x^2: the wire pushes across itself only, and the driver does the work
-    class Wire(jn.AbstractConstraint, space="planar"):
-        curvature: jn.Scalar
+    class Wire(jn.joints.AbstractConstraint, space="planar"):
+        curvature: jn.joints.Scalar
 
         def residual(self, body_i, body_j, time):
             d = body_j.position - body_i.position
@@ -244,7 +244,7 @@ def test_reactions_of_a_chain_against_recursive_newton_euler():
     motion = jn.solve(robot.mechanism(drivers=laws), TIME, order=3)
     q = np.stack([motion.outputs[name] for name in "ABC"], axis=-1)
     for frame, axes in (("body", "link"), ("global", "base")):
-        expected = jn.joint_wrenches(robot, q, frame=axes)
+        expected = jn.robot.joint_wrenches(robot, q, frame=axes)
         for k, (name, link) in enumerate(zip("ABC", "abc", strict=True)):
             parts = [jn.joint_reaction(motion, j, link, frame, [0.0, 0.0, 0.0]) for j in (name, f"{name}_drive")]
             force = sum(part.force.values for part in parts)
@@ -265,5 +265,5 @@ def test_reactions_in_a_simulation():
     expected[:, 0] += [0.0, 9.81]
     force = jn.joint_reaction(simulation, "B").force.values[:, : expected.shape[1]]
     np.testing.assert_allclose(force, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
-    balance = jn.power_balance(simulation)
+    balance = jn.energy.power_balance(simulation)
     assert (np.abs(balance["residual"]) <= 1e-12 * balance["scale"].max("time")).all()

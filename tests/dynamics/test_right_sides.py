@@ -202,7 +202,7 @@ def check_right_sides(mechanism, equations, f, instant=0, leave_out=()):
 
 
 def random_state(mechanism, random, order=ORDER - 1, size=0.1):
-    """Return a state that fulfils nothing."""
+    """Return a state that fulfills nothing."""
 
     def body():
         if mechanism.space == "planar":

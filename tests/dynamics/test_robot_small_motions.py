@@ -39,10 +39,10 @@ def test_names_and_shapes_that_do_not_fit_a_robot_are_refused():
         (lambda: jn.equilibrium(robot, torques={"wrist": 1.0}), RobotError, "torques"),
         (lambda: jn.equilibrium(robot, hold="all", torques={"elbow": 1.0}), RobotError, "torques.elbow"),
         (lambda: jn.equilibrium(robot, q=[0.0]), RobotError, "q"),
-        (lambda: jn.linearise(robot, q=[0.0, 0.0, 0.0]), RobotError, "q"),
-        (lambda: jn.linearise(robot, q=[0.0, np.nan]), RobotError, "q"),
-        (lambda: jn.linearise(robot, coordinates=["wrist"]), RobotError, "coordinates"),
-        (lambda: jn.linearise(jn.load("examples/double_pendulum.yaml"), q=[0.0]), MechanismError, "q"),
+        (lambda: jn.linearize(robot, q=[0.0, 0.0, 0.0]), RobotError, "q"),
+        (lambda: jn.linearize(robot, q=[0.0, np.nan]), RobotError, "q"),
+        (lambda: jn.linearize(robot, coordinates=["wrist"]), RobotError, "coordinates"),
+        (lambda: jn.linearize(jn.load("examples/double_pendulum.yaml"), q=[0.0]), MechanismError, "q"),
         (lambda: jn.equilibrium(jn.load("examples/double_pendulum.yaml"), hold="all"), MechanismError, "hold"),
     ):
         with pytest.raises(kind) as caught:
@@ -55,7 +55,7 @@ def test_matrices_of_an_arm_that_moves_are_the_derivatives_of_its_inverse_dynami
     robot = arm(damping=0.3, armature=0.02)
     state = np.array([[0.4, -1.1], [1.3, -0.7], [2.0, 0.9]])
     for drives in (False, True):
-        small = jn.linearise(robot, q=state, drives=drives)
+        small = jn.linearize(robot, q=state, drives=drives)
         expected = slopes(robot, state, drives=drives)
         for matrix, slope in zip((small.stiffness, small.damping, small.mass), expected, strict=True):
             assert np.allclose(matrix, slope, atol=1e-8)
@@ -71,7 +71,7 @@ def test_an_arm_hangs_where_gravity_needs_no_torque_and_swings_there():
     still = np.stack([q, 0 * q, 0 * q])
     assert np.abs(jn.inverse_dynamics(robot, still)).max() < 1e-12
     assert rest.stability == "stable"
-    small = jn.linearise(rest)
+    small = jn.linearize(rest)
     assert small.coordinates == ("shoulder", "elbow")
     expected = slopes(robot, still)
     squares = np.linalg.eigvals(np.linalg.solve(expected[2], expected[0]))
@@ -95,7 +95,7 @@ def test_held_joints_have_the_torques_of_inverse_dynamics_and_given_torques_move
 @pytest.mark.slow
 def test_a_robot_with_loops_has_the_stiffness_of_the_torques_that_hold_it():
     robot = jn.load_robot(FIVE_BAR)
-    small = jn.linearise(robot)
+    small = jn.linearize(robot)
     names = small.coordinates
     assert len(names) == 2
 
@@ -108,6 +108,6 @@ def test_a_robot_with_loops_has_the_stiffness_of_the_torques_that_hold_it():
         places = [{name: s * step * (name == names[k]) for name in names} for s in (1, -1)]
         slope = (torques(places[0]) - torques(places[1])) / (2 * step)
         assert np.allclose(slope, small.stiffness[:, k], atol=1e-7)
-    other = jn.linearise(robot, coordinates=["left_motor", "right_motor"])
+    other = jn.linearize(robot, coordinates=["left_motor", "right_motor"])
     values = [np.sort(np.linalg.eigvals(np.linalg.solve(x.mass, x.stiffness)).real) for x in (small, other)]
     assert values[0].shape == values[1].shape == (2,)

@@ -62,7 +62,7 @@ def third(p, q, p0, q0, r0):
 
 
 def mm(*values):
-    """Return millimetres, given as decimals in text, in metres."""
+    """Return millimeters, given as decimals in text, in metres."""
     found = [mpf(value) / 1000 for text in values for value in text.split()]
     return found if len(found) > 1 else found[0]
 

@@ -140,7 +140,7 @@ def test_a_motion_is_the_same_with_kept_programs(shelf):
         np.testing.assert_array_equal(after.outputs[name], values)
 
 
-def test_brief_programs_are_not_optimised_for_a_command_about_few_instants(shelf, monkeypatch):
+def test_brief_programs_are_not_optimized_for_a_command_about_few_instants(shelf, monkeypatch):
     options, compile_ = [], jax.stages.Lowered.compile
     monkeypatch.delenv("XLA_FLAGS", raising=False)  # by which tests have all of them compiled so
     monkeypatch.setattr(store_, "_many", False)
@@ -164,7 +164,7 @@ def test_brief_programs_are_not_optimised_for_a_command_about_few_instants(shelf
     assert len(shelf) == 2
 
 
-def test_all_programs_are_optimised_but_for_a_command(shelf):
+def test_all_programs_are_optimized_but_for_a_command(shelf):
     assert not store_.is_wanted_soon()
 
 

@@ -103,7 +103,7 @@ def test_what_has_no_rule_is_left_to_xla_and_told_once(monkeypatch):
     monkeypatch.setattr(backends, "_told", set())
     given, x = (np.arange(3.0),), np.random.default_rng(1).uniform(1.0, 2.0, (3, 5))
     function = Mapped(transformed)
-    with pytest.warns(jn.MachineCodeWarning, match="operation 'digamma'"):
+    with pytest.warns(jn.errors.MachineCodeWarning, match="operation 'digamma'"):
         program = function.program(given, (x,))
     assert program.backend == "xla"
     np.testing.assert_allclose(program((x,)), digamma(x) * given[0][:, None], rtol=1e-13)

@@ -36,7 +36,7 @@ pendulum = jn.Mechanism(
     space="planar",
     bodies={"rod": jn.Body([0, 0], mass=1.0, inertia=0.1, center_of_mass=[0.5, 0.0])},
     joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
-    outputs={"angle": jn.AngleOutput("rod")},
+    outputs={"angle": jn.outputs.AngleOutput("rod")},
     gravity=[0, -9.81],
 )
 jobs = [

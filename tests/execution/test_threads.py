@@ -117,7 +117,7 @@ def test_the_default_device_of_the_caller_is_that_of_its_threads():
 
 @pytest.mark.parametrize("count", [0, -1, 1.5, True, "two"])
 def test_no_number_of_threads(count):
-    with pytest.raises(jn.MechanismError, match="whole number above zero"):
+    with pytest.raises(jn.errors.MechanismError, match="whole number above zero"):
         thread_count(count)
 
 
@@ -128,5 +128,5 @@ def test_number_of_threads_from_the_environment(monkeypatch):
     assert thread_count() == 3
     assert thread_count(2) == 2
     monkeypatch.setenv(VARIABLE, "many")
-    with pytest.raises(jn.MechanismError, match=VARIABLE):
+    with pytest.raises(jn.errors.MechanismError, match=VARIABLE):
         thread_count()

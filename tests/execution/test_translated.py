@@ -84,7 +84,7 @@ def test_an_operation_without_code_is_left_to_xla(monkeypatch):
     def transformed(x):
         return jax.lax.digamma(x)
 
-    with pytest.warns(jn.MachineCodeWarning, match="digamma"):
+    with pytest.warns(jn.errors.MachineCodeWarning, match="digamma"):
         found = transformed(np.arange(1.0, 5.0))
     np.testing.assert_allclose(found, digamma(np.arange(1.0, 5.0)), rtol=1e-13)
 

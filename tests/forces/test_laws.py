@@ -58,7 +58,7 @@ def test_functions_and_motion_laws():
     np.testing.assert_allclose(damped(x, v, t).derivatives()[:, 0, 0], [-0.6 * 0.09, -2 * 0.09, 0, 0, 0], atol=1e-15)
     np.testing.assert_array_equal(FunctionLaw(lambda x, v, t: 7.0)(x, v, t).derivatives()[:, 0, 0], [7, 0, 0, 0, 0])
     times = np.linspace(0, 1, 11)
-    spline = TimeLaw(jn.SplineMotion(times, times**3, degree=5))
+    spline = TimeLaw(jn.laws.SplineMotion(times, times**3, degree=5))
     np.testing.assert_allclose(spline(x, v, t).derivatives()[:4, 0, 0], [0.027, 0.27, 1.8, 6], rtol=1e-11)
 
 
@@ -67,7 +67,7 @@ def test_numbers_are_stacked_and_expressions_of_one_text_too():
         "one": forces.Torque(("a", "b"), 1.0),
         "two": forces.Torque(("ground", "b"), 2),
         "first": forces.Torque(("a", "b"), "-k*v"),
-        "second": forces.Torque(("b", "a"), jn.Expression("-k*v")),
+        "second": forces.Torque(("b", "a"), jn.laws.Expression("-k*v")),
         "other": forces.Torque(("a", "b"), "-k*x"),
     }
     system, model = system_of(made, 2, {"k": 3.0})
@@ -155,14 +155,14 @@ def test_values_that_are_allowed():
     for law, wanted in (
         (np.array([1.0, 2.0]), [1.0, 2.0]),
         (lambda x, v, t: -v, [-1.5, 2.5]),
-        ([jn.FunctionMotion(jnp.sin), "t"], [np.sin(0.7), 0.7]),
+        ([jn.laws.FunctionMotion(jnp.sin), "t"], [np.sin(0.7), 0.7]),
     ):
         force = built(forces.PointForce("a", [0, 0], law)).force(x, v, t[0])
         np.testing.assert_allclose(np.ravel(force.coefficients[0]), wanted, rtol=1e-15)
 
 
 def test_a_parameter_may_not_hide_a_variable_of_a_law():
-    with pytest.raises(jn.MechanismError, match=r"forces\.F\.law: .*'x' .*variable"):
+    with pytest.raises(jn.errors.MechanismError, match=r"forces\.F\.law: .*'x' .*variable"):
         built(forces.Torque(BOTH, "-x"), parameters={"x": 1.0})
     built(forces.Torque(BOTH, "-v"), parameters={"x": 1.0})
 
@@ -190,17 +190,17 @@ def test_a_parameter_may_not_hide_a_variable_of_a_law():
     ],
 )
 def test_structure_of_forces(make, message):
-    with pytest.raises(jn.MechanismError, match=message):
+    with pytest.raises(jn.errors.MechanismError, match=message):
         make()
 
 
 def test_a_force_of_ones_own_joins_the_catalogue():
-    class Magnet(jn.AbstractForce, type="magnet"):
+    class Magnet(jn.forces.AbstractForce, type="magnet"):
         """Attraction of two points."""
 
-        point_i: jn.Vector
-        point_j: jn.Vector
-        strength: jn.Scalar
+        point_i: jn.joints.Vector
+        point_j: jn.joints.Vector
+        strength: jn.joints.Scalar
 
         def displacement(self, body_i, body_j, time):
             d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -211,7 +211,7 @@ def test_a_force_of_ones_own_joins_the_catalogue():
 
     for space in ("planar", "spatial"):
         assert forces.force_catalogue(space)["magnet"] is Magnet
-    for kind in (jn.Scalar, jn.Law, jn.Laws):
+    for kind in (jn.joints.Scalar, jn.forces.Law, jn.forces.Laws):
         assert kind.__metadata__
     built(Magnet(BOTH, *LINE, strength="2*s"), parameters={"s": 1.0})
     assert "magnet" not in forces.force_catalogue("neither")

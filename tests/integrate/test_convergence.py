@@ -83,7 +83,7 @@ def test_back_in_time_to_the_start(method):
     back, _ = onwards(prepared, method, there, 0.0, tolerance)
     first = np.concatenate([np.asarray(part).ravel() for part in prepared.state])
     assert np.max(np.abs(ends(there)[:, 0] - first)) > 1
-    assert np.max(np.abs(ends(back)[:, 0] - first)) < 1000 * tolerance  # 2e-10 measured for Taylor: neighbours part
+    assert np.max(np.abs(ends(back)[:, 0] - first)) < 1000 * tolerance  # 2e-10 measured for Taylor: neighbors part
 
 
 @pytest.mark.slow

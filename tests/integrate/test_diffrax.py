@@ -38,7 +38,7 @@ def solved(term, state, equations, instants):
 @pytest.mark.slow
 def test_a_run_of_diffrax_agrees_with_taylor_series():
     mechanism = dynamics.double_pendulum(0.3, 1.0, 1.0, -2.0)
-    equation = jn.ode_term(mechanism)
+    equation = jn.integrate.ode_term(mechanism)
     instants = np.array([0.0, 0.35, STOP])
     solution = solved(equation.term, equation.state, equation.equations, jnp.asarray(instants))
     motion = equation.motion(solution.ts, solution.ys, order=3)
@@ -59,7 +59,7 @@ def tip_of_the_first(motion):
 
 @pytest.mark.slow
 def test_states_and_values_may_be_batched_and_differentiated():
-    equation = jn.ode_term(dynamics.double_pendulum(0.3, 1.0, 1.0, -2.0))
+    equation = jn.integrate.ode_term(dynamics.double_pendulum(0.3, 1.0, 1.0, -2.0))
     instants = jnp.array([STOP])
 
     def end(spin, gravity):
@@ -79,7 +79,7 @@ def test_states_and_values_may_be_batched_and_differentiated():
 
 @pytest.mark.slow
 def test_the_term_in_space_is_the_first_coefficients_of_the_series():
-    equation = jn.ode_term(dynamics.spatial_double_pendulum())
+    equation = jn.integrate.ode_term(dynamics.spatial_double_pendulum())
     rates = equation.term.vector_field(0.0, equation.state, equation.equations)
     assert isinstance(rates, State)
     motion = jn.simulate(equation.mechanism, [0.0], order=2)
@@ -100,4 +100,4 @@ def test_missing_diffrax_is_named(monkeypatch):
 
     monkeypatch.setattr(importlib, "import_module", refuse)
     with pytest.raises(MechanismError, match=r"jounce\[integrators\]"):
-        jn.ode_term(dynamics.simple_pendulum())
+        jn.integrate.ode_term(dynamics.simple_pendulum())

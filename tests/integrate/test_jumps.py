@@ -11,7 +11,7 @@ QUARTER = np.sqrt(2.0 / STRENGTH)  # s: from rest at 1 m to the middle
 
 
 def relay(time):
-    """Position of 1 kg at rest at 1 m, under a force of constant size towards zero."""
+    """Position of 1 kg at rest at 1 m, under a force of constant size toward zero."""
     s = np.mod(time, 4 * QUARTER)
     parts = [1 - STRENGTH * s**2 / 2, -1 + STRENGTH * (s - 2 * QUARTER) ** 2 / 2]
     parts.append(1 - STRENGTH * (s - 4 * QUARTER) ** 2 / 2)
@@ -27,7 +27,7 @@ def sled(law, motion="1.0"):
         joints={"rail": planar.Prismatic(("ground", "sled"), *rail)},
         forces={"push": forces.SlideForce(("ground", "sled"), *rail[:3], law)},
         initial={"go": drivers.SlideDriver(("ground", "sled"), *rail[:3], motion)},
-        outputs={"x": jn.PointOutput("sled", [0, 0])},
+        outputs={"x": jn.outputs.PointOutput("sled", [0, 0])},
     )
 
 
@@ -66,7 +66,7 @@ def test_dry_friction_at_turning_points():
     turns = phase + np.pi * np.arange(13)
     np.testing.assert_allclose([when for when, _ in motion.kinks], turns[turns < 40.0], rtol=0, atol=1e-12)
     count = np.searchsorted(turns, motion.time)  # turns so far
-    size = radius - 0.1 * count  # the centre leaps by twice 0.05 at each
+    size = radius - 0.1 * count  # the center leaps by twice 0.05 at each
     wanted = np.where(count % 2 == 0, -0.05, 0.05) + size * np.cos(motion.time - phase)
     assert np.abs(motion.outputs["x"][:, 0, 0] - wanted).max() < 1e-11
 

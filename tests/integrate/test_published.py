@@ -211,7 +211,7 @@ def test_spatial_slider_crank():
         check(motion.outputs["angle"][index], tables["coordinates"]["angle"][:, :4], 1e-9)
         check(motion.outputs["slide"][index][..., 0], tables["coordinates"]["slide"][:, :4], 1e-9)
         for k, axis in enumerate("xyz"):
-            check(motion.outputs["centre"][index][..., k], tables["rod"][axis][:, :4], 1e-9)
+            check(motion.outputs["center"][index][..., k], tables["rod"][axis][:, :4], 1e-9)
     # 8e-14 of the largest kinetic energy was measured over 96 turns; at the tolerance 1e-15 it was 5.5e-11
     energy_kept(motion, 1e-13, 0.468)
 
@@ -268,4 +268,4 @@ def test_stewart_platform_forces_with_rates():
         found = jn.driver_force(motion, f"leg{k}").to_numpy()[index, :3]
         check(found, tables["forces"][f"leg{k}"][:, :3], 1e-12)
     for k, axis in enumerate("xyz"):
-        check(motion.outputs["centre"][index][..., k], tables["centre"][axis][:, :5], 1e-12)
+        check(motion.outputs["center"][index][..., k], tables["center"][axis][:, :5], 1e-12)

@@ -25,7 +25,7 @@ def swing(time, order):
 
 @pytest.mark.slow
 def test_spring_and_damper_in_closed_form_with_events():
-    events = [jn.JointEvent("slide", direction=-1), jn.JointEvent("slide", derivative=1)]
+    events = [jn.integrate.JointEvent("slide", direction=-1), jn.integrate.JointEvent("slide", derivative=1)]
     law = {"slide": "-10*slide - 4*slide_d1"}
     found = jn.simulate(slider(), TIME, 4, state=[[1.0], [-1.0]], torque=law, events=events)
     assert np.abs(found.q[:, :, 0] - swing(TIME, 4)).max() <= 1e-11
@@ -49,8 +49,8 @@ def test_wrenches_of_state_and_time_in_closed_form():
     rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
     pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
     arm = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", rod)], [pin])
-    push = jn.Wrench("rod", lambda t: jnp.array([0.0, 0.0, 2 * jnp.sin(3 * t)]), point=[0.5, 0, 0], frame="link")
-    pull = jn.Wrench("rod", spring, point=[0.5, 0, 0])
+    push = jn.robot.Wrench("rod", lambda t: jnp.array([0.0, 0.0, 2 * jnp.sin(3 * t)]), point=[0.5, 0, 0], frame="link")
+    pull = jn.robot.Wrench("rod", spring, point=[0.5, 0, 0])
     found = jn.simulate(arm, TIME, 3, state=[[-1.5], [0.0]], wrenches=[push, pull])
     q, rate, second, third = found.q[:, :, 0].T
     sine, cosine, upright = np.sin(q), np.cos(q), -q - 0.2 * rate - 4.905
@@ -63,9 +63,9 @@ def test_wrenches_of_state_and_time_in_closed_form():
     work = np.trapezoid((np.sin(3 * fine) - (q + 0.2 * rate) * np.cos(q)) * rate, fine)
     assert np.isclose(found.energy[-1] - found.energy[0], work, rtol=0, atol=1e-6)
     for bad, words in (
-        ([jn.Wrench("base", [1, 0, 0])], "fixed to the base"),
-        ([jn.Wrench("rod", [[1, 0, 0]])], "three finite numbers"),
-        ([jn.Wrench("rod", lambda t: t)], "three components"),
+        ([jn.robot.Wrench("base", [1, 0, 0])], "fixed to the base"),
+        ([jn.robot.Wrench("rod", [[1, 0, 0]])], "three finite numbers"),
+        ([jn.robot.Wrench("rod", lambda t: t)], "three components"),
     ):
         with pytest.raises(jn.errors.RobotError, match=words):
             jn.simulate(arm, TIME, 2, wrenches=bad)
@@ -83,17 +83,17 @@ FLIGHT = np.array([0.0, 0.3, 0.6])
 
 def flown(robot, time, state, base, force):
     """Return a simulation with a force on the last link, also where it is zero: so the program is compiled once."""
-    wrench = jn.Wrench(robot.moving_links[-1], force)
+    wrench = jn.robot.Wrench(robot.moving_links[-1], force)
     return jn.simulate(robot, time, 2, state=state, base=base, wrenches=[wrench], drives=False)
 
 
 @pytest.mark.slow
-def test_force_on_a_free_base_moves_its_centre_of_mass():
+def test_force_on_a_free_base_moves_its_center_of_mass():
     robot = satellite()
     force = np.array([1.0, -2.0, 0.5])
-    base = jn.BaseMotion([0, 0, 0], [1, 0, 0, 0], np.zeros((1, 6)))
+    base = jn.robot.BaseMotion([0, 0, 0], [1, 0, 0, 0], np.zeros((1, 6)))
     found = flown(robot, FLIGHT, np.zeros((2, 2)), base, force)
-    own = jn.center_of_mass(robot, found.q[:, :1])[:, 0]
+    own = jn.robot.center_of_mass(robot, found.q[:, :1])[:, 0]
     w, x, y, z = found.base.quaternion.T
     turned = np.stack(
         [
@@ -102,9 +102,9 @@ def test_force_on_a_free_base_moves_its_centre_of_mass():
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
-    centre = found.base.position + np.einsum("ijt,tj->ti", turned, own)
-    expected = centre[0] + 0.5 * FLIGHT[:, None] ** 2 * force / robot.mass
-    assert np.abs(centre - expected).max() <= 1e-12
+    center = found.base.position + np.einsum("ijt,tj->ti", turned, own)
+    expected = center[0] + 0.5 * FLIGHT[:, None] ** 2 * force / robot.mass
+    assert np.abs(center - expected).max() <= 1e-12
 
 
 @pytest.mark.slow
@@ -125,7 +125,7 @@ def test_pulse_and_jumps_are_not_passed_over():
 @pytest.mark.slow
 def test_sticking_friction_ends_with_a_reason():
     robot = slider(friction=1.0)
-    with pytest.raises(jn.SolveError, match="a force of a joint switches without end at t = 1 s") as caught:
+    with pytest.raises(jn.errors.SolveError, match="a force of a joint switches without end at t = 1 s") as caught:
         jn.simulate(robot, TIME, 2, state=[[0.0], [0.5]], drives=True)
     assert caught.value.motion.q[4, 0, 0] == pytest.approx(0.25, abs=1e-9)
     assert caught.value.motion.status[-1] != Status.OK
@@ -156,7 +156,7 @@ def test_driven_joint_and_feedback():
         return -0.2 * rate
 
     found = jn.simulate(robot, TIME, 4, torque=damped, driven={names[1]: law}, drives=False)
-    expected = jn.ExpressionMotion(law)(jn.Jet.variable(TIME, 4)).derivatives().T
+    expected = jn.laws.ExpressionMotion(law)(jn.Jet.variable(TIME, 4)).derivatives().T
     assert np.abs(found.q[:, :, 1] - expected).max() <= 1e-12
     free = [0, 2]
     assert np.abs(found.torque[:, 0, free] + 0.2 * found.q[:, 1, free]).max() <= 1e-12
@@ -166,13 +166,13 @@ def test_driven_joint_and_feedback():
 @pytest.mark.slow
 def test_free_base_keeps_its_momenta_and_energy():
     robot = satellite()
-    base = jn.BaseMotion([0, 0, 0], [1, 0, 0, 0], [[0.1, 0.2, 0.3, 3.0, -1.0, 2.0]])
+    base = jn.robot.BaseMotion([0, 0, 0], [1, 0, 0, 0], [[0.1, 0.2, 0.3, 3.0, -1.0, 2.0]])
     found = flown(robot, FLIGHT, [[0.1, 0.2], [0.5, -0.5]], base, np.zeros(3))
     assert np.ptp(found.energy) <= 1e-12 * found.energy.max()
-    forces = jn.inverse_dynamics(robot, found.q, base=jn.BaseMotion(*vars(found.base).values()), drives=False)
+    forces = jn.inverse_dynamics(robot, found.q, base=jn.robot.BaseMotion(*vars(found.base).values()), drives=False)
     assert np.abs(forces[:, 0]).max() <= 1e-11  # nothing pushes the base, nor the joints
     assert np.abs((found.base.quaternion**2).sum(axis=1) - 1).max() <= 1e-14
-    there = jn.BaseMotion(found.base.position[-1], found.base.quaternion[-1], found.base.twist[-1, :1])
+    there = jn.robot.BaseMotion(found.base.position[-1], found.base.quaternion[-1], found.base.twist[-1, :1])
     again = flown(robot, FLIGHT[::-1], found.q[-1, :2], there, np.zeros(3))
     assert np.abs(again.q[-1, 0] - [0.1, 0.2]).max() <= 1e-9
     assert np.abs(again.base.position[-1]).max() <= 1e-9
@@ -180,15 +180,15 @@ def test_free_base_keeps_its_momenta_and_energy():
 
 def test_bad_input_is_told():
     robot = slider()
-    with pytest.raises(jn.RobotError, match="torque: no moving joint has this name"):
+    with pytest.raises(jn.errors.RobotError, match="torque: no moving joint has this name"):
         jn.simulate(robot, TIME, torque={"slider": 1.0})
-    with pytest.raises(jn.RobotError, match=r"the function must return an array of 1 forces"):
+    with pytest.raises(jn.errors.RobotError, match=r"the function must return an array of 1 forces"):
         jn.simulate(robot, TIME, torque=lambda t, q, v: jnp.zeros(3))
-    with pytest.raises(jn.ExpressionError, match="wheel"):
+    with pytest.raises(jn.errors.ExpressionError, match="wheel"):
         jn.simulate(robot, TIME, torque={"slide": "2*wheel"})
-    with pytest.raises(jn.RobotError, match=r"state: must hold q and q', the shape"):
+    with pytest.raises(jn.errors.RobotError, match=r"state: must hold q and q', the shape"):
         jn.simulate(robot, TIME, state=[0.0])
     with pytest.raises(jn.JounceError, match=r"torques: .*did you mean 'torque'"):
         jn.simulate(robot, TIME, torques=[1.0])
-    with pytest.raises(jn.RobotError, match=r"derivative"):
-        jn.JointEvent(lambda t, q, v: q[0], derivative=2)
+    with pytest.raises(jn.errors.RobotError, match=r"derivative"):
+        jn.integrate.JointEvent(lambda t, q, v: q[0], derivative=2)

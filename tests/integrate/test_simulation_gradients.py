@@ -23,7 +23,7 @@ PENDULUM = jn.Mechanism(
     bodies={"rod": jn.Body([0, 0], mass="m", inertia=INERTIA, center_of_mass=["c", 0])},
     joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
     initial={"rise": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion="lift")},
-    outputs={"angle": jn.AngleOutput("rod"), "tip": jn.PointOutput("rod", ["c", 0])},
+    outputs={"angle": jn.outputs.AngleOutput("rod"), "tip": jn.outputs.PointOutput("rod", ["c", 0])},
 )
 
 
@@ -94,7 +94,7 @@ def test_forces_that_are_zero_and_a_body_in_even_motion():
             name: jn.drivers.CoordinateDriver(("ground", "body"), name, motion=motion)
             for name, motion in {"x": "v*t", "y": "0", "angle": "0"}.items()
         },
-        outputs={"place": jn.PointOutput("body", [0, 0])},
+        outputs={"place": jn.outputs.PointOutput("body", [0, 0])},
     )
 
     def place(values):
@@ -167,7 +167,7 @@ def test_what_cannot_be_traced_is_told():
     def by_formulas(m):
         return jn.simulate(PENDULUM.with_parameters(m=m), TIME, method=jn.Obreshkov()).outputs["angle"][-1, 0]
 
-    with pytest.raises(jn.UnsupportedError, match=r"jn\.Taylor\(\)"):
+    with pytest.raises(jn.errors.UnsupportedError, match=r"jn\.Taylor\(\)"):
         jax.grad(by_formulas)(2.0)
 
 
@@ -182,11 +182,11 @@ def test_redundant_constraints_are_refused():
             "lower": jn.spatial.Revolute(("ground", "door"), [0, 0, 0], [0, 0, 0], **hinge),
             "upper": jn.spatial.Revolute(("ground", "door"), [0, 0, 0.8], [0, 0, 0.8], **hinge),
         },
-        outputs={"corner": jn.PointOutput("door", [1, 0, 0])},
+        outputs={"corner": jn.outputs.PointOutput("door", [1, 0, 0])},
     )
 
     def last(mass):
         return jn.simulate(door.with_parameters(m=mass), [0.0, 0.1], order=1).outputs["corner"][-1, 0, 0]
 
-    with pytest.raises(jn.MechanismError, match="gradients of mechanisms with redundant constraints"):
+    with pytest.raises(jn.errors.MechanismError, match="gradients of mechanisms with redundant constraints"):
         jax.grad(last)(3.0)

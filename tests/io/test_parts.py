@@ -31,12 +31,12 @@ def _three_stretches(monkeypatch):
 def turning():
     """A body that turns three times about an inclined axis, with outputs of every shape."""
     outputs = {
-        "angles": jn.EulerAnglesOutput("spindle", "zyx"),
-        "attitude": jn.EulerParametersOutput("spindle"),
-        "matrix": jn.RotationMatrixOutput("spindle"),
-        "p": jn.PointOutput("spindle", [1, 0, 0.5]),
-        "torque": jn.DriverTorqueOutput("turn"),
-        "energy": jn.KineticEnergyOutput(),
+        "angles": jn.outputs.EulerAnglesOutput("spindle", "zyx"),
+        "attitude": jn.outputs.EulerParametersOutput("spindle"),
+        "matrix": jn.outputs.RotationMatrixOutput("spindle"),
+        "p": jn.outputs.PointOutput("spindle", [1, 0, 0.5]),
+        "torque": jn.outputs.DriverTorqueOutput("turn"),
+        "energy": jn.outputs.KineticEnergyOutput(),
     }
     body = jn.Body([0, 0, 0], mass=2.0, inertia=[0.1, 0.2, 0.25])
     return dataclasses.replace(

@@ -130,7 +130,7 @@ PIECEWISE = {
 
 def derivatives(function, t, order):
     """Coefficients of the composition, under one jit (the rules run eagerly would compile one by one)."""
-    result = jax.jit(lambda t: jn.compose(function, jn.Jet.variable(t, order)).derivatives())(jnp.asarray(t))
+    result = jax.jit(lambda t: jn.jet.compose(function, jn.Jet.variable(t, order)).derivatives())(jnp.asarray(t))
     factorials = np.cumprod([1.0, *range(1, order + 1)])
     return np.array(result) / factorials
 
@@ -171,26 +171,26 @@ def test_high_order_of_a_law_with_rules_is_as_exact_as_jets_written_directly():
 
 def test_argument_is_any_jet_of_any_batch():
     x = jn.Jet([jnp.array([[0.1, 0.2, 0.3]]), jnp.full((1, 3), 2.0), None, jnp.ones((1, 3))])
-    result = jn.compose(lambda t: jnp.exp(jnp.sin(t)), x)
+    result = jn.jet.compose(lambda t: jnp.exp(jnp.sin(t)), x)
     assert result.shape == (1, 3)
     np.testing.assert_allclose(result.derivatives(), jet.exp(jet.sin(x)).derivatives(), rtol=1e-13)
 
 
 def test_every_instant_takes_its_own_branch():
     t = jn.Jet.variable(jnp.array([0.5, 1.5]), 2)
-    result = jn.compose(lambda t: jnp.where(t < 1, t**2, 3 * t), t)
+    result = jn.jet.compose(lambda t: jnp.where(t < 1, t**2, 3 * t), t)
     np.testing.assert_allclose(result.derivatives(), [[0.25, 4.5], [1.0, 3.0], [2.0, 0.0]])
 
 
 @pytest.mark.parametrize("function", [lambda t: 3.0, lambda t: 3, lambda t: jnp.asarray(3.0)])
 def test_constant_law(function):
     np.testing.assert_array_equal(
-        jn.compose(function, jn.Jet.variable(jnp.zeros(2), 2)).derivatives(), [[3, 3], [0, 0], [0, 0]]
+        jn.jet.compose(function, jn.Jet.variable(jnp.zeros(2), 2)).derivatives(), [[3, 3], [0, 0], [0, 0]]
     )
 
 
 def test_order_zero_is_the_function():
-    assert float(jn.compose(slider, jn.Jet.variable(AT, 0)).coefficients[0]) == pytest.approx(
+    assert float(jn.jet.compose(slider, jn.Jet.variable(AT, 0)).coefficients[0]) == pytest.approx(
         float(slider(AT)), rel=1e-15
     )
 
@@ -200,17 +200,19 @@ def test_order_zero_is_the_function():
 )
 def test_law_that_does_not_return_one_scalar(function):
     with pytest.raises(TypeError, match="one scalar"):
-        jn.compose(function, jn.Jet.variable(0.5, 2))
+        jn.jet.compose(function, jn.Jet.variable(0.5, 2))
 
 
 def test_jit_vmap_and_grad_through_composition():
     def third(t):
-        return jn.compose(slider, jn.Jet.variable(t, 3)).derivatives()[3]
+        return jn.jet.compose(slider, jn.Jet.variable(t, 3)).derivatives()[3]
 
     instants = jnp.array([0.5, 0.7])
     mapped = jax.vmap(third)(instants)
-    np.testing.assert_allclose(mapped, jn.compose(slider, jn.Jet.variable(instants, 3)).derivatives()[3], rtol=1e-13)
-    fourth = jn.compose(slider, jn.Jet.variable(AT, 4)).derivatives()[4]
+    np.testing.assert_allclose(
+        mapped, jn.jet.compose(slider, jn.Jet.variable(instants, 3)).derivatives()[3], rtol=1e-13
+    )
+    fourth = jn.jet.compose(slider, jn.Jet.variable(AT, 4)).derivatives()[4]
     assert float(jax.jit(jax.grad(third))(AT)) == pytest.approx(float(fourth), rel=1e-11)
 
 
@@ -223,7 +225,7 @@ def test_program_does_not_double_with_each_order(name):
     function, _ = (SMOOTH | PIECEWISE)[name]
 
     def size(order):
-        program = jax.make_jaxpr(lambda t: jn.compose(function, jn.Jet.variable(t, order)).derivatives())
+        program = jax.make_jaxpr(lambda t: jn.jet.compose(function, jn.Jet.variable(t, order)).derivatives())
         return len(str(program(jnp.asarray(AT))))
 
     assert size(6) < 3.5 * size(3)

@@ -252,7 +252,7 @@ def test_a_program_agrees_with_the_algebra_of_jets_to_a_high_order():
 
 def test_a_spline_is_followed_in_its_piece():
     times = np.linspace(0.0, 2.0, 15)
-    law = jn.SplineMotion(times, np.sin(3 * times), degree=5)
+    law = jn.laws.SplineMotion(times, np.sin(3 * times), degree=5)
     (path,) = paths((1, 6), order=5)
     path[0] = np.linspace(0.11, 1.93, 6)  # in six of the pieces
 

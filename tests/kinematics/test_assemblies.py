@@ -150,17 +150,17 @@ def _turn_between(first, second):
 
 
 def test_a_loop_that_cannot_close():
-    with pytest.raises(jn.AssemblyError, match="cannot be assembled"):
+    with pytest.raises(jn.errors.AssemblyError, match="cannot be assembled"):
         jn.assemblies(four_bar(1.0, 3.0, 2.5, 3.2).with_parameters(d=20.0), circuits=False)
 
 
 def test_degrees_of_freedom_that_are_left():
-    with pytest.raises(jn.MobilityError, match="infinitely many"):
+    with pytest.raises(jn.errors.MobilityError, match="infinitely many"):
         jn.assemblies(dataclasses.replace(four_bar(1.0, 3.0, 2.5, 3.2), drivers={}))
 
 
 def test_a_number_that_is_not_there():
-    with pytest.raises(jn.AssemblyError, match="2 were found"):
+    with pytest.raises(jn.errors.AssemblyError, match="2 were found"):
         jn.assemblies(four_bar(1.0, 3.0, 2.5, 3.2), circuits=False).number(3)
 
 
@@ -186,11 +186,11 @@ def test_a_motion_of_the_assembly_of_a_number():
 
 def test_a_wish_that_tells_nothing_apart():
     mechanism = dataclasses.replace(four_bar(1.0, 3.0, 2.5, 3.2), assembly={"crank": "above"})
-    with pytest.raises(jn.AssemblyError, match="assemblies 1 and 2 fit equally well"):
+    with pytest.raises(jn.errors.AssemblyError, match="assemblies 1 and 2 fit equally well"):
         jn.solve(mechanism, [0.0, 0.01])
 
 
 @pytest.mark.parametrize("wish", [0, True, "second", {}, {"rocker": "up"}, {"rockr": "above"}, 1.5])
 def test_wishes_that_make_no_sense(wish):
-    with pytest.raises(jn.MechanismError, match="assembly"):
+    with pytest.raises(jn.errors.MechanismError, match="assembly"):
         dataclasses.replace(four_bar(1.0, 3.0, 2.5, 3.2), assembly=wish)

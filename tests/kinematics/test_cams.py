@@ -11,7 +11,7 @@ DISC, OFF, ROLLER, COUNT = 0.03, 0.01, 0.008, 181
 
 
 def disc_law(follower, sense=1.0):
-    """The law of a follower on a disc of 30 mm, whose centre is 10 mm off the axis, towards y at the angle zero."""
+    """The law of a follower on a disc of 30 mm, whose center is 10 mm off the axis, toward y at the angle zero."""
 
     def center(t):
         return -OFF * np.sin(sense * t), OFF * np.cos(sense * t)
@@ -21,7 +21,7 @@ def disc_law(follower, sense=1.0):
     def coordinate(t):
         x, y = -OFF * jnp.sin(sense * t), OFF * jnp.cos(sense * t)
         reach = DISC + follower.radius
-        if isinstance(follower, jn.TranslatingFollower):
+        if isinstance(follower, jn.cams.TranslatingFollower):
             return y + DISC if follower.is_flat else y + jnp.sqrt(reach**2 - (follower.offset - x) ** 2)
         away = jnp.hypot(follower.center_distance - x, y)
         above = jnp.arctan2(y, follower.center_distance - x)
@@ -30,16 +30,16 @@ def disc_law(follower, sense=1.0):
         return above + jnp.arccos((follower.arm**2 + away**2 - reach**2) / (2 * follower.arm * away))
 
     start = follower.start(DISC - OFF)
-    return jn.FunctionMotion(lambda t: coordinate(t) - start), center
+    return jn.laws.FunctionMotion(lambda t: coordinate(t) - start), center
 
 
 FOLLOWERS = {
-    "flat": jn.TranslatingFollower("flat_face"),
-    "roller": jn.TranslatingFollower("roller", radius=ROLLER),
-    "offset roller": jn.TranslatingFollower("roller", radius=ROLLER, offset=0.006),
-    "edge": jn.TranslatingFollower("knife_edge", offset=-0.004),
-    "rocker with a roller": jn.OscillatingFollower("roller", center_distance=0.08, arm=0.07, radius=ROLLER),
-    "rocker with a face": jn.OscillatingFollower("flat_face", center_distance=0.08, face_offset=0.003),
+    "flat": jn.cams.TranslatingFollower("flat_face"),
+    "roller": jn.cams.TranslatingFollower("roller", radius=ROLLER),
+    "offset roller": jn.cams.TranslatingFollower("roller", radius=ROLLER, offset=0.006),
+    "edge": jn.cams.TranslatingFollower("knife_edge", offset=-0.004),
+    "rocker with a roller": jn.cams.OscillatingFollower("roller", center_distance=0.08, arm=0.07, radius=ROLLER),
+    "rocker with a face": jn.cams.OscillatingFollower("flat_face", center_distance=0.08, face_offset=0.003),
 }
 
 
@@ -57,7 +57,7 @@ def test_an_eccentric_disc_comes_back_from_its_law(name, sense):
     follower = FOLLOWERS[name]
     turn = 1.0 if sense == "counterclockwise" else -1.0
     law, _ = disc_law(follower, turn)
-    cam = jn.plate_cam(law, follower, DISC - OFF, sense=sense, count=COUNT)
+    cam = jn.cams.plate_cam(law, follower, DISC - OFF, sense=sense, count=COUNT)
     found = cam.table
     x, y = found.profile
     np.testing.assert_allclose(np.hypot(x, y - OFF), DISC, rtol=1e-12)
@@ -82,23 +82,23 @@ def test_an_eccentric_disc_comes_back_from_its_law(name, sense):
 @pytest.mark.slow
 def test_handbook_formulas_of_rollers_and_faces():
     """tan(pressure angle) = (s' - e)/(y0 + s) of an offset roller; R = base + s + s'' and contact s' under a face."""
-    law = jn.SegmentedMotion([
-        jn.Segment("cycloidal", 2.0, to=0.015), jn.Segment("dwell", 0.6), jn.Segment("polynomial_4_5_6_7", 2.2, to=0.0),
-        jn.Segment("dwell", 2 * math.pi - 4.8),
+    law = jn.laws.SegmentedMotion([
+        jn.laws.Segment("cycloidal", 2.0, to=0.015), jn.laws.Segment("dwell", 0.6),
+        jn.laws.Segment("polynomial_4_5_6_7", 2.2, to=0.0), jn.laws.Segment("dwell", 2 * math.pi - 4.8),
     ])  # fmt: skip
     base, offset = 0.03, 0.007
     angle = np.linspace(0.05, 6.2, 41)
     s, v, a = (np.asarray(x) for x in law(jn.Jet.variable(angle, 2)).derivatives())
-    roller = jn.plate_cam(law, jn.TranslatingFollower("roller", ROLLER, offset), base, count=COUNT)
+    roller = jn.cams.plate_cam(law, jn.cams.TranslatingFollower("roller", ROLLER, offset), base, count=COUNT)
     start = math.sqrt((base + ROLLER) ** 2 - offset**2)
     pressure = np.tan(roller.at(angle).pressure_angle)
     np.testing.assert_allclose(pressure, (v - offset) / (start + s), rtol=1e-12, atol=1e-14)
-    radial = jn.plate_cam(law, jn.TranslatingFollower("roller", ROLLER), base, count=COUNT)
+    radial = jn.cams.plate_cam(law, jn.cams.TranslatingFollower("roller", ROLLER), base, count=COUNT)
     r = base + ROLLER + s
     bend = (r * r + 2 * v * v - r * a) / (r * r + v * v) ** 1.5  # of a polar curve
     np.testing.assert_allclose(radial.at(angle).pitch_curvature, bend, rtol=1e-12)
     np.testing.assert_allclose(1 / radial.at(angle).curvature, 1 / bend - ROLLER, rtol=1e-10)
-    flat = jn.plate_cam(law, jn.TranslatingFollower("flat_face"), base, count=COUNT)
+    flat = jn.cams.plate_cam(law, jn.cams.TranslatingFollower("flat_face"), base, count=COUNT)
     np.testing.assert_allclose(1 / flat.at(angle).curvature, base + s + a, rtol=1e-11)
     np.testing.assert_allclose(flat.at(angle).contact, v, atol=1e-15)
     low, high = flat.face
@@ -106,18 +106,19 @@ def test_handbook_formulas_of_rollers_and_faces():
     assert high.angle == pytest.approx(1.0, abs=1e-6)
     assert low.value == pytest.approx(-2.1875 * 0.015 / 2.2, rel=1e-12)
     assert flat.continuity.smoothness == 2
-    mirrored = jn.plate_cam(
-        law, jn.TranslatingFollower("roller", ROLLER, -offset), base, sense="clockwise", count=COUNT
+    mirrored = jn.cams.plate_cam(
+        law, jn.cams.TranslatingFollower("roller", ROLLER, -offset), base, sense="clockwise", count=COUNT
     )
     np.testing.assert_allclose(mirrored.table.profile * [[-1], [1]], roller.table.profile, atol=1e-15)
 
 
 @pytest.mark.slow
 def test_undercut_is_told_with_the_angle_and_what_is_lost():
-    law = jn.SegmentedMotion([jn.Segment("cycloidal", 0.9, to=0.02), jn.Segment("cycloidal", 0.9, to=0.0),
-                              jn.Segment("dwell", 2 * math.pi - 1.8)])  # fmt: skip
-    for follower in (jn.TranslatingFollower("flat_face"), jn.TranslatingFollower("roller", 0.03)):
-        cam = jn.plate_cam(law, follower, 0.025, count=721)
+    law = jn.laws.SegmentedMotion([
+        jn.laws.Segment("cycloidal", 0.9, to=0.02), jn.laws.Segment("cycloidal", 0.9, to=0.0),
+        jn.laws.Segment("dwell", 2 * math.pi - 1.8)])  # fmt: skip
+    for follower in (jn.cams.TranslatingFollower("flat_face"), jn.cams.TranslatingFollower("roller", 0.03)):
+        cam = jn.cams.plate_cam(law, follower, 0.025, count=721)
         assert cam.is_undercut
         assert len(cam.undercuts) == (1 if follower.is_flat else 2)  # the roller has a part on each flank
         first, last = cam.undercuts[0], cam.undercuts[-1]
@@ -128,7 +129,7 @@ def test_undercut_is_told_with_the_angle_and_what_is_lost():
         assert cam.least_radius.value < 0
         rest = cam.angle > 3.0
         np.testing.assert_allclose(cam.followed_lift[rest], cam.table.lift[rest], atol=1e-12)
-    sound = jn.plate_cam(law, jn.TranslatingFollower("roller", 0.005), 0.1, count=721)
+    sound = jn.cams.plate_cam(law, jn.cams.TranslatingFollower("roller", 0.005), 0.1, count=721)
     assert not sound.is_undercut
     assert sound.least_concave_radius.value > 0
     least = sound.least_radius
@@ -138,10 +139,10 @@ def test_undercut_is_told_with_the_angle_and_what_is_lost():
 
 @pytest.mark.slow
 def test_units_do_not_matter():
-    fall = jn.Segment("cycloidal", 2 * math.pi - 3.0, to=0.0)
-    law, large = (jn.SegmentedMotion([jn.Segment("cycloidal", 3.0, to=x), fall]) for x in (0.02, 20.0))
-    first = jn.plate_cam(law, jn.TranslatingFollower("roller", 0.03), 0.02, count=361)
-    second = jn.plate_cam(large, jn.TranslatingFollower("roller", 30.0), 20.0, count=361)
+    fall = jn.laws.Segment("cycloidal", 2 * math.pi - 3.0, to=0.0)
+    law, large = (jn.laws.SegmentedMotion([jn.laws.Segment("cycloidal", 3.0, to=x), fall]) for x in (0.02, 20.0))
+    first = jn.cams.plate_cam(law, jn.cams.TranslatingFollower("roller", 0.03), 0.02, count=361)
+    second = jn.cams.plate_cam(large, jn.cams.TranslatingFollower("roller", 30.0), 20.0, count=361)
     assert len(first.undercuts) == len(second.undercuts)
     np.testing.assert_allclose(second.followed_lift, 1e3 * first.followed_lift, rtol=1e-9, atol=1e-9)
 
@@ -149,25 +150,25 @@ def test_units_do_not_matter():
 @pytest.mark.parametrize(
     "law, follower, options, words",
     [
-        ("0.01*t", jn.TranslatingFollower("flat_face"), {}, "does not close.*0.0628"),
-        ("-0.03*(1 - cos(t))", jn.TranslatingFollower("flat_face"), {}, "through the axis"),
-        ("0", jn.TranslatingFollower("roller", 0.01, offset=0.04), {}, "misses the cam"),
-        ("0", jn.OscillatingFollower("roller", 0.1, arm=0.2, radius=0.01), {}, "from 0.07 m to 0.13 m"),
-        ("0", jn.OscillatingFollower("flat_face", 0.01), {}, "more than 0.02 m"),
-        ("1/t", jn.TranslatingFollower("flat_face"), {}, "no finite value"),
-        ("0", jn.TranslatingFollower("flat_face"), {"sense": "left"}, "unknown sense"),
-        ("0", jn.TranslatingFollower("flat_face"), {"count": 3}, "from 16"),
+        ("0.01*t", jn.cams.TranslatingFollower("flat_face"), {}, "does not close.*0.0628"),
+        ("-0.03*(1 - cos(t))", jn.cams.TranslatingFollower("flat_face"), {}, "through the axis"),
+        ("0", jn.cams.TranslatingFollower("roller", 0.01, offset=0.04), {}, "misses the cam"),
+        ("0", jn.cams.OscillatingFollower("roller", 0.1, arm=0.2, radius=0.01), {}, "from 0.07 m to 0.13 m"),
+        ("0", jn.cams.OscillatingFollower("flat_face", 0.01), {}, "more than 0.02 m"),
+        ("1/t", jn.cams.TranslatingFollower("flat_face"), {}, "no finite value"),
+        ("0", jn.cams.TranslatingFollower("flat_face"), {"sense": "left"}, "unknown sense"),
+        ("0", jn.cams.TranslatingFollower("flat_face"), {"count": 3}, "from 16"),
     ],
 )
 def test_what_is_wrong_is_named(law, follower, options, words):
     with pytest.raises(jn.JounceError, match=words):
-        jn.plate_cam(law, follower, 0.02, **options)
+        jn.cams.plate_cam(law, follower, 0.02, **options)
 
 
 def test_followers_refuse_what_does_not_go_together():
-    with pytest.raises(jn.MechanismError, match="only a roller has a radius"):
-        jn.TranslatingFollower("flat_face", radius=0.01)
-    with pytest.raises(jn.TrajectoryError, match="greater than zero"):
-        jn.TranslatingFollower("roller")
-    with pytest.raises(jn.MechanismError, match="unknown shape"):
-        jn.TranslatingFollower("mushroom")
+    with pytest.raises(jn.errors.MechanismError, match="only a roller has a radius"):
+        jn.cams.TranslatingFollower("flat_face", radius=0.01)
+    with pytest.raises(jn.errors.TrajectoryError, match="greater than zero"):
+        jn.cams.TranslatingFollower("roller")
+    with pytest.raises(jn.errors.MechanismError, match="unknown shape"):
+        jn.cams.TranslatingFollower("mushroom")

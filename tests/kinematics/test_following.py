@@ -33,7 +33,7 @@ def twin_slider_cranks(law="6*t"):
         | {f"rod_{n}": planar.DoubleRevolute(("crank", n), ["a", 0], [0, 0], "b") for n in names}
         | {f"guide_{n}": planar.Prismatic(("ground", n), **guide) for n in names},
         drivers={"turn": drivers.CoordinateDriver(("ground", "crank"), "angle", law)},
-        outputs={n: jn.PointOutput(n, [0, 0]) for n in names},
+        outputs={n: jn.outputs.PointOutput(n, [0, 0]) for n in names},
     )
 
 
@@ -115,8 +115,8 @@ def test_change_point_at_the_end_of_a_grid():
 
 
 @pytest.mark.slow
-def test_dead_centre_touched_by_the_law_is_a_change_point():
-    """The crank goes on through the dead centre: cos(angle) follows from the position of the slider."""
+def test_dead_center_touched_by_the_law_is_a_change_point():
+    """The crank goes on through the dead center: cos(angle) follows from the position of the slider."""
     time = np.linspace(0, 3, 31)
     motion = jn.solve(slider_crank("4 - 0.5*cos(t)**2"), time, order=0)
     np.testing.assert_allclose(motion.change_points, [np.pi / 2], atol=1e-9)
@@ -155,7 +155,7 @@ def test_output_without_a_rate_is_not_ok_and_the_motion_goes_on():
         bodies={"block": jn.Body([0.5, 0])},
         joints={"guide": planar.Prismatic(("ground", "block"), [0, 0], [0, 0], [1, 0], [1, 0])},
         drivers={"slide": drivers.SlideDriver(("ground", "block"), [0, 0], [0, 0], [1, 0], "0.5 - 0.5*t")},
-        outputs={"gap": jn.DistanceOutput(("ground", "block"), [0, 0], [0, 0])},
+        outputs={"gap": jn.outputs.DistanceOutput(("ground", "block"), [0, 0], [0, 0])},
     )
     time = np.linspace(0, 2, 5)
     np.testing.assert_allclose(jn.solve(mechanism, time, order=0).outputs["gap"][:, 0], abs(0.5 - 0.5 * time))
@@ -163,7 +163,7 @@ def test_output_without_a_rate_is_not_ok_and_the_motion_goes_on():
     assert motion.status.tolist() == [0, 0, Status.UNDEFINED, 0, 0]
     assert motion.faults == {2: "output gap"}
     np.testing.assert_allclose(motion.outputs["gap"][[1, 3]], [[0.25, -0.5], [0.25, 0.5]], atol=1e-15)
-    with pytest.raises(jn.SolveError, match="output gap"):
+    with pytest.raises(jn.errors.SolveError, match="output gap"):
         jn.solve(mechanism, time, order=1)
 
 
@@ -188,11 +188,16 @@ def test_nearly_singular_factor_is_singular():
 
 
 EXCURSIONS = [
-    jn.SegmentedMotion(
-        [jn.Segment("dwell", 0.5), jn.Segment("cycloidal", 0.5, by=6.0), jn.Segment("cycloidal", 0.5, by=-6.0)], 0.52
+    jn.laws.SegmentedMotion(
+        [
+            jn.laws.Segment("dwell", 0.5),
+            jn.laws.Segment("cycloidal", 0.5, by=6.0),
+            jn.laws.Segment("cycloidal", 0.5, by=-6.0),
+        ],
+        0.52,
     ),
-    pytest.param(jn.Expression("0.52 + 6*exp(-(t - 1)**2/0.01)"), marks=pytest.mark.slow),
-    pytest.param(jn.Expression("0.52 + 6*t**6*(2 - t)**6"), marks=pytest.mark.slow),
+    pytest.param(jn.laws.Expression("0.52 + 6*exp(-(t - 1)**2/0.01)"), marks=pytest.mark.slow),
+    pytest.param(jn.laws.Expression("0.52 + 6*t**6*(2 - t)**6"), marks=pytest.mark.slow),
 ]
 
 

@@ -102,7 +102,7 @@ def test_unrefined_positions(monkeypatch):
     np.testing.assert_allclose(found.outputs["psi"][:, 0], wanted.outputs["psi"][:, 0], atol=1e-6)
 
 
-def test_results_depend_neither_on_threads_nor_on_neighbours():
+def test_results_depend_neither_on_threads_nor_on_neighbors():
     times = np.linspace(0, 2, 3001)
     found = [jn.solve(four_bar(), times, threads=count).outputs["psi"] for count in (1, 2, 3)]
     np.testing.assert_array_equal(found[1], found[0])

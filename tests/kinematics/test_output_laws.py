@@ -16,9 +16,12 @@ ORDER = 4
 
 def slider_crank(law, output="stroke_x"):
     crank = jn.load("examples/slider_crank.yaml")
-    theta = dataclasses.replace(crank.drivers["theta"], motion=jn.OutputMotion(output, law))
+    theta = dataclasses.replace(crank.drivers["theta"], motion=jn.laws.OutputMotion(output, law))
     bodies = {name: dataclasses.replace(body, mass=1.0, inertia=0.01) for name, body in crank.bodies.items()}
-    outputs = crank.outputs | {"theta": jn.DriverAngleOutput("theta"), "torque": jn.DriverTorqueOutput("theta")}
+    outputs = crank.outputs | {
+        "theta": jn.outputs.DriverAngleOutput("theta"),
+        "torque": jn.outputs.DriverTorqueOutput("theta"),
+    }
     more = {"bodies": bodies, "outputs": outputs, "gravity": [0.0, -9.81]}
     return dataclasses.replace(crank, drivers={"theta": theta}, **more)
 
@@ -49,7 +52,7 @@ def test_the_driver_follows_with_all_derivatives(motion):
 
 @pytest.mark.slow
 def test_forces_are_those_of_the_driver_not_of_the_output(motion):
-    balance = jn.power_balance(motion)
+    balance = jn.energy.power_balance(motion)
     assert float(np.abs(balance["residual"] / balance["scale"]).max()) < 1e-13
     torque, rate = motion.outputs["torque"][:, 0], motion.outputs["theta"][:, 1]
     np.testing.assert_allclose(torque * rate, balance["drivers"].sel(derivative=0), atol=1e-14)
@@ -74,14 +77,14 @@ def test_forces_are_those_of_the_driver_not_of_the_output(motion):
     ],
 )
 def test_what_cannot_be_held_is_named(output, words):
-    with pytest.raises(jn.MechanismError, match=words) as caught:
+    with pytest.raises(jn.errors.MechanismError, match=words) as caught:
         jn.solve(slider_crank("0.17", output), GRID)
     assert caught.value.name == "drivers.theta.motion.output"
 
 
 @pytest.mark.slow
 def test_where_the_output_does_not_determine_the_driver_it_is_refused():
-    with pytest.raises(jn.SolveError, match=r"stroke_x .*no further than 0\.199.*theta") as caught:
+    with pytest.raises(jn.errors.SolveError, match=r"stroke_x .*no further than 0\.199.*theta") as caught:
         jn.solve(slider_crank("0.19 + 0.02*t"), GRID, order=0)
     assert caught.value.motion.status[0] == jn.Status.OK
     top = math.sqrt(0.2**2 - 0.01**2)
@@ -92,13 +95,13 @@ def test_where_the_output_does_not_determine_the_driver_it_is_refused():
 @pytest.mark.slow
 def test_what_needs_the_law_beforehand_says_so(motion):
     mechanism = slider_crank("0.17 + 0.015*cos(3*t)")
-    for ask in (jn.simulate, jn.linearise, jn.trace):
+    for ask in (jn.simulate, jn.linearize, jn.trace):
         with pytest.raises(jn.JounceError, match=r"output 'stroke_x'.*motion\.actuated"):
             ask(mechanism)
-    with pytest.raises(jn.UnsupportedError, match="go through numbers"):
+    with pytest.raises(jn.errors.UnsupportedError, match="go through numbers"):
         jax.grad(lambda r: jn.solve(mechanism.with_parameters(r=r), GRID).actuated)(0.05)
-    with pytest.raises(jn.MechanismError, match="the coordinate of this driver is an angle"):
-        dataclasses.replace(motion.mechanism, outputs={"x": jn.DriverDisplacementOutput("theta")})
+    with pytest.raises(jn.errors.MechanismError, match="the coordinate of this driver is an angle"):
+        dataclasses.replace(motion.mechanism, outputs={"x": jn.outputs.DriverDisplacementOutput("theta")})
 
 
 @pytest.mark.slow
@@ -144,14 +147,14 @@ def test_gradients_of_the_driver_and_of_its_torque():
 def test_the_least_torque_of_a_driver_that_follows():
     """The longer the rod, the less its hinge turns for the same tip, and the less torque that takes."""
     mechanism = rod_in_the_plane({"length": 0.2, "swing": 0.1})
-    found = jn.optimise(mechanism, "peak(torque)", {"length": (0.18, 0.25)}, starts=1, time=GRID[:5])
+    found = jn.optimize(mechanism, "peak(torque)", {"length": (0.18, 0.25)}, starts=1, time=GRID[:5])
     assert found.status == "optimal"
     assert found.parameters["length"] == 0.25
 
 
 def rod_in_the_plane(parameters):
     """The rod of `rod_in_space`, in the plane."""
-    law = jn.OutputMotion("tip_y", "swing*sin(2*t) + 0.05")
+    law = jn.laws.OutputMotion("tip_y", "swing*sin(2*t) + 0.05")
     return jn.Mechanism(
         space="planar",
         parameters=parameters,
@@ -159,9 +162,9 @@ def rod_in_the_plane(parameters):
         joints={"hinge": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
         drivers={"motor": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", law)},
         outputs={
-            "tip": jn.PointOutput("rod", ["length", 0]),
-            "angle": jn.DriverAngleOutput("motor"),
-            "torque": jn.DriverTorqueOutput("motor"),
+            "tip": jn.outputs.PointOutput("rod", ["length", 0]),
+            "angle": jn.outputs.DriverAngleOutput("motor"),
+            "torque": jn.outputs.DriverTorqueOutput("motor"),
         },
     )
 
@@ -170,7 +173,9 @@ def rod_in_space(parameters):
     """A rod that turns about z, whose tip is held to a law of y; its motor carries an inertia of 0.01 kg m^2 only."""
     rod = jn.Body([0, 0, 0], orientation=[math.cos(0.1), 0, 0, math.sin(0.1)], mass=2.0, inertia=[0.0, 0.01, 0.01])
     hinge = jn.spatial.Revolute(("ground", "rod"), [0, 0, 0], [0, 0, 0], axis_i=[0, 0, 1], axis_j=[0, 0, 1])
-    motor = jn.drivers.RotationDriver(("ground", "rod"), [0, 0, 1], jn.OutputMotion("tip_y", "swing*sin(2*t) + 0.05"))
+    motor = jn.drivers.RotationDriver(
+        ("ground", "rod"), [0, 0, 1], jn.laws.OutputMotion("tip_y", "swing*sin(2*t) + 0.05")
+    )
     return jn.Mechanism(
         space="spatial",
         parameters=parameters,
@@ -178,9 +183,9 @@ def rod_in_space(parameters):
         joints={"hinge": hinge},
         drivers={"motor": motor},
         outputs={
-            "tip": jn.PointOutput("rod", ["length", 0, 0]),
-            "angle": jn.DriverAngleOutput("motor"),
-            "torque": jn.DriverTorqueOutput("motor"),
+            "tip": jn.outputs.PointOutput("rod", ["length", 0, 0]),
+            "angle": jn.outputs.DriverAngleOutput("motor"),
+            "torque": jn.outputs.DriverTorqueOutput("motor"),
         },
     )
 

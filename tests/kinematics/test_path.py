@@ -45,7 +45,7 @@ def test_fifty_turns_with_three_instants_after_the_first():
 def test_rotation_driver_over_turns_and_back(vectors):
     time = np.array([0.0, 0.5, 1.0])
     mechanism = spindle(law(0.3, wave=5 * TURN), vectors=vectors)
-    with pytest.warns(jn.UnitWarning, match="degrees"):  # five turns there and back: told, and right
+    with pytest.warns(jn.errors.UnitWarning, match="degrees"):  # five turns there and back: told, and right
         motion = jn.solve(mechanism, time, order=1)
     expected = 0.3 + TURN * 5 * np.sin(np.pi * time)
     np.testing.assert_allclose(motion.outputs["angle"][:, 0], expected, atol=1e-12)

@@ -25,7 +25,7 @@ def printed_screw(distance_driver):
             "advance": distance_driver,
         },
         drivers={"turn": drivers.RotationDriver(BODIES, Z, "3*t")},
-        outputs={"p": jn.PointOutput("nut", ORIGIN), "angle": jn.RelativeAngleOutput(BODIES, Z)},
+        outputs={"p": jn.outputs.PointOutput("nut", ORIGIN), "angle": jn.outputs.RelativeAngleOutput(BODIES, Z)},
     )
 
 
@@ -37,7 +37,7 @@ def test_screw_as_printed_turns_without_advancing():
 
 
 def test_screw_as_printed_with_the_driver_of_equation_104_has_a_row_of_zeros():
-    with pytest.raises(jn.MobilityError, match=r"6 coordinates; .* 6 equations, 5 of them"):
+    with pytest.raises(jn.errors.MobilityError, match=r"6 coordinates; .* 6 equations, 5 of them"):
         jn.solve(printed_screw(drivers.SpatialDistanceDriver(BODIES, ORIGIN, ORIGIN, 0.0)), TIME, order=1)
 
 

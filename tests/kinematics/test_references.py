@@ -14,7 +14,7 @@ HIGHER = {"rolling_disc": 8, "six_bar_watt": 10, "rsur": 6}
 
 
 def errors(name, order):
-    """Normalised RMSE of every output and derivative: by the maximum absolute value, as S does."""
+    """Normalized RMSE of every output and derivative: by the maximum absolute value, as S does."""
     time, outputs = reference(name)
     motion = jn.solve(jn.load(example(name)), time, order=order)
     assert not motion.status.any()

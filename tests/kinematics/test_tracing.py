@@ -17,7 +17,7 @@ def pendulum(length):
         space="planar",
         bodies={"rod": jn.Body([0, 0], mass=1.0, inertia=0.1, center_of_mass=[length, 0.0])},
         joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
-        outputs={"angle": jn.AngleOutput("rod")},
+        outputs={"angle": jn.outputs.AngleOutput("rod")},
         parameters={"tilt": 0.1},
     )
 
@@ -36,7 +36,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("transformed", [jax.grad, jax.jit, lambda f: lambda x: jax.vmap(f)(np.array([x]))])
 def test_traced_values_are_refused_by_name(name, transformed):
-    with pytest.raises(jn.UnsupportedError) as told:
+    with pytest.raises(jn.errors.UnsupportedError) as told:
         transformed(CASES[name])(0.14)
     assert told.value.name == name
     assert "jax.grad" in str(told.value)

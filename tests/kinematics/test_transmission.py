@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.kinematics.curves.transmission import FourBar, SliderCrank, extremes, recognised
+from jounce.kinematics.curves.transmission import FourBar, SliderCrank, extremes, recognized
 from tests.problems.linkages import FourBar as RandomFourBar, SliderCrank as RandomSliderCrank
 
 TYPES = {
@@ -22,7 +22,7 @@ TYPES = {
 @pytest.mark.parametrize("lengths, kind", TYPES.items())
 def test_types_of_grashof(lengths, kind):
     mechanism = RandomFourBar().mechanism.with_parameters(**dict(zip("abcd", lengths, strict=True)))
-    found = recognised(mechanism, "drive")
+    found = recognized(mechanism, "drive")
     assert found.type.startswith(kind)
 
 
@@ -32,7 +32,7 @@ def test_extremes_are_those_along_the_curve(family, point):
     for seed in range(6):
         linkage = family.linkage(np.random.default_rng(seed), False)[0]
         curve = jn.trace(linkage.mechanism, 0.0, count=2001, order=0)
-        found = recognised(linkage.mechanism, "drive")
+        found = recognized(linkage.mechanism, "drive")
         (least, least_at), (most, _) = extremes(found, *curve.range)
         assert found.transmission(least_at) == pytest.approx(least)
         angles = _angles(linkage, curve, point)
@@ -73,7 +73,7 @@ def test_a_four_bar_of_hinges_turned_in_its_frames():
         },
         drivers={"drive": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "t")},
     )
-    found = recognised(mechanism, "drive")
+    found = recognized(mechanism, "drive")
     np.testing.assert_allclose(found.offset, 0.3 - turn)
     np.testing.assert_allclose(found.transmission(0.3 - turn + 1.1), crank.transmission(1.1))
 
@@ -82,10 +82,10 @@ def test_a_four_bar_of_hinges_turned_in_its_frames():
 def test_what_is_no_four_bar_is_not_taken_for_one():
     for name in ("six_bar_watt", "six_bar_stephenson", "gear_pair", "rssr", "quick_return"):
         mechanism = jn.load(f"examples/{name}.yaml")
-        assert recognised(mechanism, next(iter(mechanism.drivers))) is None
+        assert recognized(mechanism, next(iter(mechanism.drivers))) is None
     driven = RandomFourBar().mechanism
     at_rod = dataclasses.replace(driven.drivers["drive"], bodies=("crank", "rocker"))
-    assert recognised(dataclasses.replace(driven, drivers={"drive": at_rod}), "drive") is None
+    assert recognized(dataclasses.replace(driven, drivers={"drive": at_rod}), "drive") is None
 
 
 def test_a_slider_crank_that_turns_and_one_that_rocks():

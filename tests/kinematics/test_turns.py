@@ -32,9 +32,9 @@ def shafts(law):
         },
         drivers={"turn": drivers.RotationDriver(("ground", "first"), X, law)},
         outputs={
-            "first": jn.RelativeAngleOutput(("ground", "first"), X),
-            "back": jn.RelativeAngleOutput(("first", "ground"), [-2, 0, 0], [0, 1, 0], [0, 1, 0.2]),
-            "second": jn.RelativeAngleOutput(
+            "first": jn.outputs.RelativeAngleOutput(("ground", "first"), X),
+            "back": jn.outputs.RelativeAngleOutput(("first", "ground"), [-2, 0, 0], [0, 1, 0], [0, 1, 0.2]),
+            "second": jn.outputs.RelativeAngleOutput(
                 ("ground", "second"), [np.cos(slope), np.sin(slope), 0], [-np.sin(slope), np.cos(slope), 0], [0, 1, 0]
             ),
         },
@@ -120,7 +120,7 @@ def drag_link(law, gear=False):
         bodies=bodies,
         joints=joints,
         drivers={"turn": drivers.CoordinateDriver(("ground", "first"), "angle", law)},
-        outputs={name: jn.AngleOutput(name) for name in bodies},
+        outputs={name: jn.outputs.AngleOutput(name) for name in bodies},
     )
 
 
@@ -214,7 +214,7 @@ def test_energies_and_powers_have_the_turns_of_the_forces():
     first, second = angles_of_law(start, rate, 0.4, time)[:, 0], angles_of_law(0.2, -2 * rate, 0.1, time)[:, 0]
     expected = sum((angle - 0.3) ** 2 for angle in (first, second, second - first))
     np.testing.assert_allclose(jn.dynamics.stored_energy(motion), expected, rtol=1e-13)
-    balance = jn.power_balance(motion)
+    balance = jn.energy.power_balance(motion)
     assert float((abs(balance["residual"]) / balance["scale"]).max()) < 1e-13
 
 
@@ -236,7 +236,7 @@ def hold_about_axes_that_tilt_too_and_for_outputs_asked_for_later(turn):
         for name, output in mechanism.outputs.items():
             np.testing.assert_allclose(motion.evaluate(output).values, motion.outputs[name], rtol=0, atol=1e-12)
             if name in twist:
-                torque = jn.applied_force(motion, name).values[:, 0]
+                torque = jn.dynamics.applied_force(motion, name).values[:, 0]
                 np.testing.assert_allclose(torque, -motion.outputs[name][:, 0], rtol=0, atol=1e-12)
         assert np.abs(motion.outputs["second"][:, 0] - turn - np.array(grid)).max() < 0.1
 

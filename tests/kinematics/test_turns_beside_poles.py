@@ -28,7 +28,7 @@ def gimbals():
             f"turn_{pair[1]}": drivers.RotationDriver(pair, u, law, a, a)
             for pair, u, a, law in zip(pairs, axes, sides, laws, strict=True)
         },
-        outputs={"angle": jn.RelativeAngleOutput(("ground", "inner"), Z, X, X)},
+        outputs={"angle": jn.outputs.RelativeAngleOutput(("ground", "inner"), Z, X, X)},
     )
 
 
@@ -48,9 +48,9 @@ def expected(miss, time=TIME):
 def test_half_a_turn_at_once_is_counted_whatever_the_order(order, miss):
     motion = jn.solve(gimbals().with_parameters(miss=miss), TIME, order=order)
     np.testing.assert_allclose(motion.outputs["angle"][:, 0], expected(miss), rtol=0, atol=1e-8)
-    later = motion.evaluate(jn.RelativeAngleOutput(("inner", "ground"), [0, 1, 0], Z, Z))
+    later = motion.evaluate(jn.outputs.RelativeAngleOutput(("inner", "ground"), [0, 1, 0], Z, Z))
     np.testing.assert_array_equal(np.isfinite(later), True)
-    angles = motion.evaluate(jn.EulerAnglesOutput(("inner",), "ZYX")).values[:, 0]
+    angles = motion.evaluate(jn.outputs.EulerAnglesOutput(("inner",), "ZYX")).values[:, 0]
     np.testing.assert_allclose(angles[:, 0], expected(miss), rtol=0, atol=1e-8)
 
 
@@ -71,7 +71,7 @@ def test_simulations_count_them_forward_and_backward_alone_and_side_by_side():
         bodies={"ball": jn.Body(ORIGIN, mass=1.0, inertia=[1.0, 1.0, 1.0])},
         joints={"pin": spatial.Spherical(("ground", "ball"), ORIGIN, ORIGIN)},
         initial={"spin": drivers.RotationDriver(("ground", "ball"), [0, "cos(miss)", "sin(miss)"], f"{RATE}*t")},
-        outputs={"angle": jn.RelativeAngleOutput(("ground", "ball"), Z, X, X)},
+        outputs={"angle": jn.outputs.RelativeAngleOutput(("ground", "ball"), Z, X, X)},
     )
     for time in (TIME, -TIME):
         together = jn.simulate_batch(ball, {"miss": misses}, time, order=2).outputs["angle"]

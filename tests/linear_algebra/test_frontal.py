@@ -1,4 +1,4 @@
-"""Elimination body by body: against NumPy on random patterns, and as the factorisation of mechanisms."""
+"""Elimination body by body: against NumPy on random patterns, and as the factorization of mechanisms."""
 
 import itertools
 
@@ -110,7 +110,7 @@ def chain(links, law="0.4*sin(t)"):
         bodies={name: jn.Body([0.1 * k, 0.0]) for k, name in enumerate(names[1:])},
         joints={f"pin{k}": jn.planar.Revolute(pair, [0.1 * (k > 0), 0], [0, 0]) for k, pair in enumerate(pairs)},
         drivers={f"turn{k}": jn.drivers.CoordinateDriver(pair, "angle", law) for k, pair in enumerate(pairs)},
-        outputs={"tip": jn.PointOutput(names[-1], [0.1, 0])},
+        outputs={"tip": jn.outputs.PointOutput(names[-1], [0.1, 0])},
     )
 
 

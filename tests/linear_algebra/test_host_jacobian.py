@@ -77,7 +77,7 @@ def test_degrees_of_freedom_of_a_long_chain_are_told_by_body():
     whole = chain(40)
     drivers = {name: driver for name, driver in whole.drivers.items() if name != "turn39"}
     one_free = jn.Mechanism(space="planar", bodies=whole.bodies, joints=whole.joints, drivers=drivers)
-    with pytest.raises(jn.MobilityError, match=r"119 equations, 119 of them .* link39"):
+    with pytest.raises(jn.errors.MobilityError, match=r"119 equations, 119 of them .* link39"):
         jn.solve(one_free, [0.0])
 
 
@@ -89,7 +89,7 @@ def test_redundant_joints_of_a_long_chain_are_told_by_name():
         space="planar", bodies=whole.bodies, joints={**whole.joints, "again": again}, drivers=drivers
     )
     told = r"121 equations, 119 of .* with which link39 can .*; joint again repeats 2 equations of pin20"
-    with pytest.raises(jn.MobilityError, match=told):
+    with pytest.raises(jn.errors.MobilityError, match=told):
         jn.solve(redundant, [0.0])
 
 
@@ -100,5 +100,5 @@ def test_a_long_chain_that_cannot_close_is_told_by_joint():
     drivers = dict(itertools.islice(whole.drivers.items(), 39))
     bodies = dict(zip(whole.bodies, points, strict=True))
     mechanism = jn.Mechanism(space="planar", bodies=bodies, joints={**whole.joints, "far": far}, drivers=drivers)
-    with pytest.raises(jn.AssemblyError, match=r"joints\.far"):
+    with pytest.raises(jn.errors.AssemblyError, match=r"joints\.far"):
         jn.solve(mechanism, [0.0])

@@ -69,7 +69,7 @@ def test_residuals_are_rounding_however_ill_conditioned(condition, transposed):
     assert (np.abs(wanted @ solution - right) <= 1e-15 * scale).all()
 
 
-def test_singular_matrices_are_told_and_leave_their_neighbours_alone():
+def test_singular_matrices_are_told_and_leave_their_neighbors_alone():
     matrices = MATRIX.copy()
     matrices[:, :, 1] = 1.0
     matrices[2, 3, 3] = np.nan

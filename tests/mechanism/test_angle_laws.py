@@ -21,7 +21,7 @@ def rod(motion, **parts):
         "bodies": {"rod": jn.Body([0, 0], mass=1.0, inertia=0.1)},
         "joints": {"pin": jn.planar.Revolute(GROUND, [0, 0], [0, 0])},
         "drivers": {"motor": jn.drivers.CoordinateDriver(GROUND, "angle", motion=motion)},
-        "outputs": {"angle": jn.AngleOutput("rod")},
+        "outputs": {"angle": jn.outputs.AngleOutput("rod")},
     }
     return jn.Mechanism(**(whole | parts))
 
@@ -36,7 +36,7 @@ def told(call):
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         call()
-    return [str(x.message) for x in found if x.category is jn.UnitWarning and x.filename == __file__]
+    return [str(x.message) for x in found if x.category is jn.errors.UnitWarning and x.filename == __file__]
 
 
 SWING = "drivers.motor.motion: goes from -30 to 90 rad, 19 turns: degrees? A number without a unit is in SI"
@@ -49,10 +49,11 @@ SWING = "drivers.motor.motion: goes from -30 to 90 rad, 19 turns: degrees? A num
         (lambda t: 30 + 60 * jnp.sin(np.pi * t), SWING),
         (lambda t: jnp.where(t > -1.0, 30 + 60 * jnp.sin(np.pi * t), 0.0), SWING),
         (lambda t: 30 + 60 * jnp.dot(jnp.sin(jnp.stack([np.pi * t, 0.0])), jnp.ones(2)), SWING),  # of one instant only
-        (jn.motion_profile("cycloidal", 0.0, 90.0, 1.0), "goes from 0 to 90 rad, 14 turns: degrees?"),
+        (jn.laws.motion_profile("cycloidal", 0.0, 90.0, 1.0), "goes from 0 to 90 rad, 14 turns: degrees?"),
         (90, "90 rad is 14 turns: 90 deg?"),
         ("60 + 360*t", "60 rad is 9.5 turns: 60 deg?"),
-        (jn.FollowingMotion(jn.SplineMotion(np.linspace(0, 360, 9), np.linspace(0, 1, 9), beyond="hold"), "180*t"),
+        (jn.laws.FollowingMotion(
+            jn.laws.SplineMotion(np.linspace(0, 360, 9), np.linspace(0, 1, 9), beyond="hold"), "180*t"),
          "goes on over 360 rad of its leader, 57 turns: degrees?"),
     ],
 )  # fmt: skip
@@ -60,7 +61,7 @@ def test_a_law_in_degrees_is_told_once(motion, words):
     mechanism = rod(motion)
     (found,) = told(lambda: looked_at(mechanism))
     assert words in found
-    other = dataclasses.replace(mechanism, outputs={"tip": jn.PointOutput("rod", [1.0, 0.0])})
+    other = dataclasses.replace(mechanism, outputs={"tip": jn.outputs.PointOutput("rod", [1.0, 0.0])})
     assert not told(lambda: (looked_at(mechanism), looked_at(other, 2 * T)))
 
 
@@ -71,7 +72,7 @@ def test_solutions_and_simulations_tell_it():
     assert "goes from -60 to 60 rad" in found
 
     def run():
-        with pytest.raises(jn.MechanismError, match="mass"):
+        with pytest.raises(jn.errors.MechanismError, match="mass"):
             jn.simulate(rod("60*sin(pi*t)", joints={}, bodies={"rod": jn.Body([0, 0])}), T)
 
     assert len(told(run)) == 1
@@ -94,7 +95,7 @@ def test_what_a_file_told_is_not_told_again(tmp_path):
     path = tmp_path / "four_bar.yaml"
     text = Path("examples/four_bar.yaml").read_text()
     path.write_text(text.replace("motion: 30*deg + 60*deg*sin", "motion: 1 + 60*sin"))
-    with pytest.warns(jn.UnitWarning, match="four_bar.yaml, line"):
+    with pytest.warns(jn.errors.UnitWarning, match="four_bar.yaml, line"):
         mechanism = jn.load(path)
     assert not told(lambda: looked_at(mechanism))
     path.write_text(text.replace("motion: 30*deg + 60*deg*sin(2*pi*t/tau)", "motion: {samples: law.csv}"))

@@ -39,7 +39,7 @@ def test_angles_of_every_sequence_come_back_with_their_derivatives(sequence):
     if sequence[0] == sequence[2]:
         values[0, 1] += math.pi / 2
     pose = pose_of(sequence, Jet(list(values)))
-    found = coefficients(jn.EulerAnglesOutput("b", sequence).evaluate(pose))[:, :, 0]
+    found = coefficients(jn.outputs.EulerAnglesOutput("b", sequence).evaluate(pose))[:, :, 0]
     np.testing.assert_allclose(found, values, rtol=0, atol=2e-12)
     first = Rotation.from_quat(np.asarray(pose.quaternion.coefficients[0])[:, 0].T, scalar_first=True)
     np.testing.assert_allclose(found[0].T, first.as_euler(sequence), rtol=0, atol=1e-14)
@@ -51,25 +51,25 @@ def test_relative_attitudes_are_those_of_the_frames():
     A, B = (np.array([np.asarray(c) for c in pose.attitude.dense().coefficients])[..., 0, :] for pose in (one, two))
     expected = [sum(np.einsum("jib,jkb->ikb", A[m], B[k - m]) for m in range(k + 1)) for k in range(ORDER + 1)]
     pair = ("a", "b")
-    matrix = coefficients(jn.RelativeRotationMatrixOutput(pair).evaluate(one, two))[:, :, 0]
+    matrix = coefficients(jn.outputs.RelativeRotationMatrixOutput(pair).evaluate(one, two))[:, :, 0]
     np.testing.assert_allclose(matrix.reshape(ORDER + 1, 3, 3, -1), expected, rtol=0, atol=1e-13)
-    parameters = coefficients(jn.RelativeEulerParametersOutput(pair).evaluate(one, two))[:, :, 0]
+    parameters = coefficients(jn.outputs.RelativeEulerParametersOutput(pair).evaluate(one, two))[:, :, 0]
     of = Rotation.from_quat(parameters[0].T, scalar_first=True).as_matrix()
     np.testing.assert_allclose(np.moveaxis(of, 0, -1), expected[0], rtol=0, atol=1e-14)
-    angles = jn.RelativeEulerAnglesOutput(pair, "xzy").evaluate(one, two)
+    angles = jn.outputs.RelativeEulerAnglesOutput(pair, "xzy").evaluate(one, two)
     again = jn.rigid.rotation_matrix("xzy", angles)
     np.testing.assert_allclose(coefficients(again)[..., 0, :], expected, rtol=0, atol=1e-12)
-    alone = coefficients(jn.RotationMatrixOutput("b").evaluate(two))[:, :, 0]
+    alone = coefficients(jn.outputs.RotationMatrixOutput("b").evaluate(two))[:, :, 0]
     np.testing.assert_allclose(alone.reshape(B.shape), B, rtol=0, atol=1e-15)
 
 
 LAWS = {"alpha": "0.3 + 7*t", "beta": "b0 + b1*t + b2*sin(2*t)", "gamma": "0.5 + c1*t + c2*t**2"}
 SWINGING = {"b0": 1.2, "b1": 0.0, "b2": 0.4, "c1": -5.0, "c2": 0.2}
 OUTPUTS = {
-    "angles": jn.EulerAnglesOutput("rotor", "ZXZ"),
-    "p": jn.EulerParametersOutput("rotor"),
-    "A": jn.RotationMatrixOutput("rotor"),
-    "by_pin": jn.RelativeEulerAnglesOutput(("outer", "rotor"), "XYZ"),
+    "angles": jn.outputs.EulerAnglesOutput("rotor", "ZXZ"),
+    "p": jn.outputs.EulerParametersOutput("rotor"),
+    "A": jn.outputs.RotationMatrixOutput("rotor"),
+    "by_pin": jn.outputs.RelativeEulerAnglesOutput(("outer", "rotor"), "XYZ"),
 }
 
 
@@ -171,7 +171,7 @@ def test_parallel_axes_are_undefined_and_near_them_derivatives_hold():
     middle angle grows again, the others shifted by half a turn."""
     mechanism = gimbal(b0=0.5, b1=-1.0, b2=0.0, c1=1.0, c2=0.0)
     instants = [0.0, 0.499, 0.5, 0.501, 0.9]
-    with pytest.raises(jn.SolveError, match="angles"):
+    with pytest.raises(jn.errors.SolveError, match="angles"):
         jn.solve(mechanism, instants, order=SOLVED)
     motion = jn.solve(mechanism, instants, order=SOLVED, strict=False)
     assert list(motion.status) == [0, 0, jn.Status.UNDEFINED, 0, 0]
@@ -192,9 +192,9 @@ def test_parallel_axes_are_undefined_and_near_them_derivatives_hold():
 @pytest.mark.slow
 def test_angles_without_a_value_are_refused_afterwards_too(turning):
     """The outer ring turns about z only, where the first and the last axis of ZXZ are one."""
-    with pytest.raises(jn.MechanismError, match="t = 0 s"):
-        turning.evaluate(jn.EulerAnglesOutput("outer", "ZXZ"))
-    fixed = turning.evaluate(jn.EulerAnglesOutput("outer", "xyz")).sel(derivative=[0, 1], euler_angle="gamma")
+    with pytest.raises(jn.errors.MechanismError, match="t = 0 s"):
+        turning.evaluate(jn.outputs.EulerAnglesOutput("outer", "ZXZ"))
+    fixed = turning.evaluate(jn.outputs.EulerAnglesOutput("outer", "xyz")).sel(derivative=[0, 1], euler_angle="gamma")
     np.testing.assert_allclose(fixed, [derivatives("alpha", t)[:2] for t in turning.time], rtol=0, atol=1e-11)
 
 
@@ -206,23 +206,23 @@ def test_simulated_angles_are_continuous_over_turns():
         bodies={"rotor": jn.Body([0, 0, 0], mass=1.0, inertia=[1.0, 1.0, 2.0])},
         joints={},
         initial={"spin": jn.drivers.RotationDriver(("ground", "rotor"), [0, 0, 1.0], motion="0.2 + 11*t")},
-        outputs={"turn": jn.EulerAnglesOutput("rotor", "ZYX"), "p": jn.EulerParametersOutput("rotor")},
+        outputs={"turn": jn.outputs.EulerAnglesOutput("rotor", "ZYX"), "p": jn.outputs.EulerParametersOutput("rotor")},
     )
     motion = jn.simulate(mechanism, [0.0, 2.0, 5.0], order=1, method=jn.Taylor(8))
     np.testing.assert_allclose(motion.outputs["turn"][:, 0, 0], [0.2, 22.2, 55.2], rtol=0, atol=1e-9)
     np.testing.assert_allclose(motion.outputs["turn"][:, 1], [[11.0, 0, 0]] * 3, rtol=0, atol=1e-9)
     half = np.array([0.1, 11.1, 27.6])
     np.testing.assert_allclose(motion.outputs["p"][:, 0, [0, 3]].T, [np.cos(half), np.sin(half)], rtol=0, atol=1e-9)
-    with pytest.raises(jn.MechanismError, match="EulerAnglesOutput"):
-        jn.Event(jn.EulerAnglesOutput("rotor", "ZYX"))
-    fixed = motion.evaluate(jn.EulerAnglesOutput("rotor", "xyz"))
+    with pytest.raises(jn.errors.MechanismError, match="EulerAnglesOutput"):
+        jn.Event(jn.outputs.EulerAnglesOutput("rotor", "ZYX"))
+    fixed = motion.evaluate(jn.outputs.EulerAnglesOutput("rotor", "xyz"))
     np.testing.assert_allclose(fixed.sel(derivative=0, euler_angle="gamma"), [0.2, 22.2, 55.2], rtol=0, atol=1e-9)
 
 
 @pytest.mark.slow  # to compile
 def test_simulated_angles_without_a_value_are_told():
     """A rotor that turns about z only has no angles of the sequence ZXZ; of a batch the other numbers stay."""
-    outputs = {"turn": jn.EulerAnglesOutput("rotor", "ZXZ"), "p": jn.EulerParametersOutput("rotor")}
+    outputs = {"turn": jn.outputs.EulerAnglesOutput("rotor", "ZXZ"), "p": jn.outputs.EulerParametersOutput("rotor")}
     mechanism = jn.Mechanism(
         space="spatial",
         parameters={"speed": 11.0, "tilt": 0.0},
@@ -231,7 +231,7 @@ def test_simulated_angles_without_a_value_are_told():
         initial={"spin": jn.drivers.RotationDriver(("ground", "rotor"), [0, 0, 1.0], motion="0.2 + speed*t")},
         outputs=outputs,
     )
-    with pytest.raises(jn.SolveError, match="output turn") as caught:
+    with pytest.raises(jn.errors.SolveError, match="output turn") as caught:
         jn.simulate(mechanism, [0.0, 2.0], order=1, method=jn.Taylor(8))
     assert (caught.value.motion.status == jn.Status.UNDEFINED).all()
     batch = jn.simulate_batch(mechanism, {"tilt": [0.0, 0.1]}, [0.0, 0.1], order=1, method=jn.Taylor(8))
@@ -289,11 +289,11 @@ def test_files_hold_every_form(tmp_path):
 def test_files_that_are_wrong_say_where(tmp_path, old, new, named):
     path = tmp_path / "rotor.yaml"
     path.write_text(FILE.replace(old, new))
-    with pytest.raises(jn.MechanismFileError, match=named):
+    with pytest.raises(jn.errors.MechanismFileError, match=named):
         jn.load(path)
 
 
 def test_bodies_of_the_plane_have_an_angle_only():
     motion = jn.solve(jn.load("examples/four_bar.yaml"), [0.0], order=0)
-    with pytest.raises(jn.MechanismError, match="spatial"):
-        motion.evaluate(jn.RotationMatrixOutput("crank"))
+    with pytest.raises(jn.errors.MechanismError, match="spatial"):
+        motion.evaluate(jn.outputs.RotationMatrixOutput("crank"))

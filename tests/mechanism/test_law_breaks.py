@@ -10,7 +10,9 @@ from jounce.kinematics.families.design_sides import sides_of_designs
 from jounce.mechanism.law_breaks import breaks_of_laws, laws_may_break
 
 PAIR = ("ground", "rod")
-RAMP = jn.SegmentedMotion([jn.Segment("dwell", "begin"), jn.Segment("cycloidal", 0.5, by=1.0)], beyond="hold")
+RAMP = jn.laws.SegmentedMotion(
+    [jn.laws.Segment("dwell", "begin"), jn.laws.Segment("cycloidal", 0.5, by=1.0)], beyond="hold"
+)
 ROD = jn.Mechanism(
     space="planar",
     parameters={"begin": 0.2, "k": 3.0},
@@ -23,9 +25,9 @@ ROD = jn.Mechanism(
         "spring": jn.forces.Torque(PAIR, law="-k*x"),
         "grease": jn.forces.Torque(PAIR, law=lambda x, v, t: -0.1 * v),
     },
-    outputs={"torque": jn.DriverTorqueOutput("motor")},
+    outputs={"torque": jn.outputs.DriverTorqueOutput("motor")},
 )
-UNSEEN = dataclasses.replace(ROD, outputs={"angle": jn.AngleOutput("rod")})
+UNSEEN = dataclasses.replace(ROD, outputs={"angle": jn.outputs.AngleOutput("rod")})
 
 
 def test_laws_of_forces_count_where_forces_are_shown_or_move_the_bodies():

@@ -47,7 +47,7 @@ def wishbone():
     """Return the suspension driven at its lower arm."""
     made = jn.load("examples/double_wishbone.yaml")
     driver = jn.drivers.RotationDriver(("ground", "lower_arm"), [1, 0.04, -0.02], LAW)
-    second = {"bump_steer_2": jn.DerivativeOutput("toe", "wheel_z", 2)}
+    second = {"bump_steer_2": jn.outputs.DerivativeOutput("toe", "wheel_z", 2)}
     made = dataclasses.replace(made, drivers={"arm": driver}, outputs={**made.outputs, **second})
     return made, jn.solve(made, INSTANTS, order=ORDER)
 
@@ -131,21 +131,21 @@ def _center(its, t):
 def four_bar(**outputs):
     made = jn.load("examples/four_bar.yaml")
     known = {
-        "theta": jn.AngleOutput("crank"),
-        "psi": jn.AngleOutput("rocker"),
-        "C": jn.PointOutput("rocker", ["CD", 0]),
+        "theta": jn.outputs.AngleOutput("crank"),
+        "psi": jn.outputs.AngleOutput("rocker"),
+        "C": jn.outputs.PointOutput("rocker", ["CD", 0]),
     }
     return dataclasses.replace(made, outputs={**known, **outputs})
 
 
 def test_a_transmission_ratio_is_that_of_freudenstein_and_an_instant_center_lies_on_both_lines():
     outputs = {
-        "ratio": jn.DerivativeOutput("psi", "theta"),
-        "third": jn.DerivativeOutput("psi", "theta", 3),
-        "tangent": jn.DerivativeOutput("C_y", "C_x"),
-        "pole": jn.InstantCenterOutput(("crank", "rocker")),
-        "own": jn.InstantCenterOutput(("crank", "rocker"), frame="body"),
-        "pin": jn.InstantCenterOutput(("ground", "rocker")),
+        "ratio": jn.outputs.DerivativeOutput("psi", "theta"),
+        "third": jn.outputs.DerivativeOutput("psi", "theta", 3),
+        "tangent": jn.outputs.DerivativeOutput("C_y", "C_x"),
+        "pole": jn.outputs.InstantCenterOutput(("crank", "rocker")),
+        "own": jn.outputs.InstantCenterOutput(("crank", "rocker"), frame="body"),
+        "pin": jn.outputs.InstantCenterOutput(("ground", "rocker")),
     }
     motion = jn.solve(four_bar(**outputs), [0.1, 0.2, 0.9], order=ORDER)
     found = motion.outputs
@@ -162,12 +162,14 @@ def test_a_transmission_ratio_is_that_of_freudenstein_and_an_instant_center_lies
 
 
 def test_where_the_reference_stands_still_a_derivative_is_undefined_and_its_neighbors_are_right():
-    motion = jn.solve(four_bar(ratio=jn.DerivativeOutput("psi", "theta")), np.arange(0.45, 0.5501, 0.01), strict=False)
+    motion = jn.solve(
+        four_bar(ratio=jn.outputs.DerivativeOutput("psi", "theta")), np.arange(0.45, 0.5501, 0.01), strict=False
+    )
     assert [Status(s) for s in motion.status] == [Status.OK] * 5 + [Status.UNDEFINED] + [Status.OK] * 5
     assert np.isnan(motion.outputs["ratio"][5]).all()
     np.testing.assert_allclose(motion.outputs["ratio"][:5, 0], motion.outputs["ratio"][:5:-1, 0], rtol=1e-11)
-    with pytest.raises(jn.SolveError, match=r"t = 0\.5 s.*ratio"):
-        jn.solve(four_bar(ratio=jn.DerivativeOutput("psi", "theta")), [0.4, 0.5])
+    with pytest.raises(jn.errors.SolveError, match=r"t = 0\.5 s.*ratio"):
+        jn.solve(four_bar(ratio=jn.outputs.DerivativeOutput("psi", "theta")), [0.4, 0.5])
 
 
 def rocker(theta):
@@ -193,7 +195,7 @@ def test_nothing_false_is_told_near_where_the_reference_stands_still(order):
     """What is given as solved is right, however near; what rounding decides is not given."""
     off = np.array([0.0, 1e-16, 2e-16, 1e-14, 1e-12, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
     time = np.unique(np.concatenate([[0.4], 0.5 - off, 0.5 + off]))
-    motion = jn.solve(four_bar(ratio=jn.DerivativeOutput("psi", "theta")), time, order=order, strict=False)
+    motion = jn.solve(four_bar(ratio=jn.outputs.DerivativeOutput("psi", "theta")), time, order=order, strict=False)
     natural = np.abs([float(x) for x in ratio(0.4, order)]) + 1.0
     told = motion.status == 0
     for k in np.flatnonzero(told):
@@ -209,8 +211,10 @@ def crossing(**given):
     pin = jn.spatial.Revolute(("ground", "rod"), [0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 1, 0])
     driver = jn.drivers.RotationDriver(("ground", "rod"), [0, 1, 0], "t")
     lines = {
-        "line": jn.ProjectedAngleOutput(("ground", "ground", "rod"), [0, 0, 1], [1, 0, 0], [0, 0, 0], [0, 0, 0.3]),
-        "axis": jn.RelativeAngleOutput(("ground", "rod"), [0, 0, 1], [1, 0, 0], [0, 0, 1]),
+        "line": jn.outputs.ProjectedAngleOutput(
+            ("ground", "ground", "rod"), [0, 0, 1], [1, 0, 0], [0, 0, 0], [0, 0, 0.3]
+        ),
+        "axis": jn.outputs.RelativeAngleOutput(("ground", "rod"), [0, 0, 1], [1, 0, 0], [0, 0, 1]),
     }
     return jn.Mechanism(
         space="spatial", bodies={"rod": jn.Body([0, 0, 0])}, joints={"pin": pin}, drivers={"turn": driver},
@@ -232,7 +236,9 @@ def test_where_a_line_is_perpendicular_to_the_plane_there_is_no_angle(name):
 def test_projected_angles_count_turns_and_do_not_depend_on_frames():
     pin = jn.spatial.Revolute(("ground", "rod"), [0, 0, 0], [0, 0, 0], [0, 0, 1], [0, 0, 1])
     driver = jn.drivers.RotationDriver(("ground", "rod"), [0, 0, 1], "7*t + 0.4*t**2")
-    line = jn.ProjectedAngleOutput(("ground", "ground", "rod"), [0, 0, 2], [1, 0, 5], [0.1, 0, 0.1], [0.3, 0, 0.2])
+    line = jn.outputs.ProjectedAngleOutput(
+        ("ground", "ground", "rod"), [0, 0, 2], [1, 0, 5], [0.1, 0, 0.1], [0.3, 0, 0.2]
+    )
     made = jn.Mechanism(
         space="spatial", bodies={"rod": jn.Body([0, 0, 0])}, joints={"pin": pin}, drivers={"turn": driver},
         outputs={"line": line},
@@ -256,11 +262,11 @@ def test_a_force_has_derivatives_by_an_angle_and_what_has_none_is_told():
         joints={"O": jn.planar.Revolute(("ground", "arm"), [0, 0], [0, 0])},
         drivers={"turn": jn.drivers.CoordinateDriver(("ground", "arm"), "angle", "sin(2*t)")},
         outputs={
-            "angle": jn.AngleOutput("arm"),
-            "law": jn.DriverAngleOutput("turn"),
-            "torque": jn.DriverTorqueOutput("turn"),
-            "stiffness": jn.DerivativeOutput("torque", "angle"),
-            "same": jn.DerivativeOutput("angle", "law"),
+            "angle": jn.outputs.AngleOutput("arm"),
+            "law": jn.outputs.DriverAngleOutput("turn"),
+            "torque": jn.outputs.DriverTorqueOutput("turn"),
+            "stiffness": jn.outputs.DerivativeOutput("torque", "angle"),
+            "same": jn.outputs.DerivativeOutput("angle", "law"),
         },
     )
     motion = jn.solve(weight, [0.1, math.pi / 4, 1.0], order=ORDER)
@@ -284,25 +290,28 @@ def test_a_force_has_derivatives_by_an_angle_and_what_has_none_is_told():
 @pytest.mark.parametrize(
     "given, words",
     [
-        (jn.DerivativeOutput("psy", "theta"), "psy.*psi"),
-        (jn.DerivativeOutput("C", "theta"), "components.*name one, such as C_x"),
-        (jn.DerivativeOutput("self", "theta"), "one of itself"),
-        (jn.DerivativeOutput("psi", "C_z"), "C_z"),
+        (jn.outputs.DerivativeOutput("psy", "theta"), "psy.*psi"),
+        (jn.outputs.DerivativeOutput("C", "theta"), "components.*name one, such as C_x"),
+        (jn.outputs.DerivativeOutput("self", "theta"), "one of itself"),
+        (jn.outputs.DerivativeOutput("psi", "C_z"), "C_z"),
     ],
 )
 def test_bad_derivatives_are_told(given, words):
-    with pytest.raises(jn.MechanismError, match=words) as caught:
+    with pytest.raises(jn.errors.MechanismError, match=words) as caught:
         four_bar(self=given)
     assert caught.value.name.startswith("outputs.self.")
 
 
 @pytest.mark.slow
 def test_derivatives_of_derivatives_and_of_motions_that_are_solved():
-    second = {"ratio": jn.DerivativeOutput("psi", "theta"), "again": jn.DerivativeOutput("ratio", "theta")}
-    made = four_bar(**second, direct=jn.DerivativeOutput("psi", "theta", 2))
+    second = {
+        "ratio": jn.outputs.DerivativeOutput("psi", "theta"),
+        "again": jn.outputs.DerivativeOutput("ratio", "theta"),
+    }
+    made = four_bar(**second, direct=jn.outputs.DerivativeOutput("psi", "theta", 2))
     motion = jn.solve(made, [0.1, 0.3], order=3)
     np.testing.assert_allclose(motion.outputs["again"], motion.outputs["direct"], rtol=1e-10)
-    found = jn.solve(four_bar(), [0.1, 0.3], order=3).evaluate(jn.DerivativeOutput("psi", "theta"))
+    found = jn.solve(four_bar(), [0.1, 0.3], order=3).evaluate(jn.outputs.DerivativeOutput("psi", "theta"))
     np.testing.assert_allclose(found.values[:, :3], motion.outputs["ratio"][:, :3], rtol=1e-11)
-    with pytest.raises(jn.MechanismError, match="solve it to a higher order"):
-        jn.solve(four_bar(), [0.1, 0.3], order=3).evaluate(jn.DerivativeOutput("psi", "theta", 9))
+    with pytest.raises(jn.errors.MechanismError, match="solve it to a higher order"):
+        jn.solve(four_bar(), [0.1, 0.3], order=3).evaluate(jn.outputs.DerivativeOutput("psi", "theta", 9))

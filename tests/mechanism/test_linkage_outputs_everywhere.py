@@ -11,11 +11,11 @@ import jounce as jn
 
 TIMES = [0.1, 0.2, 0.3]
 OUTPUTS = {
-    "theta": jn.AngleOutput("crank"),
-    "psi": jn.AngleOutput("rocker"),
-    "ratio": jn.DerivativeOutput("psi", "theta"),
-    "second": jn.DerivativeOutput("psi", "theta", 2),
-    "pole": jn.InstantCenterOutput(("crank", "rocker")),
+    "theta": jn.outputs.AngleOutput("crank"),
+    "psi": jn.outputs.AngleOutput("rocker"),
+    "ratio": jn.outputs.DerivativeOutput("psi", "theta"),
+    "second": jn.outputs.DerivativeOutput("psi", "theta", 2),
+    "pole": jn.outputs.InstantCenterOutput(("crank", "rocker")),
 }
 
 
@@ -34,7 +34,7 @@ def test_a_file_has_them_again(tmp_path):
     }
     assert again.shown_units.of("rad/m", "")[0] == "rad/m"
     (tmp_path / "bad.yaml").write_text(text.replace("of: psi", "of: psy"))
-    with pytest.raises(jn.MechanismFileError, match="psy") as caught:
+    with pytest.raises(jn.errors.MechanismFileError, match="psy") as caught:
         jn.load(tmp_path / "bad.yaml")
     assert caught.value.line is not None
 
@@ -72,7 +72,10 @@ def test_free_simulations_have_them_one_by_one_and_side_by_side():
         name: dataclasses.replace(made.bodies[name], mass=mass, inertia=inertia, center_of_mass=center)
         for name, (mass, inertia, center) in bodies.items()
     }
-    outputs = OUTPUTS | {"energy": jn.KineticEnergyOutput(), "push": jn.DerivativeOutput("energy", "psi")}
+    outputs = OUTPUTS | {
+        "energy": jn.outputs.KineticEnergyOutput(),
+        "push": jn.outputs.DerivativeOutput("energy", "psi"),
+    }
     free = dataclasses.replace(made, bodies=heavy, drivers={}, gravity=[0, -9.81], outputs=outputs)
     free = dataclasses.replace(
         free, initial={"start": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "0.5+3*t")}
@@ -97,5 +100,5 @@ def test_a_family_that_leaves_outputs_out_keeps_what_a_derivative_is_of():
     made = four_bar()
     alone = dataclasses.replace(made, outputs={"ratio": made.outputs["ratio"]})
     assert jn.solve(alone, TIMES, order=1).outputs["ratio"].shape == (3, 2)
-    other = dataclasses.replace(made, outputs={**made.outputs, "psi": jn.AngleOutput("crank")})
+    other = dataclasses.replace(made, outputs={**made.outputs, "psi": jn.outputs.AngleOutput("crank")})
     np.testing.assert_allclose(jn.solve(other, TIMES, order=1).outputs["ratio"], [[1, 0]] * 3, atol=1e-12)

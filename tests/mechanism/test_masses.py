@@ -15,7 +15,7 @@ from tests.problems.small import crank
 ROD = jn.Inertia.solid("rod", length=0.6, mass=2.0, axis="x", center_of_mass=[0.3, 0.1, 0])
 
 
-def test_an_inertia_gives_mass_and_centre_of_mass_too():
+def test_an_inertia_gives_mass_and_center_of_mass_too():
     plane, space = jn.Body([0, 0], inertia=ROD), jn.Body([0, 0, 0], inertia=ROD)
     assert (plane.mass, plane.inertia, plane.center_of_mass.tolist()) == (2.0, 0.06, [0.3, 0.1])
     mass, center, tensor = body_mass("a", space, {}, 3)
@@ -24,7 +24,7 @@ def test_an_inertia_gives_mass_and_centre_of_mass_too():
     moved = dataclasses.replace(plane, angle=1.0)
     assert (moved.mass, moved.inertia) == (2.0, 0.06)
     for given in ({"mass": 1.0}, {"center_of_mass": [0, 0]}):
-        with pytest.raises(jn.MechanismError, match="inertia: an Inertia contains the mass"):
+        with pytest.raises(jn.errors.MechanismError, match="inertia: an Inertia contains the mass"):
             jn.Body([0, 0], inertia=ROD, **given)
 
 
@@ -73,7 +73,7 @@ def test_what_no_body_has(given, message):
 
 
 def test_no_negative_moment_in_the_plane():
-    with pytest.raises(jn.MechanismError, match=r"bodies\.a\.inertia: .*negative, got -2\.0"):
+    with pytest.raises(jn.errors.MechanismError, match=r"bodies\.a\.inertia: .*negative, got -2\.0"):
         body_mass("a", jn.Body([0, 0], inertia=-2.0), {}, 2)
 
 
@@ -108,7 +108,7 @@ def test_initial_conditions_do_not_bear_on_prescribed_motion():
     ids=["joint", "driver", "name", "body"],
 )
 def test_what_no_initial_condition_is(initial, message):
-    with pytest.raises(jn.MechanismError, match=message):
+    with pytest.raises(jn.errors.MechanismError, match=message):
         with_initial(**initial)
 
 

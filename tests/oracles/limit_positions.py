@@ -28,9 +28,9 @@ def slider_crank(a, b, e):
 
 
 def rssr(a, r, rod, center, axis):
-    """Crank a about z at the origin, rocker r about an axis through a centre: the tip in the plane of axis and rod.
+    """Crank a about z at the origin, rocker r about an axis through a center: the tip in the plane of axis and rod.
 
-    With p the tip of the crank as seen from the centre, the rocker's circle and the sphere of the rod touch where
+    With p the tip of the crank as seen from the center, the rocker's circle and the sphere of the rod touch where
     ``(p.p + r^2 - l^2)^2 = 4 r^2 |p x n|^2``, a quartic in the tangent of half the angle.
     """
     with mpmath.workdps(DIGITS):

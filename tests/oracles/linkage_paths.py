@@ -212,7 +212,7 @@ def follow(forms, circular, start, targets):
     start : array of shape (linkages, unknowns)
         Position at the first target, to rounding.
     targets : list of arrays
-        Driven values of each linkage, to be visited in this order; the driven value is monotonic between neighbours.
+        Driven values of each linkage, to be visited in this order; the driven value is monotonic between neighbors.
     """
     count, n = start.shape
     lengths = np.array([len(t) for t in targets])

@@ -44,7 +44,7 @@ def angles():
     second, fourth, sixth = beta + theta, phi + delta, omega + epsilon
     links = (beta, second, gamma, fourth, delta, sixth, epsilon)
     crank = [n["rr"] * cos(beta), n["rr"] * sin(beta)]
-    centres = [
+    centers = [
         (n["ra"] * cos(beta), n["ra"] * sin(beta)),
         (crank[0] - n["da"] * cos(second), crank[1] - n["da"] * sin(second)),
         (n["xb"] + n["sa"] * sin(gamma) + n["sb"] * cos(gamma), n["yb"] - n["sa"] * cos(gamma) + n["sb"] * sin(gamma)),
@@ -62,8 +62,8 @@ def angles():
             n["ya"] - n["ua"] * cos(epsilon) - n["ub"] * sin(epsilon),
         ),
     ]
-    for k, (centre, angle) in enumerate(zip(centres, links, strict=True), 1):
-        for coordinate in centre:
+    for k, (center, angle) in enumerate(zip(centers, links, strict=True), 1):
+        for coordinate in center:
             problem.inertia(n[f"m{k}"], coordinate)
         problem.inertia(n[f"i{k}"], angle)
     problem.force(n["mom"], beta)

@@ -1,7 +1,7 @@
 """Published benchmarks of multibody dynamics in the judge's own formulation: each function returns a closed `Problem`.
 
-Every number is taken in decimals as published. Planar bodies in absolute coordinates are (x, y, angle) of the centre
-of mass, spatial ones (x, y, z) and four Euler parameters, with their normalisation as a constraint.
+Every number is taken in decimals as published. Planar bodies in absolute coordinates are (x, y, angle) of the center
+of mass, spatial ones (x, y, z) and four Euler parameters, with their normalization as a constraint.
 """
 
 from mpmath import mp
@@ -36,7 +36,7 @@ class Planar:
 
 
 class Spatial:
-    """Rigid body of space in absolute coordinates, centre of mass and Euler parameters; inertia in principal axes."""
+    """Rigid body of space in absolute coordinates, center of mass and Euler parameters; inertia in principal axes."""
 
     def __init__(self, problem, mass, inertia, center=("0", "0", "0")):
         self.coordinates = problem.coordinates(7)
@@ -177,7 +177,7 @@ def governor_start():
 def spatial_slider_crank(stiffness=0, damping=0):
     """IFToMM benchmark, spatial rigid slider-crank: returns the problem and crank angle, slide and rod.
 
-    The crank (0.08 m, about x through (0, 0.1, 0.12), its centre of mass on the axis) starts upright; the rod (0.3 m)
+    The crank (0.08 m, about x through (0, 0.1, 0.12), its center of mass on the axis) starts upright; the rod (0.3 m)
     hangs on a ball at the crank and on a universal joint at the slider, which moves along x; weight acts along -z.
     Unlike in the benchmark, a spring with a damper may hold the slider to x = 0.2 m.
     """
@@ -261,10 +261,10 @@ def spatial_double_pendulum():
         (a, [zero] * 3, "2", ("0.03", "0.04", "0.02")),
         (b, hinge, "1.5", ("0.05", "0.02", "0.06")),
     ):
-        centre = [o + x * mp.mpf("-0.3") for o, x in zip(origin, axes[2], strict=True)]
-        for x in centre:
+        center = [o + x * mp.mpf("-0.3") for o, x in zip(origin, axes[2], strict=True)]
+        for x in center:
             problem.inertia(mass, x)
-        problem.force(mp.mpf(mass) * mp.mpf("-9.81"), centre[2])
+        problem.force(mp.mpf(mass) * mp.mpf("-9.81"), center[2])
         moments = [mp.mpf(x) for x in moments]
         for moment, axis in zip(moments, axes, strict=True):
             for x in axis:

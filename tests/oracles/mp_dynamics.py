@@ -1,7 +1,7 @@
 """Independent judge: equations of motion with constraints in many digits, to any order, from T, Q and g alone.
 
 A mechanism is a list of coordinates q, and scalar functions of them: the kinetic energy is a sum of weighted squares
-of rates, ``T = 1/2 sum w x(q)'^2`` (of coordinates of centres of mass, angles, columns of the attitude matrix), each
+of rates, ``T = 1/2 sum w x(q)'^2`` (of coordinates of centers of mass, angles, columns of the attitude matrix), each
 force F does work on one displacement ``s(q)``, and each constraint is ``g(q, t) = 0``. Then, by d'Alembert,
 
     sum w x'' dx/dq + sum lambda dg/dq = sum F ds/dq,
@@ -291,7 +291,7 @@ class Problem:
                 n.c.append(n.update(k))
 
     def start(self, time, position, velocity):
-        """Put in a state; it must fulfil the constraints."""
+        """Put in a state; it must fulfill the constraints."""
         for n in self.nodes:
             n.c = []
         self.time.at = mp.mpf(time)
@@ -366,7 +366,7 @@ class Problem:
         return self
 
     def consistent(self, position, velocity, fixed=()):
-        """Return a state that fulfils the constraints: Newton's method, the coordinates in `fixed` held as they are."""
+        """Return a state that fulfills the constraints: Newton's method, those in `fixed` held as they are."""
         position, velocity = [mp.mpf(x) for x in position], [mp.mpf(v) for v in velocity]
         free = [i for i in range(len(self.q)) if i not in fixed]
         for _ in range(100):

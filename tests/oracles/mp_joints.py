@@ -58,7 +58,7 @@ class PlanarPose:
     def angle(self):
         return atan2(self.s, self.c, self.near)
 
-    def normalisation(self):
+    def normalization(self):
         return self.c * self.c + self.s * self.s - 1
 
 
@@ -88,7 +88,7 @@ class SpatialPose:
     def point(self, p):
         return [r + d for r, d in zip(self.position, self.direction(p), strict=True)]
 
-    def normalisation(self):
+    def normalization(self):
         return dot(self.p, self.p) - 1
 
     def angular_velocity(self, frame=None):

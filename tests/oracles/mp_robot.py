@@ -163,7 +163,7 @@ def turn(axis, angle):
 
 
 class State:
-    """A robot along a motion: poses, centres of mass and angular velocities of all bodies, in the frame of the base.
+    """A robot along a motion: poses, centers of mass and angular velocities of all bodies, in the frame of the base.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ class State:
         return [dot(rate[2], before[1]), dot(rate[0], before[2]), dot(rate[1], before[0])]
 
     def angular_momentum(self, k):
-        """Return the angular momentum of body k about its centre of mass; one order shorter."""
+        """Return the angular momentum of body k about its center of mass; one order shorter."""
         A = [cut(row, self.length - 1) for row in self.attitude[k]]
         return times(A, times(self.robot.bodies[k].inertia, times(transposed(A), self.angular_velocity(k))))
 
@@ -227,13 +227,13 @@ class State:
         return cross(axis, minus(cut(point, length), cut(self.origin[j], length))), axis
 
     def pull(self, k):
-        """Return what moves body k: ``m (r'' - g)`` at the centre of mass and the rate of its angular momentum."""
+        """Return what moves body k: ``m (r'' - g)`` at the center of mass and the rate of its angular momentum."""
         body = self.robot.bodies[k]
         falling = [Series([-g, *[mpf(0)] * (self.length - 3)]) for g in self.robot.gravity]
         return scaled(plus(rates(self.center[k], 2), falling), body.mass), rates(self.angular_momentum(k))
 
     def forces(self, loads=None):
-        """Return the generalised force at each coordinate by virtual work, two orders shorter than the motions.
+        """Return the generalized force at each coordinate by virtual work, two orders shorter than the motions.
 
         `loads` maps indices of bodies to series of an external force and its moment about the origin of the body, in
         components of its frame.
@@ -269,7 +269,7 @@ class State:
         return times(back, force), times(back, moment)
 
     def center_of_mass(self):
-        """Return the centre of mass of all moving bodies."""
+        """Return the center of mass of all moving bodies."""
         masses = [body.mass for body in self.robot.bodies]
         weighted = [scaled(r, m) for r, m in zip(self.center, masses, strict=True)]
         return [sum((r[i] for r in weighted[1:]), weighted[0][i]) / mp.fsum(masses) for i in range(3)]
@@ -307,10 +307,10 @@ class State:
 
 
 def cloud(body):
-    """Return seven point masses with the mass, the centre of mass and the inertia of a body.
+    """Return seven point masses with the mass, the center of mass and the inertia of a body.
 
-    Second moments ``S = sum d l l^T`` (Cholesky without square roots) stand for pairs of points at the centre
-    plus and minus a multiple of l; the rest of the mass sits at the centre.
+    Second moments ``S = sum d l l^T`` (Cholesky without square roots) stand for pairs of points at the center
+    plus and minus a multiple of l; the rest of the mass sits at the center.
     """
     trace = body.inertia[0][0] + body.inertia[1][1] + body.inertia[2][2]
     rest = [[(trace / 2 if i == j else 0) - body.inertia[i][j] for j in range(3)] for i in range(3)]

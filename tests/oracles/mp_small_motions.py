@@ -8,7 +8,7 @@ DIGITS = 40
 class SprungFourBar:
     """A planar four-bar ABCD in gravity: a spring from the crank's middle to the ground, one on the rocker's angle.
 
-    The energy is a function of the crank's angle, and so is the generalised mass, as the kinetic energy is quadratic in
+    The energy is a function of the crank's angle, and so is the generalized mass, as the kinetic energy is quadratic in
     its rate. Derivatives are numerical ones, of 40 digits.
     """
 
@@ -29,7 +29,7 @@ class SprungFourBar:
         return coupler, rocker
 
     def centers_at(self, crank):
-        """Centres of mass and angles of the bodies."""
+        """Centers of mass and angles of the bodies."""
         coupler, rocker = self.angles(crank)
         a, d = mp.mpf(self.lengths["AB"]), mp.mpf(self.lengths["AD"])
         origins = {"crank": (0, 0), "coupler": (a * mp.cos(crank), a * mp.sin(crank)), "rocker": (d, 0)}
@@ -55,7 +55,7 @@ class SprungFourBar:
         )
 
     def mass(self, crank):
-        """Generalised mass of the crank's angle, kg m^2."""
+        """Generalized mass of the crank's angle, kg m^2."""
         total = mp.mpf(0)
         for k in range(3):
             m, inertia, *_ = self.centers_at(crank)[k]

@@ -26,7 +26,7 @@ def composed(function, inner):
     """Return the coefficients of ``function(x)`` and the scale of each, for a polynomial x given as floats.
 
     The scale replaces every number that is added up by its magnitude, so that it tells how much rounding the
-    coefficient must forgive. Where it vanishes (an odd function at zero) the neighbours stand in.
+    coefficient must forgive. Where it vanishes (an odd function at zero) the neighbors stand in.
     """
     inner = [mp.mpf(c) for c in inner]
     outer = taylor(function, inner[0], len(inner) - 1)

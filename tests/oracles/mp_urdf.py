@@ -21,7 +21,7 @@ def rotation(element):
 
 
 def inertial(link):
-    """Return mass, centre of mass and inertia in the axes of the link; nothing where none is given."""
+    """Return mass, center of mass and inertia in the axes of the link; nothing where none is given."""
     element = link.find("inertial")
     if element is None:
         return {}

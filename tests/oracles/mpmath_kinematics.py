@@ -119,12 +119,12 @@ class Model:
         return out
 
     def residuals(self, table, motions):
-        """Return the series of all residuals, normalisations last."""
+        """Return the series of all residuals, normalizations last."""
         n, out = len(table), []
         for (names, keys, residual), f in zip(self.constraints, motions, strict=True):
             out += residual(keys, None if f is None else Series(f.c[:n]), *self._poses(table, names))
         for pose in self._poses(table, self.bodies):
-            out.append(pose.normalisation())
+            out.append(pose.normalization())
         return out
 
     def jacobian(self, x, motions):
@@ -132,7 +132,7 @@ class Model:
         zero, ctx = self.ctx.mpf(0), self.ctx
         matrix, row = [], 0
         entries = [(names, r, k, f) for (names, k, r), f in zip(self.constraints, motions, strict=True)]
-        entries += [([name], lambda k, f, body: [body.normalisation()], {}, None) for name in self.bodies]
+        entries += [([name], lambda k, f, body: [body.normalization()], {}, None) for name in self.bodies]
         for names, residual, keys, f in entries:
             frozen = None if f is None else Series([f.c[0], zero])
             for body in dict.fromkeys(names):
@@ -214,7 +214,7 @@ class Model:
 
 
 def factor(matrix):
-    """Return an LU factorisation with row exchanges."""
+    """Return an LU factorization with row exchanges."""
     a, n, order = [row[:] for row in matrix], len(matrix), list(range(len(matrix)))
     if any(len(row) != n for row in a):
         raise ArithmeticError(f"{n} residuals for {len(a[0])} coordinates")

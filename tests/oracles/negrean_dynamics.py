@@ -23,7 +23,7 @@ def skew(a):
 class BodyMotion:
     """A random body and its motion: derivatives of the origin r, of the rotation matrix R, and of w, all in the base.
 
-    The body is a cloud of points, with its mass, centre of mass and second moments about that.
+    The body is a cloud of points, with its mass, center of mass and second moments about that.
     """
 
     def __init__(self, seed, order=8):
@@ -65,23 +65,23 @@ class BodyMotion:
         return turning + product_rate(lambda k: self.r[p + 1 + k], n, lambda a, b: self.mass * a @ b)
 
     def printed_107_middle(self, p, n=0):
-        """Return N 107 as printed, second form, of a body that turns about its centre of mass."""
+        """Return N 107 as printed, second form, of a body that turns about its center of mass."""
         high = self.R[p + n + 1]
         return np.trace(high @ self.second_moments @ high.T) / 2
 
     def rotation(self, p, n=0):
-        """Return the n-th rate of the energy of the turning about the centre of mass."""
+        """Return the n-th rate of the energy of the turning about the center of mass."""
         return product_rate(lambda k: self.R[p + 1 + k], n, lambda A, B: np.trace(A @ self.second_moments @ B.T))
 
     @property
     def inertia(self):
-        """Inertia tensor about the centre of mass, in the base: N 72."""
+        """Inertia tensor about the center of mass, in the base: N 72."""
         S = self.R[0] @ self.second_moments @ self.R[0].T
         return np.trace(S) * np.eye(3) - S
 
     @property
     def moments(self):
-        """Second moments about the centre of mass, in the base: N 109."""
+        """Second moments about the center of mass, in the base: N 109."""
         return self.R[0] @ self.second_moments @ self.R[0].T
 
 
@@ -154,13 +154,13 @@ def slope(robot, q, p, n, m):
 
 
 def inertia_forces(robot, q, rates):
-    """Return generalised inertia forces and their rates by virtual work, (rates + 1, joints)."""
+    """Return generalized inertia forces and their rates by virtual work, (rates + 1, joints)."""
     state = State(robot.without_gravity(), [Series([d / mp.factorial(k) for k, d in enumerate(row)]) for row in q])
     return np.array([[float(d) for d in force.derivatives()[: rates + 1]] for force in state.forces()]).T
 
 
 def higher_order(robot, q, k, m, coefficients):
-    """Return N 134 with the given coefficients: the (k-1)-th rate of the generalised inertia forces."""
+    """Return N 134 with the given coefficients: the (k-1)-th rate of the generalized inertia forces."""
     scale = math.factorial(k - 1) * math.factorial(m) / math.factorial(m + k - 1)
     terms = [c * slope(robot, q, p, m + k - 2 * p - 1, m) for p, c in zip(range(1, k + 1), coefficients, strict=True)]
     return scale * sum(terms[1:], terms[0])

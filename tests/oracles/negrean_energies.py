@@ -10,7 +10,7 @@ import numpy as np
 def first_order(mass, inertia_at_origin, center, acceleration, w, a):
     """Return the acceleration energy of a body from the motion of its origin: N 105.
 
-    `center` is the centre of mass from the origin, `acceleration` that of the origin, the tensor is about the origin.
+    `center` is the center of mass from the origin, `acceleration` that of the origin, the tensor is about the origin.
     """
     inertia = np.asarray(inertia_at_origin)
     moving = mass / 2 * acceleration @ acceleration
@@ -19,7 +19,7 @@ def first_order(mass, inertia_at_origin, center, acceleration, w, a):
 
 
 def first_order_at_center(mass, inertia, acceleration, w, a):
-    """Return the acceleration energy of a body from the motion of its centre of mass: N 106."""
+    """Return the acceleration energy of a body from the motion of its center of mass: N 106."""
     return mass / 2 * acceleration @ acceleration + rotation_first_order(inertia, w, a)
 
 

@@ -53,7 +53,7 @@ def equation_014(axis):
 
 
 def equation_012(axis, angle):
-    """Return the generalised matrix of a simple rotation, by its nine entries."""
+    """Return the generalized matrix of a simple rotation, by its nine entries."""
     yz, zx, xy = equation_013(axis)
     x, y, z = equation_014(axis)
     c, s = mp.cos, mp.sin

@@ -40,7 +40,7 @@ def appendix_04(i, j, s_i, s_j):
 
 
 def appendix_05(i):
-    """Generalised accelerations of a planar body."""
+    """Generalized accelerations of a planar body."""
     return np.append(i.r[2], i.phi[2])
 
 
@@ -87,7 +87,7 @@ def appendix_11(i, j, s_i, s_j):
 
 
 def appendix_12(i):
-    """Generalised jerks of a planar body."""
+    """Generalized jerks of a planar body."""
     return np.append(i.r[3], i.phi[3])
 
 
@@ -146,7 +146,7 @@ def appendix_21(i, j, s_i, s_j):
 
 
 def appendix_22(i):
-    """Generalised accelerations of a spatial body."""
+    """Generalized accelerations of a spatial body."""
     return np.append(i.r[2], i.w[1])
 
 
@@ -201,7 +201,7 @@ def appendix_29(i):
 
 
 def appendix_30(i):
-    """Generalised jerks of a spatial body."""
+    """Generalized jerks of a spatial body."""
     return np.append(i.r[3], i.w[2])
 
 

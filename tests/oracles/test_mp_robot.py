@@ -138,7 +138,7 @@ def test_printed_energies_of_higher_order_lack_terms():
     assert abs(third - printed) > 0.1 * third
 
 
-def test_wrench_along_the_axis_is_the_generalised_force():
+def test_wrench_along_the_axis_is_the_generalized_force():
     state = random_state(6, 5)
     for force, k in zip(state.forces(), state.robot.moving, strict=True):
         body = state.robot.bodies[k]

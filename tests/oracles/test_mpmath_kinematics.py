@@ -158,8 +158,8 @@ def rolling_disc(t):
     table, R = deg("10") * wave(t), mpf("0.04")
     x = mpf("0.10") + mpf("0.05") * wave(t) - mpf("0.01") * cos(t * (2 * mp.pi))
     disc = table - x / R
-    centre = [x * cos(table) - R * sin(table), x * sin(table) + R * cos(table)]
-    pin = [centre[0] + mpf("0.03") * cos(disc), centre[1] + mpf("0.03") * sin(disc)]
+    center = [x * cos(table) - R * sin(table), x * sin(table) + R * cos(table)]
+    pin = [center[0] + mpf("0.03") * cos(disc), center[1] + mpf("0.03") * sin(disc)]
     rise = mpf("0.25") - pin[1]
     ram = pin[0] + sqrt(mpf("0.3") ** 2 - rise * rise)
     return {"disc_angle": disc, "pin": pin, "ram": [ram, 0 * t + mpf("0.25")]}
@@ -242,7 +242,7 @@ def test_reference_agrees_with_closed_form_to_thirty_digits(name):
 def test_platform_reference_is_a_rigid_body():
     """Two of its points: relative velocity is angular velocity cross relative position, and so on in acceleration."""
     _, outputs = reference("stewart_platform")
-    d, w = outputs["corner"] - outputs["centre"], outputs["spin"]
+    d, w = outputs["corner"] - outputs["center"], outputs["spin"]
     np.testing.assert_allclose(np.linalg.norm(d[0], axis=-1), np.hypot(0.2, 0.05), rtol=1e-14)
     np.testing.assert_allclose(d[1], np.cross(w[0], d[0]), rtol=0, atol=1e-14)
     np.testing.assert_allclose(d[2], np.cross(w[1], d[0]) + np.cross(w[0], d[1]), rtol=0, atol=1e-13)

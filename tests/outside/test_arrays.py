@@ -26,7 +26,7 @@ def crank(motion="2*t"):
         bodies={"crank": jn.Body([0, 0])},
         joints={"O": jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])},
         drivers={"motor": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion=motion)},
-        outputs={"angle": jn.AngleOutput("crank")},
+        outputs={"angle": jn.outputs.AngleOutput("crank")},
     )
 
 

@@ -40,7 +40,7 @@ def four_bar(base, crank, coupler, rocker, motion, guess):
             "D": pin("ground", "rocker", [base, 0], [0, 0]),
         },
         drivers={"motor": turning("crank", motion)},
-        outputs={"rocker": jn.AngleOutput("rocker")},
+        outputs={"rocker": jn.outputs.AngleOutput("rocker")},
     )
 
 
@@ -61,11 +61,11 @@ def geared(ratio, load, **more):
         },
         forces={"load": jn.forces.Torque(("ground", "output"), law=load)},
         outputs={
-            "motor": jn.DriverTorqueOutput("motor"),
-            "brake": jn.DriverTorqueOutput("brake"),
-            "gear_on_housing": jn.JointTorqueOutput("gear", "housing"),
-            "gear_on_input": jn.JointTorqueOutput("gear", "input"),
-            "gear_on_output": jn.JointTorqueOutput("gear", "output"),
+            "motor": jn.outputs.DriverTorqueOutput("motor"),
+            "brake": jn.outputs.DriverTorqueOutput("brake"),
+            "gear_on_housing": jn.outputs.JointTorqueOutput("gear", "housing"),
+            "gear_on_input": jn.outputs.JointTorqueOutput("gear", "input"),
+            "gear_on_output": jn.outputs.JointTorqueOutput("gear", "output"),
         },
         **more,
     )
@@ -102,10 +102,10 @@ def test_a_rack_pushes_the_bearing_of_its_pinion():
         drivers={"motor": turning("pinion", "0.1*t")},
         forces={"load": jn.forces.PointForce("rack", [0, 0], law=["-100", "0"])},
         outputs={
-            "motor": jn.DriverTorqueOutput("motor"),
-            "bearing": jn.JointForceOutput("A", "ground"),
-            "guide": jn.JointTorqueOutput("guide", "ground"),
-            "rack": jn.PointOutput("rack", [0, 0]),
+            "motor": jn.outputs.DriverTorqueOutput("motor"),
+            "bearing": jn.outputs.JointForceOutput("A", "ground"),
+            "guide": jn.outputs.JointTorqueOutput("guide", "ground"),
+            "rack": jn.outputs.PointOutput("rack", [0, 0]),
         },
     )
     motion = jn.solve(made, [0.0, 1.0], order=1)
@@ -123,7 +123,10 @@ def test_a_hoist_stands_on_the_ground():
         bodies={"lift": jn.Body([0.7, 0], mass=2.0, inertia=0.1)},
         joints={"guide": jn.planar.Prismatic(("ground", "lift"), [0.7, 0], [0, 0], [0, 1], [0, 1])},
         drivers={"rope": jn.drivers.CoordinateDriver(("ground", "lift"), "y", motion="0.1 + 0.1*t + 0.2*t**3")},
-        outputs={"up": jn.JointForceOutput("rope", "lift"), "down": jn.JointForceOutput("rope", "ground")},
+        outputs={
+            "up": jn.outputs.JointForceOutput("rope", "lift"),
+            "down": jn.outputs.JointForceOutput("rope", "ground"),
+        },
     )
     found = jn.solve(made, [0.0, 0.5], order=2).outputs
     t = np.array([0.0, 0.5])
@@ -188,13 +191,15 @@ def test_peaks_of_cam_profiles_lie_at_their_ends(profile):
 
     The jerk of the 3-4-5 polynomial is largest at its ends, which the grid does not contain, between two dwells.
     """
-    law = jn.SegmentedMotion([jn.Segment("dwell", 0.2301), jn.Segment(profile, 1.0, to=1.0), jn.Segment("dwell", 0.3)])
+    law = jn.laws.SegmentedMotion(
+        [jn.laws.Segment("dwell", 0.2301), jn.laws.Segment(profile, 1.0, to=1.0), jn.laws.Segment("dwell", 0.3)]
+    )
     made = jn.Mechanism(
         space="planar",
         bodies={"f": jn.Body([0, 0])},
         joints={"guide": jn.planar.Prismatic(("ground", "f"), [0, 0], [0, 0], [1, 0], [1, 0])},
         drivers={"cam": jn.drivers.SlideDriver(("ground", "f"), [0, 0], [0, 0], [1, 0], motion=law)},
-        outputs={"lift": jn.DriverDisplacementOutput("cam")},
+        outputs={"lift": jn.outputs.DriverDisplacementOutput("cam")},
     )
     motion = jn.solve(made, np.linspace(0.0, 1.5, 151), order=3)
     found = {p.derivative: max(abs(p.minimum), abs(p.maximum)) for p in peaks(motion)}

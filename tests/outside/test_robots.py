@@ -59,7 +59,7 @@ def test_followers_with_ranges_of_the_wrong_sign_leave_the_leader_its_own(load, 
     parts = [link("outer"), joint("finger", "base", "outer", limit(0, 0.8757))]
     for k in range(count):
         parts += [link(f"in{k}"), joint(f"knuckle{k}", "outer", f"in{k}", limit(0, 0.8757) + mimic("finger", -1))]
-    with pytest.warns(jn.RobotWarning, match="knuckle0"):
+    with pytest.warns(jn.errors.RobotWarning, match="knuckle0"):
         robot = load(*parts)
     limits = robot.joints["finger"].limits
     assert (limits.lower, limits.upper) == (0.0, 0.8757)
@@ -133,7 +133,7 @@ def test_the_torques_of_both_doors_are_the_same(load):
 def test_the_acceleration_of_a_tool_is_the_classical_one(load):
     """DART issue 294, Pinocchio issues 1171 and 2141, pull 2169: spatial acceleration taken for that of a point.
 
-    A tool 0.4 m from an axis at 3 rad/s and 2 rad/s^2: 0.4 * 9 m/s^2 towards the axis, 0.8 m/s^2 along the tangent.
+    A tool 0.4 m from an axis at 3 rad/s and 2 rad/s^2: 0.4 * 9 m/s^2 toward the axis, 0.8 m/s^2 along the tangent.
     """
     robot = load(
         link("rod"),
@@ -148,7 +148,7 @@ def test_the_acceleration_of_a_tool_is_the_classical_one(load):
 def test_the_speed_of_a_free_base_does_not_accelerate_a_frame(load):
     """Pinocchio issue 1921: the acceleration of a frame on a floating body changed with the body's linear velocity.
 
-    With a constant velocity and a turn of 2 rad/s about z a frame 0.3 m away has 1.2 m/s^2 towards the center.
+    With a constant velocity and a turn of 2 rad/s about z a frame 0.3 m away has 1.2 m/s^2 toward the center.
     """
     robot = load(
         link("body"),
@@ -181,8 +181,8 @@ def test_what_a_file_says_and_is_not_modeled_is_told(load, part):
     Whatever changes forces or motion and is left out is told, once for a file, and an error with `strict`.
     """
     parts = [link("rod", "0.1 0 0"), joint("pin", "base", "rod", limit(-1, 1), axis="0 1 0"), part]
-    with pytest.warns(jn.RobotWarning) as told:
+    with pytest.warns(jn.errors.RobotWarning) as told:
         load(*parts)
     assert len(told) == 1
-    with pytest.raises(jn.RobotFileError):
+    with pytest.raises(jn.errors.RobotFileError):
         load(*parts, strict=True)

@@ -25,17 +25,17 @@ def block(law, x0=0.0, v0=0.0, guess=0.0):
         joints={"slide": jn.planar.Prismatic(("ground", "block"), [0, 0], [0, 0], [1, 0], [1, 0])},
         forces={"f": jn.forces.SlideForce(("ground", "block"), [0, 0], [0, 0], [1, 0], law=law)},
         initial={"start": start},
-        outputs={"x": jn.PointOutput("block", [0, 0])},
+        outputs={"x": jn.outputs.PointOutput("block", [0, 0])},
     )
 
 
 with taken_back():
 
-    class Wire(jn.AbstractConstraint, type="outside_wire", space="planar"):
+    class Wire(jn.joints.AbstractConstraint, type="outside_wire", space="planar"):
         """A wire with a bump at x = 1 m."""
 
-        height: jn.Scalar
-        width: jn.Scalar
+        height: jn.joints.Scalar
+        width: jn.joints.Scalar
 
         def residual(self, body_i, body_j, time):
             """Vanish where the bead is on the wire."""
@@ -55,7 +55,7 @@ def bead(height, width, speed):
             "upright": jn.planar.Coordinate(("ground", "bead"), "angle", ratio=0.0),
         },
         initial={"go": jn.drivers.CoordinateDriver(("ground", "bead"), "x", motion=f"{speed}*t")},
-        outputs={"p": jn.PointOutput("bead", [0, 0])},
+        outputs={"p": jn.outputs.PointOutput("bead", [0, 0])},
     )
 
 
@@ -90,7 +90,7 @@ def test_a_late_pulse_of_a_function_is_not_stepped_over():
     def push(t):
         return jnp.exp(-0.5 * ((t - 50.0) / width) ** 2) / (width * jnp.sqrt(2 * jnp.pi))
 
-    made = block(lambda x, v, t: jn.compose(push, t) - 0.0 * x - 0.0 * v)
+    made = block(lambda x, v, t: jn.jet.compose(push, t) - 0.0 * x - 0.0 * v)
     x, speed = jn.simulate(made, [0.0, 52.0], order=1).outputs["x"][-1, :, 0]
     assert speed == pytest.approx(1.0, rel=1e-10)
     assert x == pytest.approx(2.0, rel=1e-10)
@@ -104,7 +104,7 @@ def test_all_three_roots_of_a_cubic_are_events():
     t0 = -8.0
     v0 = 3 * t0**2 + 12 * t0 - 4
     made = block("6*t + 12", x0=-120.0 - t0 * v0, v0=v0, guess=-120.0)
-    crossing = jn.Event(jn.PointOutput("block", [0, 0]))
+    crossing = jn.Event(jn.outputs.PointOutput("block", [0, 0]))
     simulation = jn.simulate(made, [t0, 4.0], order=1, events=[crossing])
     np.testing.assert_allclose(simulation.events[0], [-6.0, -2.0, 2.0], atol=1e-11)
 
@@ -116,7 +116,7 @@ def test_friction_of_constant_size_takes_the_same_from_every_swing():
     8.2.3. Here f = 0.05 N, k = 4 N/m: 25 mm a half swing, which takes pi/2 s.
     """
     made = block("-4*x - 0.05*v/abs(v)", x0=1.05, v0=-1e-3)
-    turning = jn.Event(jn.PointOutput("block", [0, 0]), derivative=1)
+    turning = jn.Event(jn.outputs.PointOutput("block", [0, 0]), derivative=1)
     simulation = jn.simulate(made, [0.0, 5.0], order=1, events=[turning])
     first = 0.0125 - np.hypot(1.05 - 0.0125, 1e-3 / 2)  # an ellipse about f / k
     found = simulation.at(simulation.events[0]).outputs["x"][:, 0, 0]
@@ -206,7 +206,7 @@ def test_a_table_changed_in_place():
             bodies={"block": jn.Body([0, 0])},
             joints={"slide": jn.planar.Prismatic(("ground", "block"), [0, 0], [0, 0], [1, 0], [1, 0])},
             drivers={"cam": jn.drivers.SlideDriver(("ground", "block"), [0, 0], [0, 0], [1, 0], motion=motion)},
-            outputs={"x": jn.PointOutput("block", [0, 0])},
+            outputs={"x": jn.outputs.PointOutput("block", [0, 0])},
         )
         x = jn.solve(made, [0.0, 0.25, 0.5], order=1).outputs["x"]
         np.testing.assert_allclose(x[1:, :, 0], [[0.25 * top, top], [0.5 * top, top]], atol=1e-14)

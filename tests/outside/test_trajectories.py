@@ -48,7 +48,7 @@ def test_one_joint_through_0_1_10_never_turns_back(axis):
 
     A joint alone has one way between two positions; the fastest motion stays within 0 and 10 and never turns back.
     """
-    with pytest.warns(jn.UnitWarning, match="10 rad"):  # of a hinge
+    with pytest.warns(jn.errors.UnitWarning, match="10 rad"):  # of a hinge
         found = positions(jn.retime(axis, {"j": [0.0, 1.0, 10.0]}, {"j": LIMITS}))
     assert found.min() >= -1e-9
     assert found.max() <= 10 + 1e-9
@@ -73,7 +73,7 @@ def test_an_encoder_that_stands_still_stands_still(axis):
     log = jn.JointTrajectory.from_samples(t, np.round(rise, 2)[:, None], ["j"])
     try:
         found = positions(jn.retime(axis, log, {"j": LIMITS}))
-    except jn.TrajectoryError as error:
+    except jn.errors.TrajectoryError as error:
         assert "j" in str(error)  # noqa: PT017 - refused by the name of the joint is right, too
     else:
         assert found.min() >= -0.01
@@ -85,7 +85,7 @@ def test_limits_between_the_points_of_a_driver_are_found(axis):
 
     The cubic from 0 to 1 rad in 1 s with velocities 0 at both ends: 1.5 rad/s in the middle, 6 rad/s^2 at the ends.
     """
-    law = jn.HermiteMotion([0.0, 1.0], [[0.0, 0.0], [1.0, 0.0]])
+    law = jn.laws.HermiteMotion([0.0, 1.0], [[0.0, 0.0], [1.0, 0.0]])
     limits = {"j": jn.Limits(velocity=1.4, acceleration=5.0)}
     report = jn.check_limits(axis, jn.JointTrajectory({"j": law}, start=0.0, stop=1.0), limits)
     rows = {row.quantity: row for row in report.rows}

@@ -261,7 +261,7 @@ def test_pictures_say_which_data_are_stand_ins(tmp_path, samples, masses, said, 
         (None, LINK.replace("mass: 4 kg\n", ""), ("link.yaml", "mass", "missing")),
         (None, LINK.replace("4 kg", "4 m"), ("link.yaml", "line 1", "mass", "4 m")),
         (None, LINK.replace("4 kg", "-4 kg"), ("link.yaml", "mass", "-4")),
-        (None, LINK + "centre_y: 0\n", ("link.yaml", "line 5", "centre_y", "center_x")),
+        (None, LINK + "center_y: 0\n", ("link.yaml", "line 5", "center_y", "center_x")),
     ],
 )
 def test_bad_measurements(tmp_path, run, monkeypatch, samples, link, words):

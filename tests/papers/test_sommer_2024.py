@@ -27,7 +27,7 @@ from jounce.papers.sommer_2024.phase_lag import STEPS as LAG_STEPS
 
 reproduction = importlib.import_module("jounce.papers.sommer_2024.reproduce")
 ROOT = pathlib.Path(__file__).parents[2]
-FLOOR = 1e-14  # normalised RMSE that every quantity of every simulation must reach
+FLOOR = 1e-14  # normalized RMSE that every quantity of every simulation must reach
 
 
 # The same angles from other, textbook formulas, at any precision.
@@ -141,11 +141,11 @@ def small_run(tmp_path_factory):
 
 def check_errors(path, names):
     lines = path.read_text().splitlines()
-    assert lines[0] == "simulation,quantity,rmse,normalised_rmse"
+    assert lines[0] == "simulation,quantity,rmse,normalized_rmse"
     rows = list(csv.DictReader(lines))
     assert [(row["simulation"], row["quantity"]) for row in rows] == [(n, q) for n in names for q in QUANTITIES]
     for row in rows:
-        assert 0 < float(row["normalised_rmse"]) <= FLOOR, row
+        assert 0 < float(row["normalized_rmse"]) <= FLOOR, row
         assert 0 < float(row["rmse"]) <= 1e-12, row
 
 
@@ -237,7 +237,7 @@ def plain_newton_raphson(tolerance, unit):
 
 
 @pytest.mark.slow
-def test_the_floor_of_the_paper_is_that_of_residuals_in_centimetres(small_run):
+def test_the_floor_of_the_paper_is_that_of_residuals_in_centimeters(small_run):
     """Figure 4 has its floor at tolerances below 1e-11: so has the iteration on residuals in cm, not that in m."""
     right = small_run[3].cycle.explicit[:, 0]
 
@@ -312,14 +312,14 @@ def test_differences_are_exact_for_polynomials_of_their_order():
 
 
 @pytest.mark.parametrize("step", STEPS)
-def test_every_instant_has_its_neighbours_and_all_make_one_cycle(step):
-    time, centres = stencil_instants(step)
+def test_every_instant_has_its_neighbors_and_all_make_one_cycle(step):
+    time, centers = stencil_instants(step)
     assert time[0] == 0.0
     assert (np.diff(time) > 0).all()
     assert len(time) <= 1010
     for k in (-2, -1, 1, 2):
-        np.testing.assert_allclose(time[centres + k] - time[centres], k * step, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(time[centres[-1]] - time[centres[0]], 2.0, rtol=1e-15)
+        np.testing.assert_allclose(time[centers + k] - time[centers], k * step, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(time[centers[-1]] - time[centers[0]], 2.0, rtol=1e-15)
 
 
 def test_a_directory_that_cannot_be_made_is_refused_before_any_computing(tmp_path, monkeypatch):
@@ -370,7 +370,7 @@ def test_simulation_reaches_rounding_from_velocity_to_jounce(whole_run, name):
     assert cycle.time[-1] == 2.0
     assert cycle.time.shape == (201,)
     assert np.abs(cycle.simulated[:, 0] - cycle.explicit[:, 0]).max() <= 1e-14
-    assert (cycle.normalised_rmse <= FLOOR).all(), dict(zip(QUANTITIES, cycle.normalised_rmse, strict=True))
+    assert (cycle.normalized_rmse <= FLOOR).all(), dict(zip(QUANTITIES, cycle.normalized_rmse, strict=True))
     assert (cycle.peak > 0.1).all(), "the motion is worth measuring"
     for (printed_name, quantity), printed in comparison.PRINTED.items():
         if printed_name == name:

@@ -88,7 +88,7 @@ def test_a_constant_is_drawn_flat_not_magnified(rsur):
         bodies={"a": jn.Body([0.0, 0.0])},
         joints={"O": jn.planar.Revolute(("ground", "a"), point_i=[0, 0], point_j=[0, 0])},
         drivers={"theta": jn.drivers.CoordinateDriver(("ground", "a"), "angle", motion="0.5 + 0*t")},
-        outputs={"angle": jn.AngleOutput("a")},
+        outputs={"angle": jn.outputs.AngleOutput("a")},
     )
     grid = panels(draw(jn.solve(still, [0.0, 1.0], order=1)))
     assert grid[0, 0].get_ylim() == pytest.approx((0.45, 0.55))
@@ -124,8 +124,8 @@ def test_the_file_has_ink_in_every_column(example, outputs, request, tmp_path):
     save(draw(request.getfixturevalue(example), outputs), path)
     pixels = matplotlib.image.imread(path)[..., :3]
     assert pixels.shape[1] > 900
-    coloured = np.ptp(pixels, axis=2) > 0.3
-    for part in np.array_split(coloured, len(outputs), axis=1):
+    colored = np.ptp(pixels, axis=2) > 0.3
+    for part in np.array_split(colored, len(outputs), axis=1):
         assert part.mean() > 1e-3
 
 
@@ -133,16 +133,16 @@ def test_the_file_has_ink_in_every_column(example, outputs, request, tmp_path):
 def test_unknown_outputs_and_none_at_all_are_told(four_bar):
     import dataclasses
 
-    with pytest.raises(jn.MechanismError, match="did you mean 'psi'"):
+    with pytest.raises(jn.errors.MechanismError, match="did you mean 'psi'"):
         draw(four_bar, ["psy"])
     bare = dataclasses.replace(four_bar.mechanism, outputs={})
-    with pytest.raises(jn.MechanismError, match="nothing to draw"):
+    with pytest.raises(jn.errors.MechanismError, match="nothing to draw"):
         draw(jn.solve(bare, [0.0, 0.1], order=0))
 
 
 @pytest.mark.parametrize("name", ["figure.gif", "figure", "none/figure.png", "."])
 def test_paths_that_cannot_be_written_are_refused(tmp_path, name):
-    with pytest.raises(jn.OutputError):
+    with pytest.raises(jn.errors.OutputError):
         check_figure(tmp_path / name)
 
 

@@ -87,11 +87,11 @@ def test_power_goes_where_it_should(lift):
 def test_what_has_no_forces_is_told(lift):
     bare = jn.solve(jn.load(ROOT / "examples" / "four_bar.yaml"), [0.0, 0.1], order=2)
     for figure in (draw_reactions, draw_energy, draw_power):
-        with pytest.raises(jn.MechanismError, match="mass"):
+        with pytest.raises(jn.errors.MechanismError, match="mass"):
             figure(bare)
-    with pytest.raises(jn.MechanismError, match="did you mean 'spring'"):
+    with pytest.raises(jn.errors.MechanismError, match="did you mean 'spring'"):
         draw_reactions(lift, ["sprin"])
-    with pytest.raises(jn.MechanismError, match="order 2 or more"):
+    with pytest.raises(jn.errors.MechanismError, match="order 2 or more"):
         draw_reactions(jn.solve(lift.mechanism, TIME, order=1))
 
 

@@ -54,11 +54,11 @@ def test_points_that_coincide_are_one():
 def test_outline_of_a_plate_leaves_out_what_lies_inside():
     bodies = {"plate": jn.Body([0, 0])}
     corners = [[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.4]]
-    outputs = {f"p{k}": jn.PointOutput("plate", point) for k, point in enumerate(corners)}
+    outputs = {f"p{k}": jn.outputs.PointOutput("plate", point) for k, point in enumerate(corners)}
     joints = {"pin": jn.planar.Revolute(("ground", "plate"), point_i=[0, 0], point_j=[0, 0])}
     link = skeleton(jn.Mechanism(space="planar", bodies=bodies, joints=joints, outputs=outputs)).links["plate"]
     assert sorted(map(sorted, link.edges)) == [[0, 1], [0, 3], [1, 2], [2, 3]]
-    on_a_line = {f"p{k}": jn.PointOutput("plate", [x, x]) for k, x in enumerate((2.0, 1.0, 3.0))}
+    on_a_line = {f"p{k}": jn.outputs.PointOutput("plate", [x, x]) for k, x in enumerate((2.0, 1.0, 3.0))}
     link = skeleton(jn.Mechanism(space="planar", bodies=bodies, joints=joints, outputs=on_a_line)).links["plate"]
     assert sorted(map(sorted, link.edges)) == [[0, 2], [1, 2], [1, 3]]  # a chain: 0, 1, 2, 3 m
 
@@ -68,7 +68,7 @@ def test_points_in_space_are_a_plate_or_a_tree():
     joints = {"ball": jn.spatial.Spherical(("ground", "body"), point_i=[0, 0, 0], point_j=[0, 0, 0])}
 
     def edges(count):
-        outputs = {f"p{k}": jn.PointOutput("body", corner) for k, corner in enumerate(corners[:count])}
+        outputs = {f"p{k}": jn.outputs.PointOutput("body", corner) for k, corner in enumerate(corners[:count])}
         bodies = {"body": jn.Body([0, 0, 0])}
         return (
             skeleton(jn.Mechanism(space="spatial", bodies=bodies, joints=joints, outputs=outputs)).links["body"].edges
@@ -82,7 +82,7 @@ def test_points_in_space_are_a_plate_or_a_tree():
     assert len(platform.edges) == 8  # and bars lead to the two outputs
 
 
-def test_a_body_with_one_pin_reaches_to_its_centre_of_mass():
+def test_a_body_with_one_pin_reaches_to_its_center_of_mass():
     seen = skeleton(jn.load(ROOT / "examples" / "double_pendulum.yaml"))
     np.testing.assert_array_equal(seen.links["lower"].points, [[0, 0], [1, 0]])
     bare = jn.Mechanism(

@@ -86,7 +86,7 @@ def test_the_legend_names_the_joints_and_the_title_the_robot(report):
 
 
 @pytest.mark.slow
-def test_joints_beyond_the_colours_differ_in_their_dashes():
+def test_joints_beyond_the_colors_differ_in_their_dashes():
     links = [jn.Link("base"), *(jn.Link(f"link{k}", jn.Inertia(1.0, [0.1, 0, 0])) for k in range(9))]
     joints = [
         jn.Joint(f"joint{k}", "base" if k == 0 else f"link{k - 1}", f"link{k}", limits=jn.Limits(velocity=1.0))
@@ -110,7 +110,7 @@ def test_long_trajectories_are_thinned():
 
 def test_nothing_to_draw_is_told():
     report = check_limits(crane(jn.Limits(), jn.Limits()), MOTION)
-    with pytest.raises(jn.RobotError, match="there are no limits to draw"):
+    with pytest.raises(jn.errors.RobotError, match="there are no limits to draw"):
         draw_limits(report)
 
 
@@ -120,6 +120,6 @@ def test_the_file_has_ink(report, tmp_path):
     save(draw_limits(report), path)
     pixels = matplotlib.image.imread(path)[..., :3]
     assert pixels.shape[1] == 1400
-    coloured = np.ptp(pixels, axis=2) > 0.3
-    for half in np.array_split(coloured, 2, axis=1):
+    colored = np.ptp(pixels, axis=2) > 0.3
+    for half in np.array_split(colored, 2, axis=1):
         assert half.mean() > 1e-3

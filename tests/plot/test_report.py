@@ -86,7 +86,7 @@ def test_names_cannot_break_the_page(tmp_path, name):
         bodies={name: jn.Body([0, 0])},
         joints={"O": jn.planar.Revolute(("ground", name), [0, 0], [0, 0])},
         drivers={"turn": jn.drivers.CoordinateDriver(("ground", name), "angle", motion="t")},
-        outputs={"tip": jn.PointOutput(name, [1, 0])},
+        outputs={"tip": jn.outputs.PointOutput(name, [1, 0])},
     )
     path = tmp_path / "page.html"
     report(jn.solve(mechanism, [0.0, 1.0], order=1), path)
@@ -109,9 +109,9 @@ def test_instants_that_failed_are_told(tmp_path):
 
 
 def test_a_page_that_cannot_be_written_is_told(four_bar, tmp_path):
-    with pytest.raises(jn.OutputError, match=r"valid: \.html"):
+    with pytest.raises(jn.errors.OutputError, match=r"valid: \.html"):
         report(four_bar, tmp_path / "page.pdf")
-    with pytest.raises(jn.OutputError, match="does not exist"):
+    with pytest.raises(jn.errors.OutputError, match="does not exist"):
         report(four_bar, tmp_path / "none" / "page.html")
     assert not list(tmp_path.iterdir())
 

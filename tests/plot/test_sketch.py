@@ -14,7 +14,7 @@ from jounce.plot import animate, check_animation, hodograph, phase_portrait, sav
 from jounce.plot.animation import frame_instants
 from jounce.plot.drawing import screen_of
 from jounce.plot.scene import scene_of
-from jounce.plot.style import BODY_COLOURS
+from jounce.plot.style import BODY_COLORS
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 QUICK = ("four_bar", "epicyclic", "rack_pinion")
@@ -65,7 +65,7 @@ def test_links_and_pins_are_where_the_bodies_are(four_bar):
     (bar,) = artists(figure, "bodies.rocker")
     at = int(np.argmin(np.abs(four_bar.time - 0.5)))
     np.testing.assert_allclose(bar.get_xydata(), [[0.1321, 0.0], four_bar.outputs["C"][at, 0]], rtol=0, atol=1e-12)
-    assert bar.get_color() == BODY_COLOURS[1]
+    assert bar.get_color() == BODY_COLORS[1]
     centers = [patch.get_center() for patch in artists(figure, "joints.BC") if hasattr(patch, "get_center")]
     assert any(np.allclose(center, four_bar.outputs["C"][at, 0], rtol=0, atol=1e-12) for center in centers)
     (axes,) = figure.axes
@@ -94,7 +94,7 @@ def test_names_are_all_there_and_none_covers_another(four_bar):
     assert not names_in(sketch(four_bar, names="none"))
 
 
-def test_paths_are_coloured_by_the_size_of_a_derivative(four_bar):
+def test_paths_are_colored_by_the_size_of_a_derivative(four_bar):
     figure = sketch(four_bar, order=3)
     (collection,) = [c for c in figure.axes[0].collections if isinstance(c, LineCollection)]
     size = np.linalg.norm(four_bar.outputs["C"][:, 3], axis=-1)
@@ -137,15 +137,15 @@ def test_a_joint_of_ones_own_has_a_symbol():
 
 
 def test_what_cannot_be_drawn_is_told(four_bar):
-    with pytest.raises(jn.MechanismError, match="did you mean 'bodies'"):
+    with pytest.raises(jn.errors.MechanismError, match="did you mean 'bodies'"):
         sketch(four_bar, names="bodys")
-    with pytest.raises(jn.MechanismError, match=r"position of a point.*'psi'.*valid: C"):
+    with pytest.raises(jn.errors.MechanismError, match=r"position of a point.*'psi'.*valid: C"):
         sketch(four_bar, paths=["psi"])
-    with pytest.raises(jn.MechanismError, match=r"up to order 3.*got 4"):
+    with pytest.raises(jn.errors.MechanismError, match=r"up to order 3.*got 4"):
         sketch(four_bar, order=4)
-    with pytest.raises(jn.MechanismError, match="solve it first"):
+    with pytest.raises(jn.errors.MechanismError, match="solve it first"):
         sketch(four_bar.mechanism, order=1)
-    with pytest.raises(jn.MechanismError, match=r"jn\.load reads one"):
+    with pytest.raises(jn.errors.MechanismError, match=r"jn\.load reads one"):
         sketch("four_bar.yaml")
 
 
@@ -155,11 +155,11 @@ def test_hodograph_is_the_derivative_by_components(four_bar):
     (curve,) = [line for line in axes.lines if len(line.get_xdata()) == 41]
     np.testing.assert_allclose(curve.get_xydata(), four_bar.outputs["C"][:, 2], rtol=1e-15)
     assert axes.get_ylabel() == r"$\ddot{C}_{y}$  (m/s$^2$)"
-    with pytest.raises(jn.MechanismError, match="needs an output with components"):
+    with pytest.raises(jn.errors.MechanismError, match="needs an output with components"):
         hodograph(four_bar, "psi")
-    with pytest.raises(jn.MechanismError, match="did you mean 'psi'"):
+    with pytest.raises(jn.errors.MechanismError, match="did you mean 'psi'"):
         hodograph(four_bar, "ps")
-    with pytest.raises(jn.MechanismError, match=r"up to order 3.*got 4"):
+    with pytest.raises(jn.errors.MechanismError, match=r"up to order 3.*got 4"):
         hodograph(four_bar, "C", 4)
 
 
@@ -177,7 +177,7 @@ def test_phase_portrait_draws_derivatives_against_each_other(four_bar):
         (curve,) = [line for line in axes.lines if len(line.get_xdata()) == 41]
         np.testing.assert_allclose(curve.get_xydata(), four_bar.outputs["psi"][:, list(orders)], rtol=1e-15)
     assert len(phase_portrait(four_bar, "C").axes) == 2
-    with pytest.raises(jn.MechanismError, match=r"up to order 3.*got 4"):
+    with pytest.raises(jn.errors.MechanismError, match=r"up to order 3.*got 4"):
         phase_portrait(four_bar, "psi", (3, 4))
 
 
@@ -201,10 +201,10 @@ def test_times_of_frames():
     np.testing.assert_allclose(frame_instants([0.0, 4.0], speed=2.0, fps=10), np.linspace(0.0, 4.0, 21))
     assert len(frame_instants([0.0, 1000.0])) == 501  # 20 s of film
     assert frame_instants([1.0, 0.0]).tolist()[:2] == [1.0, 0.98]  # backward; 2 s of film
-    with pytest.raises(jn.MechanismError, match=r"at most 3000"):
+    with pytest.raises(jn.errors.MechanismError, match=r"at most 3000"):
         frame_instants([0.0, 1000.0], speed=1.0)
     for wrong in (0.0, -1.0, np.inf):
-        with pytest.raises(jn.MechanismError, match="greater than zero"):
+        with pytest.raises(jn.errors.MechanismError, match="greater than zero"):
             frame_instants([0.0, 1.0], speed=wrong)
 
 
@@ -218,12 +218,12 @@ def test_an_mp4_has_its_frames(four_bar, tmp_path):
 
 
 def test_a_film_that_cannot_be_written_is_told_before(four_bar, tmp_path, monkeypatch):
-    with pytest.raises(jn.OutputError, match=r"\.gif, \.mp4"):
+    with pytest.raises(jn.errors.OutputError, match=r"\.gif, \.mp4"):
         animate(four_bar, tmp_path / "film.avi")
-    with pytest.raises(jn.OutputError, match="does not exist"):
+    with pytest.raises(jn.errors.OutputError, match="does not exist"):
         check_animation(tmp_path / "none" / "film.gif")
     monkeypatch.setattr("jounce.plot.animation._ffmpeg", lambda: None)
-    with pytest.raises(jn.OutputError, match=r"needs ffmpeg.*write a \.gif"):
+    with pytest.raises(jn.errors.OutputError, match=r"needs ffmpeg.*write a \.gif"):
         animate(four_bar, tmp_path / "film.mp4")
     assert not list(tmp_path.iterdir())
 
@@ -247,5 +247,5 @@ def test_instants_that_failed_are_left_out(tmp_path):
         assert 1 <= film.n_frames <= 9
         assert film.n_frames <= solved.sum() + 1
     motion.status[:] = 2
-    with pytest.raises(jn.MechanismError, match="no instant was solved"):
+    with pytest.raises(jn.errors.MechanismError, match="no instant was solved"):
         sketch(motion)

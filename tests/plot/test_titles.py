@@ -44,7 +44,7 @@ def motions():
             bodies={name: jn.Body([0, 0], mass=1.0, inertia=0.1)},
             joints={f"O{name}": jn.planar.Revolute(("ground", name), [0, 0], [0, 0])},
             drivers={name: jn.drivers.CoordinateDriver(("ground", name), "angle", motion="t")},
-            outputs={name: jn.PointOutput(name, [1, 0])},
+            outputs={name: jn.outputs.PointOutput(name, [1, 0])},
         )
         found[kind] = jn.solve(mechanism, np.linspace(0.0, 1.0, 5), order=3)
     return found

@@ -15,9 +15,9 @@ def users_own_joint():
     """Return a joint as a user writes it: registered by a type of its own, then taken out of the registry again."""
     with taken_back():
 
-        class PointOnParabola(jn.AbstractConstraint, type="point_on_parabola", space="planar", role="joint"):
-            point_j: jn.Vector
-            curvature: jn.Scalar
+        class PointOnParabola(jn.joints.AbstractConstraint, type="point_on_parabola", space="planar", role="joint"):
+            point_j: jn.joints.Vector
+            curvature: jn.joints.Scalar
 
             def residual(self, body_i, body_j, time):
                 d = body_j.point(self.point_j) - body_i.position

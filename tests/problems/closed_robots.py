@@ -29,7 +29,7 @@ def random_loop(seed=4, count=7):
         joints.append(
             jn.Joint(f"joint_{k}", f"link_{k - 1}", f"link_{k}", position=place, rotation=rotation, axis=axis)
         )
-    weld = jn.Closure("weld", (links[-1].name, "link_0"), "weld", [0.2, -0.1, 0.3])
+    weld = jn.robot.Closure("weld", (links[-1].name, "link_0"), "weld", [0.2, -0.1, 0.3])
     return jn.Robot("loop", links, joints, gravity=[0.5, -1.0, -9.0], closures=[weld])
 
 
@@ -76,7 +76,7 @@ def forward(model, constraint, state, torque):
 
 
 def inverse(model, q):
-    """Return the generalised forces of the tree and their rates, (2, n), from derivatives to the third, (4, n)."""
+    """Return the generalized forces of the tree and their rates, (2, n), from derivatives to the third, (4, n)."""
     data = model.createData()
     force = np.array(pinocchio.rnea(model, data, *q[:3]))
     pinocchio.computeRNEADerivatives(model, data, *q[:3])

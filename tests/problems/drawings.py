@@ -311,7 +311,7 @@ def with_all_outputs(mechanism):
     point = [0.3, -0.2, 0.4][: 2 if mechanism.space == "planar" else 3]
     outputs = dict(mechanism.outputs)
     for name in mechanism.rigid_bodies:
-        outputs[f"point_{name}"] = jn.PointOutput(name, point)
+        outputs[f"point_{name}"] = jn.outputs.PointOutput(name, point)
     for name, joint in {**mechanism.joints, **mechanism.drivers}.items():
         outputs[f"force_{name}"] = JointForceOutput(name)
         if hasattr(joint, "point_j"):
@@ -323,7 +323,9 @@ def with_all_outputs(mechanism):
     for name, driver in mechanism.drivers.items():
         turning = is_turning(driver)
         outputs[f"drive_{name}"] = (DriverTorqueOutput if turning else DriverForceOutput)(name)
-        outputs[f"driven_{name}"] = (jn.DriverAngleOutput if turning else jn.DriverDisplacementOutput)(name)
+        outputs[f"driven_{name}"] = (jn.outputs.DriverAngleOutput if turning else jn.outputs.DriverDisplacementOutput)(
+            name
+        )
     for name, force in mechanism.forces.items():
         if len(force.bodies) > 1:
             outputs[f"force_{name}_on_{force.bodies[0]}"] = JointForceOutput(name, force.bodies[0], force.bodies[1])
@@ -336,12 +338,14 @@ def with_all_outputs(mechanism):
     if mechanism.space == "spatial":
         pair = ([*mechanism.rigid_bodies][-1], body) if len(mechanism.bodies) > 1 else (body, "ground")
         outputs |= {
-            "parameters": jn.EulerParametersOutput(body),
-            "parameters_between": jn.RelativeEulerParametersOutput(pair),
-            "matrix": jn.RotationMatrixOutput(body),
-            "matrix_between": jn.RelativeRotationMatrixOutput(pair),
-            "angles": jn.EulerAnglesOutput(body, "XYZ"),  # of which none is undefined where the frames are parallel
-            "angles_between": jn.RelativeEulerAnglesOutput(pair, "xyz"),
+            "parameters": jn.outputs.EulerParametersOutput(body),
+            "parameters_between": jn.outputs.RelativeEulerParametersOutput(pair),
+            "matrix": jn.outputs.RotationMatrixOutput(body),
+            "matrix_between": jn.outputs.RelativeRotationMatrixOutput(pair),
+            "angles": jn.outputs.EulerAnglesOutput(
+                body, "XYZ"
+            ),  # of which none is undefined where the frames are parallel
+            "angles_between": jn.outputs.RelativeEulerAnglesOutput(pair, "xyz"),
         }
     for name, force in mechanism.forces.items():
         outputs[f"applied_{name}"] = (AppliedForceOutput if force.unit == "N" else AppliedTorqueOutput)(name)
@@ -349,11 +353,11 @@ def with_all_outputs(mechanism):
 
 
 LOCATIONS = (
-    jn.PointOutput,
-    jn.InstantCenterOutput,
-    jn.SpatialInstantCenterOutput,
-    jn.RollCenterOutput,
-    jn.SymmetricRollCenterOutput,
+    jn.outputs.PointOutput,
+    jn.outputs.InstantCenterOutput,
+    jn.outputs.SpatialInstantCenterOutput,
+    jn.outputs.RollCenterOutput,
+    jn.outputs.SymmetricRollCenterOutput,
 )
 
 
@@ -375,7 +379,7 @@ def assert_same(mechanism, kept, found, drawings, moved):
         if isinstance(output, LOCATIONS):
             drawing = drawings[frame_of(mechanism, output)]
             expected[:, 0] -= drawing.axes.T @ drawing.origin
-        angle = output.driver if isinstance(output, jn.DriverAngleOutput) else name
+        angle = output.driver if isinstance(output, jn.outputs.DriverAngleOutput) else name
         if angle in moved:
             turns = values[0, 0] - expected[0, 0] - moved[angle]
             assert turns == pytest.approx(2 * np.pi * np.round(turns / (2 * np.pi)), abs=1e-11)
@@ -383,7 +387,7 @@ def assert_same(mechanism, kept, found, drawings, moved):
         error = np.abs(values - expected).reshape(*values.shape[:2], -1).max(axis=(0, 2))
         parts[name] = error / scales[output.unit]
     # terms of higher rates of energies and of Euler angles cancel: they are larger than what is left
-    lost = {name: 10 if isinstance(mechanism.outputs[name], CANCELLING) else 1 for name in parts}
+    lost = {name: 10 if isinstance(mechanism.outputs[name], CANCELING) else 1 for name in parts}
     wrong = {name: part for name, part in parts.items() if (part > 1e-11 * lost[name]).any()}
     assert not wrong, wrong
 
@@ -398,11 +402,11 @@ def attitudes(output, kept, found, drawings):
 
 def matrices(output, values):
     """Return attitude matrices with their derivatives from those of an output, (time, derivative, 3, 3)."""
-    if isinstance(output, jn.RotationMatrixOutput):
+    if isinstance(output, jn.outputs.RotationMatrixOutput):
         return values.reshape(*values.shape[:2], 3, 3)
     factorials = np.cumprod([1.0, *range(1, values.shape[1])])
     parts = jn.Jet(np.moveaxis(values / factorials[:, None], (1, 2), (0, 1)))
-    if isinstance(output, jn.EulerAnglesOutput):
+    if isinstance(output, jn.outputs.EulerAnglesOutput):
         found = jn.rigid.rotation_matrix(output.sequence, parts)
     else:
         e0, x, y, z = _parts(parts)
@@ -427,13 +431,13 @@ def weight(mechanism, alone):
 
 ENERGIES = (KineticEnergyOutput, AccelerationEnergyOutput, PotentialEnergyOutput)
 ENERGIES_OF_A_BODY = (BodyKineticEnergyOutput, BodyAccelerationEnergyOutput, BodyPotentialEnergyOutput)
-CANCELLING = (AccelerationEnergyOutput, jn.EulerAnglesOutput)
-ATTITUDES = (jn.EulerParametersOutput, jn.RotationMatrixOutput, jn.EulerAnglesOutput)
+CANCELING = (AccelerationEnergyOutput, jn.outputs.EulerAnglesOutput)
+ATTITUDES = (jn.outputs.EulerParametersOutput, jn.outputs.RotationMatrixOutput, jn.outputs.EulerAnglesOutput)
 PLANAR_ANGLES = (
     drivers.CoordinateDriver,
     forces.Torque,
     forces.TorsionalSpring,
     forces.Moment,
-    jn.AngleOutput,
-    jn.PlanarRelativeAngleOutput,
+    jn.outputs.AngleOutput,
+    jn.outputs.PlanarRelativeAngleOutput,
 )

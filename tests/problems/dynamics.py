@@ -35,7 +35,7 @@ def simple_pendulum(angle=0.0, rate=0.0, length=1.0, mass=1.0):
         bodies={"bob": jn.Body([0, 0], "angle", mass="mass", center_of_mass=["length", 0])},
         joints={"pivot": planar.Revolute(("ground", "bob"), [0, 0], [0, 0])},
         initial={"start": drivers.CoordinateDriver(("ground", "bob"), "angle", "angle + rate*t")},
-        outputs={"angle": jn.AngleOutput("bob"), "place": jn.PointOutput("bob", ["length", 0])},
+        outputs={"angle": jn.outputs.AngleOutput("bob"), "place": jn.outputs.PointOutput("bob", ["length", 0])},
     )
 
 
@@ -59,9 +59,9 @@ def double_pendulum(first=0.0, second=0.0, first_rate=0.0, second_rate=0.0):
             "two": drivers.CoordinateDriver(("ground", "lower"), "angle", "second + second_rate*t"),
         },
         outputs={
-            "a": jn.AngleOutput("upper"),
-            "b": jn.AngleOutput("lower"),
-            "tip": jn.PointOutput("lower", [1, 0]),
+            "a": jn.outputs.AngleOutput("upper"),
+            "b": jn.outputs.AngleOutput("lower"),
+            "tip": jn.outputs.PointOutput("lower", [1, 0]),
         },
     )
 
@@ -100,9 +100,9 @@ def spatial_double_pendulum():
             for (name, (bodies, _, axis)), law in zip(hinges.items(), ("1.2", "0.5 + 2*t"), strict=True)
         },
         outputs={
-            "first": jn.RelativeAngleOutput(("ground", "first"), y, across["A"], across["A"]),
-            "second": jn.RelativeAngleOutput(("first", "second"), x, across["B"], across["B"]),
-            "tip": jn.PointOutput("second", [0, 0, -0.6]),
+            "first": jn.outputs.RelativeAngleOutput(("ground", "first"), y, across["A"], across["A"]),
+            "second": jn.outputs.RelativeAngleOutput(("first", "second"), x, across["B"], across["B"]),
+            "tip": jn.outputs.PointOutput("second", [0, 0, -0.6]),
         },
     )
 
@@ -127,7 +127,7 @@ def free_four_bar():
             "D": planar.Revolute(("ground", "rocker"), [0.6, 0], [0, 0]),
         },
         initial={"start": drivers.CoordinateDriver(("ground", "crank"), "angle", 1.0)},
-        outputs={name: jn.AngleOutput(name) for name in rods},
+        outputs={name: jn.outputs.AngleOutput(name) for name in rods},
     )
 
 
@@ -155,9 +155,9 @@ def spatial_slider_crank(stiffness=0.0, damping=0.0):
         },
         initial={"start": drivers.RotationDriver(("ground", "crank"), x, "6*t", z, z)},
         outputs={
-            "angle": jn.RelativeAngleOutput(("ground", "crank"), x, z, z),
-            "slide": jn.PointOutput("slider", origin),
-            "centre": jn.PointOutput("rod", [0.15, 0, 0]),
+            "angle": jn.outputs.RelativeAngleOutput(("ground", "crank"), x, z, z),
+            "slide": jn.outputs.PointOutput("slider", origin),
+            "center": jn.outputs.PointOutput("rod", [0.15, 0, 0]),
         },
     )
 
@@ -189,12 +189,12 @@ def rolling_disc():
         },
         forces={"spring": forces.SlideSpring(("ground", "disc"), [0, 0.3], [0, 0], [1, 0], 50.0)},
         initial={"start": drivers.SlideDriver(("ground", "disc"), [0, 0.3], [0, 0], [1, 0], "0.4 + 0.7*t")},
-        outputs={"place": jn.PointOutput("disc", [0, 0]), "angle": jn.AngleOutput("disc")},
+        outputs={"place": jn.outputs.PointOutput("disc", [0, 0]), "angle": jn.outputs.AngleOutput("disc")},
     )
 
 
 def rolling_motion(time, order):
-    """Return x of the disc's centre and its derivatives in closed form, (time, order + 1)."""
+    """Return x of the disc's center and its derivatives in closed form, (time, order + 1)."""
     frequency = np.sqrt(50.0 / (2.0 + 0.09 / 0.3**2))
     k = np.arange(order + 1)
     phase = frequency * np.asarray(time)[:, None] + k * np.pi / 2
@@ -216,7 +216,7 @@ def gear_pair():
         },
         forces={"motor": forces.Torque(("ground", "pinion"), 3.0)},
         initial={"start": drivers.CoordinateDriver(("ground", "pinion"), "angle", 0.0)},
-        outputs={"pinion": jn.AngleOutput("pinion"), "wheel": jn.AngleOutput("wheel")},
+        outputs={"pinion": jn.outputs.AngleOutput("pinion"), "wheel": jn.outputs.AngleOutput("wheel")},
     )
 
 

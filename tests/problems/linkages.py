@@ -160,7 +160,7 @@ class SliderCrank(Family):
                 "guide": planar.Prismatic(("ground", "slider"), [0, "e"], [0, 0], [1, 0], [1, 0]),
             },
             drivers={"drive": self.driver()},
-            outputs={"A": jn.PointOutput("crank", ["a", 0]), "B": jn.PointOutput("slider", [0, 0])},
+            outputs={"A": jn.outputs.PointOutput("crank", ["a", 0]), "B": jn.outputs.PointOutput("slider", [0, 0])},
         )
 
     def driver(self):
@@ -278,7 +278,7 @@ class FourBar(Family):
                 "BC": planar.DoubleRevolute(("crank", "rocker"), ["a", 0], ["c", 0], "b"),
             },
             drivers={"drive": drivers.CoordinateDriver(("ground", "crank"), "angle", LAW)},
-            outputs={"C": jn.PointOutput("rocker", ["c", 0])},
+            outputs={"C": jn.outputs.PointOutput("rocker", ["c", 0])},
         )
 
     def forms(self, values):

@@ -102,7 +102,7 @@ def spatial_slider_crank():
     problem, (angle, x, rod) = benchmarks.spatial_slider_crank()
     problem.start(0, *benchmarks.slider_crank_start(problem))
     nodes = {"coordinates": {"angle": angle, "slide": x}, "rod": dict(zip("xyz", rod.position, strict=True))}
-    return "crank angle, place of the slider, centre of the rod", collected(problem, ("0.2", "1", "5"), nodes)
+    return "crank angle, place of the slider, center of the rod", collected(problem, ("0.2", "1", "5"), nodes)
 
 
 def slider_crank_spring():
@@ -110,7 +110,7 @@ def slider_crank_spring():
     problem, (angle, x, rod) = benchmarks.spatial_slider_crank(200, 5)
     problem.start(0, *benchmarks.slider_crank_start(problem))
     nodes = {"coordinates": {"angle": angle, "slide": x}, "rod": dict(zip("xyz", rod.position, strict=True))}
-    return "crank angle, place of the slider, centre of the rod", collected(problem, ("0.2", "1"), nodes)
+    return "crank angle, place of the slider, center of the rod", collected(problem, ("0.2", "1"), nodes)
 
 
 def free_four_bar():
@@ -148,8 +148,8 @@ def stewart():
         forces = {f"leg{k}": n for k, n in enumerate(problem.multipliers[1:], 1)}
         rows = table(problem, forces, LEVELS - 2)
         forces = {name: [text(-mp.mpf(x)) for x in row] for name, row in rows.items()}
-        out.append({"time": instant, "centre": table(problem, names), "forces": forces})
-    return "centre of mass of the platform; a leg that pushes has a positive force", out
+        out.append({"time": instant, "center": table(problem, names), "forces": forces})
+    return "center of mass of the platform; a leg that pushes has a positive force", out
 
 
 MAKERS = (

@@ -1,4 +1,4 @@
-"""The bank of mechanisms with masses: every body gets a mass, an inertia and a centre of mass off its origin."""
+"""The bank of mechanisms with masses: every body gets a mass, an inertia and a center of mass off its origin."""
 
 import dataclasses
 

@@ -79,8 +79,8 @@ def hinged_loop(hinges, law, *, size=1.0, guess=0.0, off=0.0, seed=0, **given):
         joints=joints,
         drivers={"turn": drivers.RotationDriver(("ground", "link1"), first, law, *vectors)} if law else {},
         outputs={
-            "out": jn.RelativeAngleOutput(("ground", names[-2]), last, across(last), across(last)),
-            "tip": jn.PointOutput("link1", (size * np.asarray(hinges[1][0])).tolist()),
+            "out": jn.outputs.RelativeAngleOutput(("ground", names[-2]), last, across(last), across(last)),
+            "tip": jn.outputs.PointOutput("link1", (size * np.asarray(hinges[1][0])).tolist()),
         },
         **given,
     )
@@ -201,7 +201,7 @@ def sarrus(**given):
         bodies=bodies,
         joints=joints,
         drivers={"turn": drivers.RotationDriver(("ground", "lower_x"), [0.0, -1.0, 0.0], LAW)},
-        outputs={"lift": jn.PointOutput("platform", ORIGIN)},
+        outputs={"lift": jn.outputs.PointOutput("platform", ORIGIN)},
     )
     start = mp.mpf("0.6")
     return Case(mechanism, 1, "lift", lambda t: 2 * (mp.sin(start + TURN(t)) - mp.sin(start)), 2, (0, 1))
@@ -220,7 +220,7 @@ def parallelogram(cranks=3):
         bodies=bodies,
         joints=joints,
         drivers={"turn": drivers.CoordinateDriver(("ground", "crank1"), "angle", f"0.7 + {LAW}")},
-        outputs={"coupler": jn.PointOutput("coupler", [0.0, 0.0])},
+        outputs={"coupler": jn.outputs.PointOutput("coupler", [0.0, 0.0])},
     )
     return Case(mechanism, cranks - 2, "coupler", lambda t: mp.sin(mp.mpf("0.7") + TURN(t)), 1)
 
@@ -240,7 +240,7 @@ def double_cardan(shift=0.6):
             "back": spatial.Revolute(("ground", "output"), [2.0, shift, 0], [2.0, shift, 0], X, X),
         },
         drivers={"turn": drivers.RotationDriver(("ground", "input"), X, LAW)},
-        outputs={"angle": jn.RelativeAngleOutput(("ground", "output"), X)},
+        outputs={"angle": jn.outputs.RelativeAngleOutput(("ground", "output"), X)},
     )
     return Case(mechanism, 1, "angle", TURN)
 
@@ -268,7 +268,7 @@ def scott_russell(size=1.0):
             "rail": spatial.Prismatic(("ground", "up"), at(0, 0), at(0, 0), Y, Y, Z, Z),
         },
         drivers={"turn": drivers.RotationDriver(("ground", "crank"), Z, f"0.7 + {LAW}")},
-        outputs={"end": jn.PointOutput("rod", at(-1, 0))},
+        outputs={"end": jn.outputs.PointOutput("rod", at(-1, 0))},
     )
     return Case(mechanism, 7, "end", lambda t: size * 2 * mp.sin(mp.mpf("0.7") + TURN(t)), 1, (0, 2))
 
@@ -308,7 +308,9 @@ def four_bar_of_hinges(size=1.0, law=f"0.7 + {LAW}", masses=False, space="spatia
         bodies=bodies,
         joints=joints,
         drivers={"turn": driven} if law else {},
-        outputs={"C": jn.PointOutput("rocker", [2.0 * size, 0.0] if space == "planar" else [2.0 * size, 0.0, 0.0])},
+        outputs={
+            "C": jn.outputs.PointOutput("rocker", [2.0 * size, 0.0] if space == "planar" else [2.0 * size, 0.0, 0.0])
+        },
         gravity=([0.0, -9.81] if space == "planar" else [0.0, -9.81, 0.0]) if masses else None,
     )
 

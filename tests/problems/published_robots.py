@@ -38,7 +38,7 @@ class Pair:
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             self.robot = jn.load_robot(path)
-        self.warnings = [warning for warning in caught if warning.category is jn.RobotWarning]
+        self.warnings = [warning for warning in caught if warning.category is jn.errors.RobotWarning]
         assert len(self.warnings) == len(caught)
         given = [str(path)] if root is None else [str(path), root]
         self.model = pinocchio.buildModelFromUrdf(*given)

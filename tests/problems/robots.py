@@ -16,7 +16,7 @@ NAMES = ("panda", "ur5", "solo12", "scara", "planar_arm", "serial", "branched", 
 
 
 def random_inertia(generator):
-    """Return the inertia of a real body: the moments of a few point masses about their common centre."""
+    """Return the inertia of a real body: the moments of a few point masses about their common center."""
     masses = generator.uniform(0.2, 1.0, 5)
     points = generator.uniform(-0.2, 0.2, (5, 3))
     points -= masses @ points / masses.sum()

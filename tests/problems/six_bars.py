@@ -45,9 +45,9 @@ class SixBar(Family):
             },
             drivers={"drive": drivers.CoordinateDriver(("ground", self.driven_body), "angle", LAW)},
             outputs={
-                "B": jn.PointOutput("crank", ["a", 0]),
-                "C": jn.PointOutput("rocker", ["c", 0]),
-                "R": jn.PointOutput("link", ["l", 0]),
+                "B": jn.outputs.PointOutput("crank", ["a", 0]),
+                "C": jn.outputs.PointOutput("rocker", ["c", 0]),
+                "R": jn.outputs.PointOutput("link", ["l", 0]),
             },
         )
 
@@ -245,9 +245,9 @@ class StephensonSecond(Triad):
             | {name: planar.DoubleRevolute(("lever", "plate"), *ends) for name, ends in rods.items()},
             drivers={"drive": drivers.CoordinateDriver(("ground", "crank"), "angle", LAW)},
             outputs={
-                "lever": jn.PointOutput("lever", [1, 0]),
-                "plate": jn.PointOutput("plate", [1, 0]),
-                "E": jn.PointOutput("plate", [0, 0]),
+                "lever": jn.outputs.PointOutput("lever", [1, 0]),
+                "plate": jn.outputs.PointOutput("plate", [1, 0]),
+                "E": jn.outputs.PointOutput("plate", [0, 0]),
             },
         )
 

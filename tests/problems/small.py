@@ -10,7 +10,7 @@ def law(start=0.0, rate=0.0, wave=0.0, rise=0.0):
     ``start + rate t + wave sin(pi t)``, and a rise by `rise` at t = 0.5 within a few hundredths of a second.
     """
     values = {"start": start, "rate": rate, "wave": wave, "rise": rise}
-    return jn.ExpressionMotion("start + rate*t + wave*sin(pi*t) + rise/2*(1 + tanh((t - 0.5)/0.01))", values)
+    return jn.laws.ExpressionMotion("start + rate*t + wave*sin(pi*t) + rise/2*(1 + tanh((t - 0.5)/0.01))", values)
 
 
 def crank(motion, outputs=None, **keywords):
@@ -20,7 +20,7 @@ def crank(motion, outputs=None, **keywords):
         bodies={"crank": jn.Body([0, 0])},
         joints={"O": planar.Revolute(("ground", "crank"), [0, 0], [0, 0])},
         drivers={"turn": drivers.CoordinateDriver(("ground", "crank"), "angle", motion)},
-        outputs={"angle": jn.AngleOutput("crank"), "tip": jn.PointOutput("crank", [1, 0])}
+        outputs={"angle": jn.outputs.AngleOutput("crank"), "tip": jn.outputs.PointOutput("crank", [1, 0])}
         if outputs is None
         else outputs,
         **keywords,
@@ -40,7 +40,7 @@ def four_bar(crank_angle="30*deg", rocker_angle="100*deg", motion="30*deg+60*deg
             "BC": planar.DoubleRevolute(("crank", "rocker"), ["AB", 0], ["CD", 0], "BC"),
         },
         drivers={"theta": drivers.CoordinateDriver(("ground", "crank"), "angle", motion)},
-        outputs={"psi": jn.AngleOutput("rocker"), "C": jn.PointOutput("rocker", ["CD", 0])},
+        outputs={"psi": jn.outputs.AngleOutput("rocker"), "C": jn.outputs.PointOutput("rocker", ["CD", 0])},
     )
 
 
@@ -60,7 +60,7 @@ def slider_crank(slider_motion=None):
             "guide": planar.Prismatic(("ground", "slider"), [0, 0], [0, 0], [1, 0], [1, 0]),
         },
         drivers={"drive": driver},
-        outputs={"x": jn.PointOutput("slider", [0, 0]), "angle": jn.AngleOutput("crank")},
+        outputs={"x": jn.outputs.PointOutput("slider", [0, 0]), "angle": jn.outputs.AngleOutput("crank")},
     )
 
 
@@ -71,7 +71,7 @@ def distance_slider(motion):
         bodies={"block": jn.Body([0.5, 0])},
         joints={"guide": planar.Prismatic(("ground", "block"), [0, 0], [0, 0], [1, 0], [1, 0])},
         drivers={"reach": drivers.DistanceDriver(("ground", "block"), [0, 0], [0, 0], motion)},
-        outputs={"x": jn.PointOutput("block", [0, 0])},
+        outputs={"x": jn.outputs.PointOutput("block", [0, 0])},
     )
 
 
@@ -84,10 +84,10 @@ def spindle(motion, axis=(0.0, 0.0, 1.0), vectors=None):
         joints={"O": spatial.Revolute(("ground", "spindle"), [0, 0, 0], [0, 0, 0], axis, axis)},
         drivers={"turn": drivers.RotationDriver(("ground", "spindle"), axis, motion, *(vectors or ()))},
         outputs={
-            "angle": jn.RelativeAngleOutput(("ground", "spindle"), axis),
-            "between": jn.RelativeAngleOutput(("ground", "spindle"), axis, [1.0, 0.2, 0.3], [1.0, 0.2, 0.3]),
-            "spin": jn.AngularVelocityOutput("spindle"),
-            "body_spin": jn.AngularVelocityOutput("spindle", "body"),
+            "angle": jn.outputs.RelativeAngleOutput(("ground", "spindle"), axis),
+            "between": jn.outputs.RelativeAngleOutput(("ground", "spindle"), axis, [1.0, 0.2, 0.3], [1.0, 0.2, 0.3]),
+            "spin": jn.outputs.AngularVelocityOutput("spindle"),
+            "body_spin": jn.outputs.AngularVelocityOutput("spindle", "body"),
         },
     )
 
@@ -105,7 +105,7 @@ def screw(lead, motion, driven="rotation"):
         bodies={"nut": jn.Body(origin)},
         joints={"thread": spatial.Screw(bodies, origin, origin, z, z, lead)},
         drivers={"drive": driver},
-        outputs={"p": jn.PointOutput("nut", origin), "angle": jn.RelativeAngleOutput(bodies, z)},
+        outputs={"p": jn.outputs.PointOutput("nut", origin), "angle": jn.outputs.RelativeAngleOutput(bodies, z)},
     )
 
 

@@ -54,12 +54,12 @@ def sprung_four_bar(size=1.0, turn=0.0, crank=2.0, driven=False):
                 ("ground", "rocker"), float(b.turn["stiffness"]) * size**2, float(b.turn["angle"]) + turn
             ),
         },
-        outputs={"psi": jn.AngleOutput("rocker"), "C": jn.PointOutput("coupler", [length["BC"], 0])},
+        outputs={"psi": jn.outputs.AngleOutput("rocker"), "C": jn.outputs.PointOutput("coupler", [length["BC"], 0])},
     )  # fmt: skip
 
 
 def chain(masses, stiffnesses, dampings, right_wall=False):
-    """Bodies 1 m apart on a rail, with springs and dampers from a wall to the first, between neighbours, to a wall."""
+    """Bodies 1 m apart on a rail, with springs and dampers from a wall to the first, between neighbors, to a wall."""
     count = len(masses)
     names = [f"m{k}" for k in range(count)]
     pairs = [("ground", names[0], [-1.0, 0.0], 1.0)]
@@ -75,7 +75,7 @@ def chain(masses, stiffnesses, dampings, right_wall=False):
         bodies=bodies,
         joints={f"rail_{n}": planar.Prismatic(("ground", n), [0, 0], [0, 0], [1, 0], [1, 0]) for n in names},
         forces=springs,
-        outputs={n: jn.PointOutput(n, [0, 0]) for n in names},
+        outputs={n: jn.outputs.PointOutput(n, [0, 0]) for n in names},
     )
 
 
@@ -130,7 +130,7 @@ def column(load, stiffness=2.0, length=0.5, mass=0.4, damping=0.0):
             "b": forces.TorsionalSpring(("lower", "upper"), **joint),
             "push": forces.PointForce("upper", [length, 0], [-load, 0.0], frame="body"),
         },
-        outputs={"lower": jn.AngleOutput("lower"), "upper": jn.AngleOutput("upper")},
+        outputs={"lower": jn.outputs.AngleOutput("lower"), "upper": jn.outputs.AngleOutput("upper")},
     )
 
 
@@ -156,7 +156,7 @@ def whirling(cone=0.6, length=0.8, mass=1.3, gravity=9.81):
             "fall": jn.drivers.RotationDriver(("shaft", "bob"), [0, 1, 0], f"{fall}", [1, 0, 0], [1, 0, 0]),
         },
         outputs={
-            "turn": jn.RelativeAngleOutput(("ground", "shaft"), [0, 0, 1]),
-            "fall": jn.RelativeAngleOutput(("shaft", "bob"), [0, 1, 0], [1, 0, 0], [1, 0, 0]),
+            "turn": jn.outputs.RelativeAngleOutput(("ground", "shaft"), [0, 0, 1]),
+            "fall": jn.outputs.RelativeAngleOutput(("shaft", "bob"), [0, 1, 0], [1, 0, 0], [1, 0, 0]),
         },
     ), rate  # fmt: skip

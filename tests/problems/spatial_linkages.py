@@ -68,7 +68,7 @@ class RSSR(Family):
                 "rod": spatial.DoubleSpherical(("crank", "rocker"), ["a", 0, 0], ["r", 0, 0], "l"),
             },
             drivers={"drive": drivers.RotationDriver(("ground", "crank"), Z, LAW, X, X)},
-            outputs={"C": jn.PointOutput("rocker", X), "D": jn.PointOutput("rocker", ORIGIN)},
+            outputs={"C": jn.outputs.PointOutput("rocker", X), "D": jn.outputs.PointOutput("rocker", ORIGIN)},
         )
 
     @staticmethod
@@ -158,7 +158,7 @@ class RCCC(Family):
                 "4": spatial.Cylindrical(("ground", "rocker"), point, ["f", 0, 0], axis, [0, "-fs", "fc"]),
             },
             drivers={"drive": drivers.RotationDriver(("ground", "crank"), Z, LAW, X, X)},
-            outputs={"tip": jn.PointOutput("rocker", Z), "origin": jn.PointOutput("rocker", ORIGIN)},
+            outputs={"tip": jn.outputs.PointOutput("rocker", Z), "origin": jn.outputs.PointOutput("rocker", ORIGIN)},
         )
 
     @staticmethod

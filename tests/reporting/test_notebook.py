@@ -93,7 +93,7 @@ def test_a_batch():
     time, status = np.linspace(0, 1, 3), np.array([[0, 0, 0], [0, 6, 7]])
     outputs = {"angle": np.arange(18.0).reshape(2, 3, 3)}
     outputs["angle"][1, 1:] = np.nan
-    batch = jn.Batch(time, {"length": np.array([0.1, 0.2])}, outputs, status, np.array([4, 5]))
+    batch = jn.integrate.Batch(time, {"length": np.array([0.1, 0.2])}, outputs, status, np.array([4, 5]))
     page = batch._repr_html_()
     assert "1 of 2 runs complete" in page
     assert Tables(page).tables["Outputs of complete runs (SI)"][1] == ["angle", "2 x 3 x 3", "0", "6"]
@@ -107,7 +107,7 @@ def test_names_cannot_write_html():
     assert "&lt;b&gt;&amp;" in page
 
 
-def test_colours_are_left_to_the_page(four_bar):
+def test_colors_are_left_to_the_page(four_bar):
     import re
 
     style = re.search(r"<style[^>]*>(.*?)</style>", shown(four_bar))[1]
@@ -153,7 +153,7 @@ def test_the_notebook_of_the_examples_runs():
 @pytest.mark.slow
 def test_an_equilibrium_and_what_moves_about_it():
     rest = jn.equilibrium(jn.load(EXAMPLES / "double_pendulum.yaml"))
-    small = jn.linearise(rest)
+    small = jn.linearize(rest)
     assert Tables(shown(rest)).tables["Bodies, at rest"][1][0] == "upper"
     matrices = Tables(small._repr_html_()).tables
     assert matrices["Mass (SI)"][1] == ["upper.angle", "2", "1"]

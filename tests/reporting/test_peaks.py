@@ -15,7 +15,7 @@ CRANK = jn.Mechanism(
     bodies={"a": jn.Body([0, 0], mass=1.0, inertia=0.5)},
     joints={"O": jn.planar.Revolute(("ground", "a"), [0, 0], [0, 0])},
     drivers={"turn": jn.drivers.CoordinateDriver(("ground", "a"), "angle", motion="sin(w*t) + 0.25*sin(2*w*t)")},
-    outputs={"angle": jn.AngleOutput("a")},
+    outputs={"angle": jn.outputs.AngleOutput("a")},
 )
 FINE = np.linspace(0.0, 4.0, 400_001)
 
@@ -45,13 +45,15 @@ KNOT = 1 / 3
 BRAKED = f"{KNOT}**4 + 4*{KNOT}**3*(t - {KNOT}) + 6*{KNOT}**2*(t - {KNOT})**2"
 
 
-KINKED = jn.ExpressionMotion(jn.Expression("abs(t - a)**3*(1 - abs(t - a))/6"), {"a": KNOT})  # sign (1 - 4 |t - a|)
+KINKED = jn.laws.ExpressionMotion(
+    jn.laws.Expression("abs(t - a)**3*(1 - abs(t - a))/6"), {"a": KNOT}
+)  # sign (1 - 4 |t - a|)
 
 
 @pytest.mark.parametrize(
     "law, order, value",
     [
-        (jn.PiecewiseMotion(["t**4", BRAKED], until=[KNOT]), 3, 24 * KNOT),
+        (jn.laws.PiecewiseMotion(["t**4", BRAKED], until=[KNOT]), 3, 24 * KNOT),
         (KINKED, 3, 1.0),
         (KINKED, 3, -1.0),
     ],
@@ -69,8 +71,8 @@ def test_a_peak_at_a_knot_is_the_limit_from_its_side(law, order, value, count):
 RISING = f"2 + 6*(t - {KNOT}) + 4*(t - {KNOT})**2"  # a force that ends at the knot
 JUMPING = f"({RISING})*(1 - sign(t - {KNOT}))/2 + (1 + sign(t - {KNOT}))/2"
 TORQUES = [
-    jn.PiecewiseMotion([RISING, "1"], until=[KNOT]),
-    jn.forces.TimeLaw(jn.PiecewiseMotion([RISING, "1"], until=[KNOT])),
+    jn.laws.PiecewiseMotion([RISING, "1"], until=[KNOT]),
+    jn.forces.TimeLaw(jn.laws.PiecewiseMotion([RISING, "1"], until=[KNOT])),
     JUMPING,
     JUMPING.replace(str(KNOT), "knot") + " + 0*x*v",
 ]
@@ -80,7 +82,7 @@ TORQUES = [
 def test_a_peak_at_a_knot_of_a_force_is_the_limit_from_its_side(shown, law):
     """What brakes a crank that turns evenly is taken up by its driver, and what pulls at its pin by the pin."""
     forces = {"torque": jn.forces.Torque(("ground", "a"), law), "reaction": jn.forces.PointForce("a", [0, 0], [law, 0])}
-    outputs = {"torque": jn.DriverTorqueOutput("turn"), "reaction": jn.JointForceOutput("O", "ground")}
+    outputs = {"torque": jn.outputs.DriverTorqueOutput("turn"), "reaction": jn.outputs.JointForceOutput("O", "ground")}
     even = {"turn": dataclasses.replace(CRANK.drivers["turn"], motion="w*t")}
     parts = {"drivers": even, "parameters": {"w": 3.0, "knot": KNOT}, "outputs": {"load": outputs[shown]}}
     braked = dataclasses.replace(CRANK, forces={"load": forces[shown]}, **parts)
@@ -91,7 +93,7 @@ def test_a_peak_at_a_knot_of_a_force_is_the_limit_from_its_side(shown, law):
 
 def test_the_end_of_a_law_at_the_end_of_the_time_is_seen_from_before():
     """A 3-4-5 profile ends with the jerk that it begins with, 60 by way and duration, where the law is at rest."""
-    law = jn.SegmentedMotion([jn.Segment("polynomial_3_4_5", 0.5, by=0.1)], beyond="hold")
+    law = jn.laws.SegmentedMotion([jn.laws.Segment("polynomial_3_4_5", 0.5, by=0.1)], beyond="hold")
     driver = dataclasses.replace(CRANK.drivers["turn"], motion=law)
     motion = jn.solve(dataclasses.replace(CRANK, drivers={"turn": driver}), np.linspace(0.0, 0.5, 6), order=3)
     jerk = peaks(motion)[3]
@@ -151,7 +153,7 @@ def test_peaks_of_a_simulation():
         gravity=[0, -9.81],
         bodies={"rod": jn.Body([0, 0], mass=2.0, inertia=0.5, center_of_mass=[1, 0])},
         joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
-        outputs={"angle": jn.AngleOutput("rod")},
+        outputs={"angle": jn.outputs.AngleOutput("rod")},
     )
     (angle, rate) = peaks(jn.simulate(free, [0.0, 1.0, 2.0], order=1))
     assert angle.minimum == pytest.approx(-np.pi, abs=1e-8)  # it swings from one side to the other
@@ -165,7 +167,7 @@ def test_a_motion_keeps_its_peaks_when_the_code_of_its_law_changes():
         bodies={"rod": jn.Body([0, 0])},
         joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
         drivers={"motor": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", lambda t: gain[0] * t * (1 - t))},
-        outputs={"angle": jn.AngleOutput("rod")},
+        outputs={"angle": jn.outputs.AngleOutput("rod")},
     )
     time = [0.0, 0.2, 0.6, 1.0]
     (before,) = peaks(jn.solve(crank, time, order=0))
@@ -178,7 +180,7 @@ def test_a_motion_keeps_its_peaks_when_the_code_of_its_law_changes():
 
 @pytest.mark.slow
 def test_knots_of_laws_count_in_simulations_backward():
-    law = jn.TrapezoidalMotion(0.0, 1.0, duration=1.0)
+    law = jn.laws.TrapezoidalMotion(0.0, 1.0, duration=1.0)
     driven = jn.Mechanism(
         space="planar",
         bodies={name: jn.Body([k, 0], mass=1.0, inertia=0.1) for k, name in enumerate(("rod", "bob"))},
@@ -187,7 +189,7 @@ def test_knots_of_laws_count_in_simulations_backward():
             "A": jn.planar.Revolute(("rod", "bob"), [1, 0], [0, 0]),
         },
         drivers={"motor": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", law)},
-        outputs={"angle": jn.AngleOutput("rod")},
+        outputs={"angle": jn.outputs.AngleOutput("rod")},
     )
     _, rate, *_ = peaks(jn.simulate(driven, [1.0, 0.6, 0.4, 0.0], order=3), refine=False)
     assert rate.maximum == pytest.approx(1.75, abs=1e-9)  # from 3/7 to 4/7 of the duration, between the instants

@@ -33,7 +33,7 @@ def test_long_names_stand_on_lines_of_their_own(capsys):
     assert lines[8].split() == ["5th", "rad/s^5", "-", "-", "-", "-"]
 
 
-def test_a_terminal_gets_a_coloured_table(capsys, monkeypatch):
+def test_a_terminal_gets_a_colored_table(capsys, monkeypatch):
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.setenv("COLUMNS", "100")

@@ -1,4 +1,4 @@
-"""Reactions that grow without bound towards the change points of a motion are told of; those that do not are not."""
+"""Reactions that grow without bound toward the change points of a motion are told of; those that do not are not."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from jounce.reporting.facts.motion_facts import motion_facts
 
 
 def parallelogram(law):
-    """A parallelogram with a coupler of mass m alone, its centre a quarter of its length b from the crank.
+    """A parallelogram with a coupler of mass m alone, its center a quarter of its length b from the crank.
 
     The rocker has no mass, so the force on it is along it. Across the coupler, which does not turn, it is a quarter of
     m times the acceleration of the crank's pin that way. Where the angle of the crank is zero or half a turn, the force
@@ -33,7 +33,7 @@ def parallelogram(law):
         outputs={
             "force": JointForceOutput("C"),
             "torque": DriverTorqueOutput("turn"),
-            "angle": jn.AngleOutput("rocker"),
+            "angle": jn.outputs.AngleOutput("rocker"),
         },
     )
 

@@ -1,4 +1,4 @@
-"""Points of a moving body and its centre of mass: Negrean 2025, equations 23-29 and 35-49, right and as printed."""
+"""Points of a moving body and its center of mass: Negrean 2025, equations 23-29 and 35-49, right and as printed."""
 
 import functools
 
@@ -101,7 +101,7 @@ def test_equations_035_to_037_velocity_and_acceleration_of_a_point(seed):
 
 
 @SEEDS
-def test_equations_043_to_049_centre_of_mass(seed):
+def test_equations_043_to_049_center_of_mass(seed):
     case = body(seed)
     local = case.masses @ case.points / case.masses.sum()
     expected = case.point(local)

@@ -46,7 +46,7 @@ def test_lower_case_is_fixed_and_upper_case_moving():
     np.testing.assert_allclose(moving, [0.5, 0.5, 0.5, 0.5], atol=1e-15)
 
 
-def test_quaternions_are_normalised():
+def test_quaternions_are_normalized():
     assert from_quaternion([0.0, 3.0, 0.0, 4.0]) == (0.0, 0.6, 0.0, 0.8)
 
 
@@ -59,7 +59,7 @@ def test_quaternions_are_normalised():
         (lambda: from_euler("zxq", [1.0, 1.0, 1.0]), "write three letters"),
         (lambda: from_euler("zXz", [1.0, 1.0, 1.0]), "write three letters"),
         (lambda: from_euler("zz", [1.0, 1.0, 1.0]), "write three letters"),
-        (lambda: from_euler("zzx", [1.0, 1.0, 1.0]), "neighbours different"),
+        (lambda: from_euler("zzx", [1.0, 1.0, 1.0]), "neighbors different"),
     ],
 )
 def test_nonsense_is_refused(call, words):

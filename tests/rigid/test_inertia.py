@@ -14,7 +14,7 @@ def cloud(seed, count=6):
 
 
 def of_cloud(masses, points):
-    """Return the mass, centre and inertia about the centre, as sums over the points."""
+    """Return the mass, center and inertia about the center, as sums over the points."""
     mass = masses.sum()
     center = masses @ points / mass
     tensor = np.zeros((3, 3))
@@ -48,7 +48,7 @@ def test_pseudo_inertia_tells_the_body(seed):
     same(jn.Inertia.from_pseudo((homogeneous.T * masses) @ homogeneous), jn.Inertia(*of_cloud(masses, points)), 1e-13)
 
 
-def test_a_solid_is_centred_in_its_frame_unless_told():
+def test_a_solid_is_centered_in_its_frame_unless_told():
     assert jn.Inertia.solid("sphere", radius=0.1, mass=2.0).center_of_mass.tolist() == [0, 0, 0]
 
 
@@ -90,7 +90,7 @@ def test_a_plate_just_meets_the_triangle_inequality():
     plate = jn.Inertia(1.0, tensor=[1.0, 2.0, 3.0])
     assert np.linalg.eigvalsh(plate.second_moments).min() == pytest.approx(0, abs=1e-15)
     jn.Inertia(1.0, tensor=[1.0, 2.0, 3.00002])  # as files of six digits have it
-    with pytest.raises(jn.RobotError, match="triangle"):
+    with pytest.raises(jn.errors.RobotError, match="triangle"):
         jn.Inertia(1.0, tensor=[1.0, 2.0, 3.0001])
 
 
@@ -143,7 +143,7 @@ PRODUCTS = [[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     ],
 )
 def test_no_body_has_such_an_inertia(make, message):
-    with pytest.raises(jn.RobotError) as caught:
+    with pytest.raises(jn.errors.RobotError) as caught:
         make()
     assert str(caught.value) == message
 
@@ -175,5 +175,5 @@ def test_moments_without_mass_add_to_those_of_what_they_are_fixed_to():
     body = jn.Inertia(2.0, [0.5, 0.0, 0.0], [0.1, 0.2, 0.2])
     same(jn.Inertia.total([body, rotor]), jn.Inertia(2.0, [0.5, 0.0, 0.0], [0.4, 0.4, 0.3]))
     np.testing.assert_allclose(jn.Inertia.total([rotor, rotor]).tensor.diagonal(), [0.6, 0.4, 0.2], rtol=1e-15)
-    with pytest.raises(jn.RobotError, match=r"mass: must be greater than zero, got -1\.0"):
+    with pytest.raises(jn.errors.RobotError, match=r"mass: must be greater than zero, got -1\.0"):
         jn.Inertia(-1.0, strict=False)

@@ -9,7 +9,7 @@ CELLS = 60
 
 
 def cubes(extent, inside):
-    """Return volume, centre and moments about x, y and z over the volume, from small cubes that lie inside."""
+    """Return volume, center and moments about x, y and z over the volume, from small cubes that lie inside."""
     edges = [(np.arange(CELLS) + 0.5) / CELLS * 2 * e - e for e in extent]
     x, y, z = np.meshgrid(*edges, indexing="ij")
     within = inside(x, y, z)
@@ -102,6 +102,6 @@ def test_pseudo_inertia_there_and_back():
     ],
 )
 def test_what_no_solid_is(make, message):
-    with pytest.raises(jn.RobotError) as caught:
+    with pytest.raises(jn.errors.RobotError) as caught:
         make()
     assert message in str(caught.value)

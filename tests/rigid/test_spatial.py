@@ -188,7 +188,7 @@ def test_pose_of_order_zero_has_no_angular_velocity():
         pose.global_angular_velocity()
 
 
-def test_quaternions_are_normalised():
+def test_quaternions_are_normalized():
     pose = SpatialPose.at(jnp.zeros((3, 1, 1)), column(jnp.asarray([1.0, 2.0, -2.0, 4.0])))
     np.testing.assert_allclose(pose.quaternion.coefficients[0][:, 0, 0], np.array([1, 2, -2, 4]) / 5)
 

@@ -77,7 +77,7 @@ def test_gravity_and_its_rate(case):
 
 def test_reactions(case):
     links = [case.robot.joints[joint].child for joint in list(case.model.names)[1:]]
-    wrench = jn.joint_wrenches(case.robot, case.q)[:, 0, [case.robot.moving_links.index(link) for link in links]]
+    wrench = jn.robot.joint_wrenches(case.robot, case.q)[:, 0, [case.robot.moving_links.index(link) for link in links]]
 
     def reactions(q, v, a, j):
         pinocchio.rnea(case.model, case.data, q, v, a)
@@ -111,7 +111,7 @@ def test_frames_of_all_links(case):
 
 
 def test_center_of_mass(case):
-    base = case.model.inertias[0]  # Pinocchio leaves the fixed base out of the centre of mass
+    base = case.model.inertias[0]  # Pinocchio leaves the fixed base out of the center of mass
 
     def center(q, v, a, j):
         pinocchio.centerOfMass(case.model, case.data, q, v, a)
@@ -119,7 +119,7 @@ def test_center_of_mass(case):
         moments[0] += base.mass * base.lever
         return moments / (case.data.mass[0] + base.mass)
 
-    assert error(jn.center_of_mass(case.robot, case.q[:, :3]), case.gathered(center)) <= 1e-13
+    assert error(jn.robot.center_of_mass(case.robot, case.q[:, :3]), case.gathered(center)) <= 1e-13
 
 
 def test_jacobian_and_its_rate(case):
@@ -164,7 +164,7 @@ def test_floating_base():
         expected.append([pinocchio.rnea(model, data, start, v, a), torque_rate(model, data, start, v, a, j)])
     expected = np.array(expected)
     torque = jn.inverse_dynamics(robot, q, drives=False)[:, :, order]
-    base = jn.joint_wrenches(robot, q)[:, :, robot.moving_links.index("base_link")]
+    base = jn.robot.joint_wrenches(robot, q)[:, :, robot.moving_links.index("base_link")]
     for level in range(2):
         assert error(torque[:, level], expected[:, level, 6:]) <= 1e-13
         assert error(base[:, level], expected[:, level, :6]) <= 1e-13

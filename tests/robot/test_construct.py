@@ -147,6 +147,6 @@ SKEWED = np.diag([1.0, 1.0, 1.0, 2.0])
     ],
 )
 def test_refused(make, message):
-    with pytest.raises(jn.RobotError) as caught:
+    with pytest.raises(jn.errors.RobotError) as caught:
         make()
     assert str(caught.value) == message

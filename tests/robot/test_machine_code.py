@@ -7,7 +7,7 @@ import jounce as jn
 from jounce.execution.backends import VARIABLE
 from jounce.execution.llvm.self_test import is_usable
 from jounce.robot.algorithms.forward_dynamics import _moved
-from jounce.robot.algorithms.inverse_dynamics import _generalised_forces
+from jounce.robot.algorithms.inverse_dynamics import _generalized_forces
 from jounce.robot.recursions.batches import LEAST_THREADED
 from tests.problems.robots import random_robot, robot_named
 
@@ -57,7 +57,7 @@ def test_torques_agree(monkeypatch, robot, count):
     q = motion(robot, count, 4)
     expected, found = both_ways(monkeypatch, lambda: jn.inverse_dynamics(robot, q, drives=True))
     assert_same(found, expected)
-    assert _generalised_forces.mapped.program((robot.tree, ()), (q,), static=((), True)).backend == "llvm"
+    assert _generalized_forces.mapped.program((robot.tree, ()), (q,), static=((), True)).backend == "llvm"
 
 
 @pytest.mark.slow
@@ -75,15 +75,15 @@ def test_torques_of_other_robots_agree(monkeypatch, robot, count):
 def test_other_quantities_agree(monkeypatch, robot):
     robot = ROBOTS[robot]()
     q, link = motion(robot, 129, 4), robot.moving_links[-1]
-    push = jn.Wrench(link, [1.0, 2.0, 3.0], point=[0.0, 0.0, 0.1], frame="base")
+    push = jn.robot.Wrench(link, [1.0, 2.0, 3.0], point=[0.0, 0.0, 0.1], frame="base")
     calls = [
         lambda: jn.inverse_dynamics(robot, q, wrenches=[push]),
-        lambda: jn.joint_wrenches(robot, q)[:, 0],
+        lambda: jn.robot.joint_wrenches(robot, q)[:, 0],
         lambda: jn.jacobian(robot, q, link)[:, 0],
         lambda: jn.forward_kinematics(robot, q, link).position,
-        lambda: jn.center_of_mass(robot, q),
+        lambda: jn.robot.center_of_mass(robot, q),
         lambda: jn.mass_matrix(robot, q[:, 0]),
-        lambda: jn.kinetic_energy(robot, q).total[..., None],
+        lambda: jn.energy.kinetic_energy(robot, q).total[..., None],
     ]
     for call in calls:
         assert_same(*reversed(both_ways(monkeypatch, call)))

@@ -85,7 +85,7 @@ def test_forces_and_six_rates_of_a_random_tree():
 def test_reactions_of_a_random_tree(order):
     robot, q = tree()
     expected = np.moveaxis(np.array(reference("tree")["wrench"], float), 2, 1)  # sample, level, body, component
-    wrench = jn.joint_wrenches(robot, q[:, : order + 1])
+    wrench = jn.robot.joint_wrenches(robot, q[:, : order + 1])
     assert np.all(errors(wrench, expected[:, : order - 1]) <= 5e-15)
 
 
@@ -94,7 +94,7 @@ def test_reactions_of_a_random_tree(order):
 def test_energies_of_a_random_tree(p, order):
     robot, q = tree()
     expected = np.array([sample[p] for sample in reference("tree")["energy"]], float)[:, : order - p]
-    energy = jn.acceleration_energy(robot, q[:, : order + 1], order=p)
+    energy = jn.energy.acceleration_energy(robot, q[:, : order + 1], order=p)
     assert energy.total.shape == expected.shape
     assert np.all(errors(energy.total, expected) <= 1e-14)  # by the squares of large derivatives of axes
 
@@ -107,4 +107,4 @@ def test_jacobian_and_center_of_mass_of_a_random_tree(order):
     expected = np.transpose(np.array(content["jacobian"], float), (0, 2, 3, 1))[:, : order + 1]
     assert np.all(errors(jn.jacobian(robot, q, "link_6", content["point"]), expected) <= 1e-14)
     expected = np.array(content["center"], float)[:, : order + 1]
-    assert np.all(errors(jn.center_of_mass(robot, q), expected) <= 1e-14)
+    assert np.all(errors(jn.robot.center_of_mass(robot, q), expected) <= 1e-14)

@@ -61,9 +61,9 @@ def test_a_robot_of_no_joints():
     block = jn.Robot("block", [jn.Link("block", jn.Inertia(2.0, [1.0, 0, 0]))], [])
     still = np.zeros((4, 3, 0))
     assert jn.inverse_dynamics(block, still).shape == (4, 1, 0)
-    assert jn.joint_wrenches(block, still).shape == (4, 1, 0, 6)
+    assert jn.robot.joint_wrenches(block, still).shape == (4, 1, 0, 6)
     assert jn.jacobian(block, still, "block").shape == (4, 3, 6, 0)
-    assert jn.center_of_mass(block, still)[:, 0].tolist() == [[1.0, 0.0, 0.0]] * 4
+    assert jn.robot.center_of_mass(block, still)[:, 0].tolist() == [[1.0, 0.0, 0.0]] * 4
     assert repr(block) == "<Robot block: 0 joints, 1 links>"
 
 
@@ -110,7 +110,7 @@ def test_locked_joints_hold_what_follows_them_too():
 
 
 def test_a_fixed_joint_that_should_follow_stays_where_it_is():
-    follows = pin("glue", "a", "b", type="fixed", position=[1, 0, 0], mimic=jn.Mimic("x", 2.0, 0.5))
+    follows = pin("glue", "a", "b", type="fixed", position=[1, 0, 0], mimic=jn.robot.Mimic("x", 2.0, 0.5))
     robot = chain(pin("x", "base", "a"), follows, links=[jn.Link("a", BODY), jn.Link("b", BODY)])
     held = robot.locked({"x": 0.3})
     assert held.joints["glue"].position.tolist() == [1, 0, 0]
@@ -173,13 +173,15 @@ REFUSED = [
     (
         lambda: chain(
             pin("x", "base", "a"),
-            pin("y", "a", "b", mimic=jn.Mimic("x")),
-            pin("z", "b", "c", mimic=jn.Mimic("y")),
+            pin("y", "a", "b", mimic=jn.robot.Mimic("x")),
+            pin("z", "b", "c", mimic=jn.robot.Mimic("y")),
         ),
         "joints.z.mimic: must follow a moving joint that follows no other, got 'y'; valid: x",
     ),
     (
-        lambda: jn.Robot("r", [jn.Link("base"), jn.Link("a", BODY)], [pin("x", "base", "a", mimic=jn.Mimic("x"))]),
+        lambda: jn.Robot(
+            "r", [jn.Link("base"), jn.Link("a", BODY)], [pin("x", "base", "a", mimic=jn.robot.Mimic("x"))]
+        ),
         "joints.x.mimic: must follow a moving joint that follows no other, got 'x'; none is defined",
     ),
     (lambda: MIMIC.with_gravity([0, 0]), "gravity: must have the shape (3,), not (2,)"),
@@ -202,14 +204,14 @@ REFUSED = [
     ),
     (
         lambda: MIMIC.with_floating_base("ZZX"),
-        "sequence: must be three letters X, Y, Z of which neighbours differ, got 'ZZX'",
+        "sequence: must be three letters X, Y, Z of which neighbors differ, got 'ZZX'",
     ),
 ]
 
 
 @pytest.mark.parametrize("make, message", REFUSED)
 def test_refused(make, message):
-    with pytest.raises(jn.RobotError) as caught:
+    with pytest.raises(jn.errors.RobotError) as caught:
         make()
     assert str(caught.value) == message
 
@@ -259,7 +261,7 @@ def test_inertia_of_a_link_is_changed_and_checked():
     link = robot.moving_links[1]
     changed = robot.with_inertia(link, mass=5.0)
     assert changed.mass - robot.mass == pytest.approx(5.0 - robot.links[link].inertia.mass)
-    with pytest.raises(jn.RobotError, match="elbow"):
+    with pytest.raises(jn.errors.RobotError, match="elbow"):
         robot.with_inertia("elbow", mass=1.0)
-    with pytest.raises(jn.RobotError, match="mass: must be greater than zero"):
+    with pytest.raises(jn.errors.RobotError, match="mass: must be greater than zero"):
         robot.with_inertia(link, mass=0.0)

@@ -116,13 +116,13 @@ FILES = (
 def ignored():
     """Ignore warnings of what was found before."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", jn.DamageWarning)
+        warnings.simplefilter("ignore", jn.errors.DamageWarning)
         yield
 
 
 def assert_mended(folder, whole):
     """The same command warns, and leaves the same files; once more it finds nothing to warn of."""
-    with pytest.warns(jn.DamageWarning, match=r"files of .* were lost or changed since"):
+    with pytest.warns(jn.errors.DamageWarning, match=r"files of .* were lost or changed since"):
         assert swept(folder) == whole[1]
     assert_same(folder, whole)
 

@@ -15,7 +15,7 @@ CRANK = jn.Mechanism(
     bodies={"rod": jn.Body([0, 0], mass=1.0, inertia=1.0)},
     joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
     drivers={"motor": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion="abs(t - begin)")},
-    outputs={"angle": jn.AngleOutput("rod")},
+    outputs={"angle": jn.outputs.AngleOutput("rod")},
 )
 
 

@@ -119,7 +119,7 @@ def test_what_was_lost_or_changed_on_the_disk_is_told_and_computed_again(done, t
         shutil.copy(folder / "psi_rms" / "c" / "1" / "0", part)
     else:
         part.write_bytes(part.read_bytes()[:30] + b"xx" + part.read_bytes()[32:])
-    with pytest.warns(jn.DamageWarning, match="files of 11 designs"):
+    with pytest.warns(jn.errors.DamageWarning, match="files of 11 designs"):
         again = swept(folder, histories=True)
     assert again.attrs["checksum"] == done[1].attrs["checksum"]
     assert again["psi_peak"].identical(done[1]["psi_peak"])
@@ -156,7 +156,7 @@ def test_a_chunk_with_its_digest_is_whole_in_its_own_place_only(tmp_path, change
     first = swept(folder, vary=vary, histories=True)
     values, checksum = first["psi_peak"].values, first.attrs["checksum"]
     change(folder, tmp_path)
-    with pytest.warns(jn.DamageWarning, match=r"files of (16|32) designs"):
+    with pytest.warns(jn.errors.DamageWarning, match=r"files of (16|32) designs"):
         again = swept(folder, vary=vary, histories=True)
     assert again.attrs["checksum"] == checksum
     assert np.array_equal(again["psi_peak"].values, values, equal_nan=True)
@@ -182,7 +182,7 @@ def test_coordinates_that_were_changed_are_written_again(done, tmp_path):
     folder = tmp_path / "a.zarr"
     shutil.copytree(done[0], folder)
     shutil.copy(folder / "BC" / "c" / "0", folder / "time" / "c" / "0")
-    with pytest.warns(jn.DamageWarning, match="files of time were lost or changed"):
+    with pytest.warns(jn.errors.DamageWarning, match="files of time were lost or changed"):
         again = swept(folder, histories=True)
     assert np.array_equal(again["time"].values, TIME)
     assert again.attrs["checksum"] == done[1].attrs["checksum"]
@@ -386,7 +386,7 @@ def test_simulations_start_and_weigh_as_each_design_says(tmp_path):
         bodies={"mass": jn.Body([0, 0], mass="m", inertia=1.0)},
         joints={"slide": jn.planar.Prismatic(("ground", "mass"), [0, 0], [0, 0], [0, 1], [0, 1])},
         initial={"rise": jn.drivers.CoordinateDriver(("ground", "mass"), "y", motion="lift")},
-        outputs={"place": jn.PointOutput("mass", [0, 0])},
+        outputs={"place": jn.outputs.PointOutput("mass", [0, 0])},
     )
     vary = {"lift": "0:1:3", "m": [1.0, 3.0]}
     settings = {"simulate": True, "method": jn.Taylor(8), "workers": 0, "histories": True}
@@ -457,14 +457,16 @@ def test_a_killed_worker_and_a_killed_client_lose_nothing(tmp_path):
 
 def test_peaks_at_the_knots_of_a_law_are_kept_of_every_design(tmp_path):
     """A 3-4-5 profile, whose jerk is 60 by way and duration at both ends, at instants that depend on the design."""
-    law = jn.SegmentedMotion([jn.Segment("dwell", "T/3"), jn.Segment("polynomial_3_4_5", "T", by=0.1)], beyond="hold")
+    law = jn.laws.SegmentedMotion(
+        [jn.laws.Segment("dwell", "T/3"), jn.laws.Segment("polynomial_3_4_5", "T", by=0.1)], beyond="hold"
+    )
     crank = jn.Mechanism(
         space="planar",
         parameters={"T": 0.5},
         bodies={"crank": jn.Body([0, 0])},
         joints={"O": jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])},
         drivers={"turn": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion=law)},
-        outputs={"angle": jn.AngleOutput("crank")},
+        outputs={"angle": jn.outputs.AngleOutput("crank")},
     )
     durations = np.array([0.4, 0.5, 0.7])
     settings = {"time": np.linspace(0.0, 1.0, 8), "order": 3, "workers": 0}
@@ -481,7 +483,9 @@ def test_torque_rates_at_the_knots_of_a_law_are_kept(tmp_path):
     pin = jn.Joint("pin", "base", "rod", axis=[0, 0, 1])
     robot = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", rod)], [pin])
     knot = 0.337
-    law = jn.PiecewiseMotion(["t**4", f"{knot}**4 + 4*{knot}**3*(t-{knot}) + 6*{knot}**2*(t-{knot})**2"], until=[knot])
+    law = jn.laws.PiecewiseMotion(
+        ["t**4", f"{knot}**4 + 4*{knot}**3*(t-{knot}) + 6*{knot}**2*(t-{knot})**2"], until=[knot]
+    )
     trajectory = jn.JointTrajectory({"pin": law}, start=0.0, stop=0.5, times=np.linspace(0.0, 0.5, 6))
     swept_torques = Torques(robot, trajectory, rates=1)
     from jounce.sweeps.statistics import statistics

@@ -9,17 +9,17 @@ from jounce.jet import Jet, cross
 from jounce.testing import ContractError, JointReport, check_joint
 
 
-class Frozen(jn.AbstractConstraint, space="planar"):
+class Frozen(jn.joints.AbstractConstraint, space="planar"):
     """A place that depends on time, whose rates it leaves out."""
 
-    point_j: jn.Vector
+    point_j: jn.joints.Vector
 
     def residual(self, body_i, body_j, time):
         late = Jet.constant(jnp.sin(time.coefficients[0]), time.order)
         return body_j.point(self.point_j)[0] - body_i.position[0] - late
 
 
-class Mapped(jn.AbstractConstraint, space="planar"):
+class Mapped(jn.joints.AbstractConstraint, space="planar"):
     """A function taken of each coefficient by itself, which is none of jets."""
 
     def residual(self, body_i, body_j, time):
@@ -27,23 +27,23 @@ class Mapped(jn.AbstractConstraint, space="planar"):
         return (body_j.angle - body_i.angle).map(jnp.sin)
 
 
-class Global(jn.AbstractConstraint, space="planar"):
+class Global(jn.joints.AbstractConstraint, space="planar"):
     def residual(self, body_i, body_j, time):
         del time
         return body_j.position[0] - 0.3 * body_i.position[1]
 
 
-class Twice(jn.AbstractConstraint, space="planar"):
-    point_j: jn.Vector
+class Twice(jn.joints.AbstractConstraint, space="planar"):
+    point_j: jn.joints.Vector
 
     def residual(self, body_i, body_j, time):
         del time
         d = body_j.point(self.point_j) - body_i.position
-        return jn.rows(d[0], d[1], d[0] + d[1])
+        return jn.joints.rows(d[0], d[1], d[0] + d[1])
 
 
-class Nowhere(jn.AbstractConstraint, space="planar"):
-    point_j: jn.Vector
+class Nowhere(jn.joints.AbstractConstraint, space="planar"):
+    point_j: jn.joints.Vector
 
     def residual(self, body_i, body_j, time):
         del time
@@ -51,11 +51,11 @@ class Nowhere(jn.AbstractConstraint, space="planar"):
         return d.dot(d) + 1.0
 
 
-class Across(jn.AbstractConstraint, space="planar"):
+class Across(jn.joints.AbstractConstraint, space="planar"):
     """Directions at a right angle, which are said to be parallel."""
 
-    vector_i: jn.Vector
-    vector_j: jn.Vector
+    vector_i: jn.joints.Vector
+    vector_j: jn.joints.Vector
 
     held_parallel = (("vector_i", "vector_j"),)
 
@@ -89,7 +89,7 @@ class Changing(planar.Revolute):
         return id(self)
 
 
-class Constant(jn.AbstractConstraint, space="planar"):
+class Constant(jn.joints.AbstractConstraint, space="planar"):
     def residual(self, body_i, body_j, time):
         del body_i, body_j
         return time - 1.0
@@ -116,13 +116,13 @@ def test_a_contract_that_is_broken_is_named(kind, contract, words):
         check_joint(kind, space="planar", contracts=[contract], order=2)
 
 
-class Fork(jn.AbstractConstraint, space="planar"):
+class Fork(jn.joints.AbstractConstraint, space="planar"):
     """A fork of body i about a pin of body j, from a line of body i by a height."""
 
-    point_i: jn.Vector
-    point_j: jn.Vector
-    vector_i: jn.Vector
-    height: jn.Scalar
+    point_i: jn.joints.Vector
+    point_j: jn.joints.Vector
+    vector_i: jn.joints.Vector
+    height: jn.joints.Scalar
     side: str
 
     dimensions = {"height": "length"}
@@ -149,7 +149,7 @@ def test_a_joint_of_ones_own_is_held_to_all_of_them():
 @pytest.mark.parametrize(
     "arguments, words",
     [
-        ((int, {}), "kind: must be a class derived from jn.AbstractConstraint"),
+        ((int, {}), "kind: must be a class derived from jn.joints.AbstractConstraint"),
         ((Fork, {"space": "flat"}), "space"),
         ((Fork, {"order": 0, "space": "planar"}), "order: must be a whole number, 1 or greater"),
         ((Fork, {"contracts": ["jacobin"], "space": "planar"}), "contracts: no contract has this name.*jacobian"),
@@ -158,5 +158,5 @@ def test_a_joint_of_ones_own_is_held_to_all_of_them():
 )
 def test_what_makes_no_sense_is_refused_in_words(arguments, words):
     kind, options = arguments
-    with pytest.raises(jn.MechanismError, match=words):
+    with pytest.raises(jn.errors.MechanismError, match=words):
         check_joint(kind, **options)

@@ -7,12 +7,14 @@ import jounce as jn
 from jounce.trajectory import breaks
 from jounce.trajectory.breaks import at_breaks, both_sides, law_breaks, may_break, with_sides
 
-BENT = jn.PiecewiseMotion(["t", "2*t - 0.25"], until=[0.25])
-RAMP = jn.SegmentedMotion([jn.Segment("dwell", 0.25), jn.Segment("cycloidal", 0.5, by=0.1)], beyond="hold")
+BENT = jn.laws.PiecewiseMotion(["t", "2*t - 0.25"], until=[0.25])
+RAMP = jn.laws.SegmentedMotion(
+    [jn.laws.Segment("dwell", 0.25), jn.laws.Segment("cycloidal", 0.5, by=0.1)], beyond="hold"
+)
 
 
 def expression(text):
-    return jn.ExpressionMotion(jn.Expression(text), {})
+    return jn.laws.ExpressionMotion(jn.laws.Expression(text), {})
 
 
 @pytest.mark.parametrize(
@@ -24,12 +26,12 @@ def expression(text):
         (expression("0.1*(t - 0.4)**2*sign(t - 0.4)"), [0.4]),
         (expression("abs(sin(7*t))"), [np.pi / 7, 2 * np.pi / 7]),
         (expression("abs(t - 0.3)**3*t"), [0.3]),
-        (jn.FunctionMotion(lambda t: abs(t - 0.7)), [0.7]),
-        (jn.PiecewiseMotion(["t**4", "0.2**4 + abs(t - 0.6)"], until=[0.2]), [0.2, 0.6]),
+        (jn.laws.FunctionMotion(lambda t: abs(t - 0.7)), [0.7]),
+        (jn.laws.PiecewiseMotion(["t**4", "0.2**4 + abs(t - 0.6)"], until=[0.2]), [0.2, 0.6]),
         (RAMP, [0.25, 0.75]),
-        (jn.FollowingMotion(BENT, expression("t**2")), [0.5]),
-        (jn.FollowingMotion(RAMP, expression("t**2")), [0.5, np.sqrt(0.75)]),
-        (jn.FollowingMotion(expression("sin(t)"), BENT), [0.25]),
+        (jn.laws.FollowingMotion(BENT, expression("t**2")), [0.5]),
+        (jn.laws.FollowingMotion(RAMP, expression("t**2")), [0.5, np.sqrt(0.75)]),
+        (jn.laws.FollowingMotion(expression("sin(t)"), BENT), [0.25]),
     ],
 )
 def test_breaks_are_found(law, expected):
@@ -38,15 +40,15 @@ def test_breaks_are_found(law, expected):
 
 
 def test_those_of_several_laws_are_told_once():
-    laws = [expression("abs(t - 0.5)"), jn.PiecewiseMotion(["t", "0.5"], until=[0.5])]
+    laws = [expression("abs(t - 0.5)"), jn.laws.PiecewiseMotion(["t", "0.5"], until=[0.5])]
     assert law_breaks(laws, 0.0, 1.0, 4).tolist() == pytest.approx([0.5], abs=1e-11)
 
 
 def test_a_leader_of_several_laws_is_looked_at_once(monkeypatch):
     looked, seen = [], breaks._seen
     monkeypatch.setattr(breaks, "_seen", lambda law, *x: looked.append(law) or seen(law, *x))
-    leader = jn.FunctionMotion(lambda t: abs(t - 0.7))
-    laws = [jn.FollowingMotion(own, leader) for own in (expression("sin(t)"), jn.CycloidalMotion(0.0, 1.0))]
+    leader = jn.laws.FunctionMotion(lambda t: abs(t - 0.7))
+    laws = [jn.laws.FollowingMotion(own, leader) for own in (expression("sin(t)"), jn.laws.CycloidalMotion(0.0, 1.0))]
     assert law_breaks(laws, 0.0, 0.9, 2).tolist() == pytest.approx([0.7], abs=1e-11)
     assert looked == [leader]
 

@@ -45,12 +45,12 @@ def test_the_integral_of_a_formula(text):
     exact, instants = CASES[text]
     with mpmath.workdps(40):
         expected = np.array([float(exact(mpmath.mpf(t))) for t in instants])
-    found = values(jn.IntegratedMotion(text), instants)[0]
+    found = values(jn.laws.IntegratedMotion(text), instants)[0]
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
 
 def test_derivatives_are_those_of_the_formula_and_follow_a_leader():
-    law = jn.FollowingMotion(jn.IntegratedMotion("cos(t)", initial=[0.5]), "3*t + 0.2*sin(t)")
+    law = jn.laws.FollowingMotion(jn.laws.IntegratedMotion("cos(t)", initial=[0.5]), "3*t + 0.2*sin(t)")
     instants = [-2.0, 0.3, 1.9]
     with mpmath.workdps(50):
         exact = [
@@ -62,33 +62,33 @@ def test_derivatives_are_those_of_the_formula_and_follow_a_leader():
 
 @pytest.mark.slow
 def test_a_second_derivative_with_what_is_known_at_the_start():
-    law = jn.IntegratedMotion("6*t", derivative=2, initial=["x0", 2.0], start=1.0).resolved({"x0": 3.0})
+    law = jn.laws.IntegratedMotion("6*t", derivative=2, initial=["x0", 2.0], start=1.0).resolved({"x0": 3.0})
     instants = np.array([-1.0, 1.0, 2.5])
     np.testing.assert_allclose(values(law, instants, 1), [instants**3 - instants + 3, 3 * instants**2 - 1], atol=1e-12)
 
 
 @pytest.mark.slow
 def test_pieces_that_repeat_are_integrated_from_border_to_border():
-    saw = jn.PiecewiseMotion(["t", "2 - t"], until=[1.0, 2.0], beyond="repeat")
-    found = values(jn.IntegratedMotion(saw), [0.5, 1.5, 7.3, 50.2, -1.0])[0]
+    saw = jn.laws.PiecewiseMotion(["t", "2 - t"], until=[1.0, 2.0], beyond="repeat")
+    found = values(jn.laws.IntegratedMotion(saw), [0.5, 1.5, 7.3, 50.2, -1.0])[0]
     np.testing.assert_allclose(found, [0.125, 0.875, 3 + 0.5 + 0.3 - 0.045, 25.02, -0.5], rtol=1e-13)
-    pulse = [jn.Segment("dwell", 100.0), *(jn.Segment("cycloidal", 0.005, to=x) for x in (1.0, 0.0))]
-    found = values(jn.IntegratedMotion(jn.SegmentedMotion(pulse)), [50.0, 101.0])[0]
+    pulse = [jn.laws.Segment("dwell", 100.0), *(jn.laws.Segment("cycloidal", 0.005, to=x) for x in (1.0, 0.0))]
+    found = values(jn.laws.IntegratedMotion(jn.laws.SegmentedMotion(pulse)), [50.0, 101.0])[0]
     np.testing.assert_allclose(found, [0.0, 0.005], rtol=1e-11)
 
 
 def test_a_pole_is_never_passed():
-    law = jn.IntegratedMotion("1/(2 - t)**2")
+    law = jn.laws.IntegratedMotion("1/(2 - t)**2")
     np.testing.assert_allclose(values(law, [1.9])[0], [1 / 0.1 - 0.5], rtol=1e-12)
     assert np.isnan(values(law, [2.5])).all()
-    with pytest.raises(jn.TrajectoryError, match=r"is integrated from .* to 2 s only"):
+    with pytest.raises(jn.errors.TrajectoryError, match=r"is integrated from .* to 2 s only"):
         law.check_instants(0.0, 2.5)
 
 
 @pytest.mark.slow
 def test_slopes_by_parameters():
     def distance(tau):
-        law = jn.IntegratedMotion("1 - exp(-t/tau)").resolved({"tau": tau})
+        law = jn.laws.IntegratedMotion("1 - exp(-t/tau)").resolved({"tau": tau})
         return law(jn.Jet.variable(0.7, 0)).coefficients[0]
 
     tau = 0.3
@@ -100,7 +100,9 @@ def test_slopes_by_parameters():
 @pytest.mark.slow
 def test_slopes_by_the_start_and_the_values_there():
     def place(start, x0, v0):
-        law = jn.IntegratedMotion("6*t", 2, initial=["x0", "v0"], start="s").resolved({"s": start, "x0": x0, "v0": v0})
+        law = jn.laws.IntegratedMotion("6*t", 2, initial=["x0", "v0"], start="s").resolved(
+            {"s": start, "x0": x0, "v0": v0}
+        )
         return law(jn.Jet.variable(2.0, 0)).coefficients[0]
 
     start, v0 = 0.5, 3.0  # x0 + v0 (t - s) + t^3 - s^3 - 3 s^2 (t - s)
@@ -112,13 +114,13 @@ def test_slopes_by_the_start_and_the_values_there():
 
 @pytest.mark.slow
 def test_knots_are_those_of_the_derivative_one_order_higher():
-    ramp = jn.SegmentedMotion([jn.Segment("constant_velocity", 1.0, to=2.0)])
-    told = jn.continuity(jn.IntegratedMotion(ramp), -0.5, 1.5)
+    ramp = jn.laws.SegmentedMotion([jn.laws.Segment("constant_velocity", 1.0, to=2.0)])
+    told = jn.laws.continuity(jn.laws.IntegratedMotion(ramp), -0.5, 1.5)
     assert [(x.order, x.count, abs(x.size)) for x in told.derivatives if x.count] == [(2, 2, 2.0)]
 
 
 def test_what_cannot_be_is_refused():
-    with pytest.raises(jn.TrajectoryError, match=r"initial: must be a list of at most 1 values"):
-        jn.IntegratedMotion("t", initial=[0.0, 1.0])
-    with pytest.raises(jn.TrajectoryError, match="derivative"):
-        jn.IntegratedMotion("t", derivative=9)
+    with pytest.raises(jn.errors.TrajectoryError, match=r"initial: must be a list of at most 1 values"):
+        jn.laws.IntegratedMotion("t", initial=[0.0, 1.0])
+    with pytest.raises(jn.errors.TrajectoryError, match="derivative"):
+        jn.laws.IntegratedMotion("t", derivative=9)

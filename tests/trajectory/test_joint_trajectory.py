@@ -239,7 +239,7 @@ def test_bad_trajectories(number):
 
 
 def test_exported():
-    assert issubclass(jn.TrajectoryError, jn.JounceError)
+    assert issubclass(jn.errors.TrajectoryError, jn.JounceError)
 
 
 def test_a_trajectory_goes_to_other_processes_whole():

@@ -23,7 +23,7 @@ def polynomial(t, order):
 @pytest.mark.parametrize("derivative", [1, 2, 3])
 def test_polynomials_come_back(derivative):
     initial = [polynomial(T[0], k) for k in range(derivative)]
-    law = jn.MeasuredMotion(T, polynomial(T, derivative), derivative, initial, degree=5)
+    law = jn.laws.MeasuredMotion(T, polynomial(T, derivative), derivative, initial, degree=5)
     t = np.linspace(0.5, 2.0, 31)
     found = law(jn.Jet.variable(t, order=5)).derivatives()
     for order in range(6):
@@ -34,25 +34,25 @@ def test_polynomials_come_back(derivative):
 def test_a_long_record_is_integrated_at_once_and_loses_no_digits():
     """Over three minutes at 1 kHz, of which sums of all samples before each would take ten."""
     t = np.linspace(0.0, 200.0, 200_001)
-    law = jn.MeasuredMotion(t, -np.sin(t), 2, [0.0, 1.0])
+    law = jn.laws.MeasuredMotion(t, -np.sin(t), 2, [0.0, 1.0])
     late = np.array([3.3, 123.4567, 199.99])
     found = law(jn.Jet.variable(late, order=2)).derivatives()
     np.testing.assert_allclose(found, [np.sin(late), np.cos(late), -np.sin(late)], rtol=0, atol=2e-13)
 
 
 def test_zero_at_the_start_unless_given_and_what_is_beyond():
-    law = jn.MeasuredMotion([0.0, 1.0, 2.0], [2.0, 2.0, 2.0], degree=1, beyond="hold")
+    law = jn.laws.MeasuredMotion([0.0, 1.0, 2.0], [2.0, 2.0, 2.0], degree=1, beyond="hold")
     assert law(jn.Jet.variable(2.0, order=1)).derivatives().tolist() == [4.0, 4.0]
     assert law(jn.Jet.variable(5.0, order=1)).derivatives().tolist() == [4.0, 0.0]
-    refused = jn.MeasuredMotion([0.0, 1.0], [2.0, 2.0], degree=1)
-    with pytest.raises(jn.MechanismError, match="samples go from 0 to 1"):
+    refused = jn.laws.MeasuredMotion([0.0, 1.0], [2.0, 2.0], degree=1)
+    with pytest.raises(jn.errors.MechanismError, match="samples go from 0 to 1"):
         refused(jn.Jet.variable(2.0, order=1))
 
 
 def test_it_is_the_law_of_accelerations_of_negrean():
     rates = polynomial(T, 2) + np.sin(9 * T)
-    law = jn.MeasuredMotion(T, rates, degree=3)
-    theirs = jn.PolynomialMotion.from_accelerations(T, rates, continuity=4)
+    law = jn.laws.MeasuredMotion(T, rates, degree=3)
+    theirs = jn.laws.PolynomialMotion.from_accelerations(T, rates, continuity=4)
     t = jn.Jet.variable(np.linspace(0.6, 1.9, 9), order=4)
     np.testing.assert_allclose(law(t).derivatives(), theirs(t).derivatives(), rtol=0, atol=1e-10)
 
@@ -69,8 +69,8 @@ def test_it_is_the_law_of_accelerations_of_negrean():
     ],
 )
 def test_bad_laws(change, words):
-    with pytest.raises(jn.MechanismError, match=words):
-        jn.MeasuredMotion(T, T, **change)
+    with pytest.raises(jn.errors.MechanismError, match=words):
+        jn.laws.MeasuredMotion(T, T, **change)
 
 
 SLED = """\
@@ -169,15 +169,15 @@ def test_a_trajectory_file(tmp_path, text):
 def test_bad_trajectory_files(tmp_path, text, words):
     table(tmp_path / "a.csv", time=T, a=T, b=T)
     (tmp_path / "law.yaml").write_text(text)
-    with pytest.raises(jn.TrajectoryError) as raised:
+    with pytest.raises(jn.errors.TrajectoryError) as raised:
         jn.load_trajectory(tmp_path / "law.yaml")
     assert all(word in str(raised.value) for word in words), str(raised.value)
 
 
 def test_noisy_accelerations_are_told():
     noisy = polynomial(T, 2) + np.random.default_rng(1).normal(scale=5.0, size=len(T))
-    trajectory = jn.JointTrajectory({"a": jn.MeasuredMotion(T, noisy)}, T[0], T[-1])
-    with pytest.warns(jn.SampleWarning, match="'a'"):
+    trajectory = jn.JointTrajectory({"a": jn.laws.MeasuredMotion(T, noisy)}, T[0], T[-1])
+    with pytest.warns(jn.errors.SampleWarning, match="'a'"):
         trajectory.derivatives(T, 4)
 
 
@@ -206,7 +206,7 @@ def test_what_is_known_at_the_first_sample_follows_the_parameters(tmp_path):
 
 @pytest.mark.slow
 def test_gradients_with_respect_to_what_is_known_at_the_first_sample():
-    law = jn.MeasuredMotion(T, polynomial(T, 2), initial=["x0", "v0/2"])
+    law = jn.laws.MeasuredMotion(T, polynomial(T, 2), initial=["x0", "v0/2"])
     time = jn.Jet.variable(np.array([0.5, 1.25]), order=2)
     slopes = jax.jacobian(lambda v0: law.resolved({"x0": 0.1, "v0": v0})(time).derivatives())(1.0)
     np.testing.assert_allclose(slopes, [[0.0, 0.375], [0.5, 0.5], [0.0, 0.0]], rtol=0, atol=1e-12)
@@ -222,8 +222,8 @@ def test_bad_expressions_of_what_is_known_at_the_first_sample(tmp_path, initial,
 
 
 def test_a_law_that_waits_for_parameters_gives_no_numbers():
-    law = jn.MeasuredMotion(T, T, initial=["x0", "2*pi/3"])
-    with pytest.raises(jn.MechanismError, match="x0"):
+    law = jn.laws.MeasuredMotion(T, T, initial=["x0", "2*pi/3"])
+    with pytest.raises(jn.errors.MechanismError, match="x0"):
         law(jn.Jet.variable(1.0, order=1))
     known = law.resolved({"x0": 0.25})(jn.Jet.variable(T[0], order=1)).derivatives()
     np.testing.assert_allclose(known, [0.25, 2 * math.pi / 3], rtol=1e-15)

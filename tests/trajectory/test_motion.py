@@ -19,31 +19,31 @@ def derivatives(law, order=4, at=INSTANTS):
 
 class TestExpressionMotion:
     def test_values_and_derivatives(self):
-        found = derivatives(jn.ExpressionMotion("a*t**3 + cos(w*t)", {"a": 2.0, "w": 3.0}), 2)
+        found = derivatives(jn.laws.ExpressionMotion("a*t**3 + cos(w*t)", {"a": 2.0, "w": 3.0}), 2)
         t = np.array(INSTANTS)
         np.testing.assert_allclose(found[0], 2 * t**3 + np.cos(3 * t), rtol=1e-15)
         np.testing.assert_allclose(found[1], 6 * t**2 - 3 * np.sin(3 * t), rtol=1e-14)
         np.testing.assert_allclose(found[2], 12 * t - 9 * np.cos(3 * t), rtol=1e-14)
 
     def test_equation_056_of_sommer_2024(self):
-        law = jn.ExpressionMotion("30*deg + 60*deg*sin(2*pi*t/tau)", {"tau": 2.0})
+        law = jn.laws.ExpressionMotion("30*deg + 60*deg*sin(2*pi*t/tau)", {"tau": 2.0})
         right = sommer_planar.equation_056(np.array(INSTANTS), np.radians(30), np.radians(60), 2.0)
         np.testing.assert_allclose(derivatives(law), right, rtol=1e-13, atol=1e-12)
 
     @pytest.mark.parametrize("text", ["0.3", "a", "2*a - 1"])
     def test_constant_law(self, text):
-        found = derivatives(jn.ExpressionMotion(text, {"a": 0.65}), 2)
+        found = derivatives(jn.laws.ExpressionMotion(text, {"a": 0.65}), 2)
         np.testing.assert_allclose(found[0], np.full((1, 3), 0.65 if text == "a" else 0.3))
         np.testing.assert_array_equal(found[1:], 0)
 
     def test_name_without_a_value(self):
-        with pytest.raises(jn.ExpressionError, match="tua"):
-            jn.ExpressionMotion("sin(2*pi*t/tua)", {"tau": 2.0})
+        with pytest.raises(jn.errors.ExpressionError, match="tua"):
+            jn.laws.ExpressionMotion("sin(2*pi*t/tua)", {"tau": 2.0})
 
 
 class TestFunctionMotion:
     def test_any_traceable_function(self):
-        found = derivatives(jn.FunctionMotion(lambda t: jnp.where(t < 0.5, t**2, jnp.sin(t))), 1)
+        found = derivatives(jn.laws.FunctionMotion(lambda t: jnp.where(t < 0.5, t**2, jnp.sin(t))), 1)
         t = np.array(INSTANTS)
         np.testing.assert_allclose(found[0], np.where(t < 0.5, t**2, np.sin(t)), rtol=1e-15)
         np.testing.assert_allclose(found[1], np.where(t < 0.5, 2 * t, np.cos(t)), rtol=1e-15)
@@ -65,7 +65,7 @@ class TestSplineMotion:
     @pytest.mark.parametrize("degree", [1, 3, 5, 7])
     def test_polynomial_of_the_degree_is_itself(self, degree):
         polynomial = np.polynomial.Polynomial(np.random.default_rng(degree).uniform(-1, 1, degree + 1))
-        found = derivatives(jn.SplineMotion(self.times, polynomial(self.times), degree), degree + 1)
+        found = derivatives(jn.laws.SplineMotion(self.times, polynomial(self.times), degree), degree + 1)
         t = np.array(INSTANTS)
         for k in range(degree + 1):
             expected = polynomial.deriv(k)(t) if k else polynomial(t)
@@ -77,7 +77,7 @@ class TestSplineMotion:
         values = np.sin(7 * times)
         spline = make_interp_spline(times, values, k=5)
         at = jnp.asarray(np.linspace(times[0], times[-1], 11))[None]
-        found = derivatives(jn.SplineMotion(times, values, 5), 4, at)
+        found = derivatives(jn.laws.SplineMotion(times, values, 5), 4, at)
         for k in range(5):
             expected = spline.derivative(k)(np.array(at)) if k else spline(np.array(at))
             np.testing.assert_allclose(found[k], expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
@@ -85,7 +85,7 @@ class TestSplineMotion:
     @pytest.mark.slow
     def test_it_goes_through_its_samples(self):
         values = np.cos(5 * self.times)
-        law = jn.SplineMotion(self.times, values)
+        law = jn.laws.SplineMotion(self.times, values)
         found = derivatives(law, 0, jnp.asarray(self.times)[None])
         np.testing.assert_allclose(found[0, 0], values, atol=1e-14)
 
@@ -94,16 +94,18 @@ class TestSplineMotion:
     def test_samples_that_all_agree_are_at_rest_exactly(self, degree, held):
         """Friction takes its sign from the velocity: rounding in its place would be all of the friction."""
         times = np.cumsum(np.random.default_rng(1).uniform(0.5, 1.5, 60)) / 7
-        found = derivatives(jn.SplineMotion(times, np.full(60, held), degree), 3, jnp.linspace(times[0], times[-1], 97))
+        found = derivatives(
+            jn.laws.SplineMotion(times, np.full(60, held), degree), 3, jnp.linspace(times[0], times[-1], 97)
+        )
         assert (found[0] == held).all()
         assert (found[1:] == 0).all()
 
     def test_outside_the_samples_the_end_pieces_go_on_where_they_are_to(self):
-        law = jn.SplineMotion(self.times, self.times**3, 3, beyond="continue")
+        law = jn.laws.SplineMotion(self.times, self.times**3, 3, beyond="continue")
         np.testing.assert_allclose(derivatives(law, 0, jnp.asarray([[-0.5, 1.5]])), [[[-0.125, 3.375]]], rtol=1e-11)
 
     def test_jets_of_the_law_agree_with_its_values_nearby(self):
-        law = jn.SplineMotion(self.times, np.sin(3 * self.times), 5)
+        law = jn.laws.SplineMotion(self.times, np.sin(3 * self.times), 5)
         jet = law(Jet.variable(INSTANTS, 5))
         step = 1e-3
         np.testing.assert_allclose(jet.evaluate(step), derivatives(law, 0, INSTANTS + step)[0], rtol=1e-14)
@@ -111,7 +113,7 @@ class TestSplineMotion:
     @pytest.mark.slow
     def test_two_splines_drive_two_bodies(self):
         """Drivers of a kind are stacked: each must take its own samples."""
-        one, two = (jn.SplineMotion(self.times, a * self.times**2, 3) for a in (1.0, -2.0))
+        one, two = (jn.laws.SplineMotion(self.times, a * self.times**2, 3) for a in (1.0, -2.0))
         mechanism = jn.Mechanism(
             space="planar",
             bodies={"a": jn.Body([0, 0]), "b": jn.Body([1, 0])},
@@ -119,7 +121,7 @@ class TestSplineMotion:
             drivers={
                 f"d{n}": jn.drivers.CoordinateDriver(("ground", n), "angle", law) for n, law in (("a", one), ("b", two))
             },
-            outputs={n: jn.AngleOutput(n) for n in "ab"},
+            outputs={n: jn.outputs.AngleOutput(n) for n in "ab"},
         )
         time = np.array([0.0, 0.33, 0.71, 1.0])
         motion = jn.solve(mechanism, time, order=2)
@@ -140,5 +142,5 @@ class TestSplineMotion:
         ],
     )
     def test_wrong_samples(self, times, values, degree, message):
-        with pytest.raises(jn.MechanismError, match=message):
-            jn.SplineMotion(times, values, degree)
+        with pytest.raises(jn.errors.MechanismError, match=message):
+            jn.laws.SplineMotion(times, values, degree)

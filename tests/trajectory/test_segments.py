@@ -38,8 +38,8 @@ def test_profiles_have_the_peaks_that_are_printed_and_their_smoothness(profile):
 def test_laws_known_already_are_the_same():
     segments = [Segment("cycloidal", 2.0, by=3.0), Segment("polynomial_4_5_6_7", 1.5, to=-1.0)]
     law, instants = SegmentedMotion(segments, initial=0.5, start=1.0), np.linspace(0.5, 5.0, 91)
-    first = derivatives(jn.CycloidalMotion(0.5, 3.5, 2.0, 1.0), instants)
-    second = derivatives(jn.RestToRestMotion(3.5, -1.0, 1.5, 3.0, rest=3), instants)
+    first = derivatives(jn.laws.CycloidalMotion(0.5, 3.5, 2.0, 1.0), instants)
+    second = derivatives(jn.laws.RestToRestMotion(3.5, -1.0, 1.5, 3.0, rest=3), instants)
     wanted = np.where(instants < 3.0, first, second)
     np.testing.assert_allclose(derivatives(law, instants), wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
 
@@ -117,8 +117,8 @@ def test_slopes_in_durations_and_ways_are_those_of_differences():
 
 def test_a_law_of_another_coordinate_has_the_derivatives_of_the_chain_rule():
     lift = SegmentedMotion([Segment("modified_sine", 2.0, to=1.0), Segment("cycloidal", 3.0, to=0.0)], beyond="repeat")
-    follower, t = jn.FollowingMotion(lift, "0.4*t + 0.3*sin(t)"), np.linspace(0.1, 9.0, 60)
-    angle = derivatives(jn.ExpressionMotion("0.4*t + 0.3*sin(t)"), t, 2)
+    follower, t = jn.laws.FollowingMotion(lift, "0.4*t + 0.3*sin(t)"), np.linspace(0.1, 9.0, 60)
+    angle = derivatives(jn.laws.ExpressionMotion("0.4*t + 0.3*sin(t)"), t, 2)
     own = derivatives(lift, angle[0], 2)
     found = derivatives(follower, t, 2)
     np.testing.assert_allclose(found[1], own[1] * angle[1], rtol=1e-12, atol=1e-14)
@@ -126,7 +126,7 @@ def test_a_law_of_another_coordinate_has_the_derivatives_of_the_chain_rule():
 
 
 def test_pieces_follow_each_other_also_where_the_others_have_no_value():
-    law = jn.PiecewiseMotion(["sqrt(1 - t)", "log(t)", "t - 2"], until=[0.5, 2.0])
+    law = jn.laws.PiecewiseMotion(["sqrt(1 - t)", "log(t)", "t - 2"], until=[0.5, 2.0])
     found = derivatives(law, [0.0, 0.49, 0.5, 1.9, 2.0, 30.0], 1)
     np.testing.assert_allclose(found[0], [1.0, np.sqrt(0.51), np.log(0.5), np.log(1.9), 0.0, 28.0], rtol=1e-15)
     np.testing.assert_allclose(found[1, 2:5], [2.0, 1 / 1.9, 1.0], rtol=1e-15)
@@ -150,6 +150,6 @@ def test_pieces_follow_each_other_also_where_the_others_have_no_value():
     ],
 )
 def test_what_is_no_law_is_refused_by_name(segments, options, name, words):
-    with pytest.raises(jn.TrajectoryError, match=words) as caught:
+    with pytest.raises(jn.errors.TrajectoryError, match=words) as caught:
         SegmentedMotion(segments, **options)
     assert caught.value.name == name

@@ -18,8 +18,10 @@ JUMPS = {  # of cam profiles of unit rise and duration, at the beginning: order,
 @pytest.mark.parametrize("profile", JUMPS)
 def test_segments_jump_as_their_formulas_say(profile):
     order, size = JUMPS[profile]
-    law = jn.SegmentedMotion([jn.Segment("dwell", 0.5), jn.Segment(profile, 2.0, by=3.0), jn.Segment("dwell", 1.0)])
-    found = jn.continuity(law, 0.0, 4.0)
+    law = jn.laws.SegmentedMotion(
+        [jn.laws.Segment("dwell", 0.5), jn.laws.Segment(profile, 2.0, by=3.0), jn.laws.Segment("dwell", 1.0)]
+    )
+    found = jn.laws.continuity(law, 0.0, 4.0)
     assert found.smoothness == order - 1
     told = found.derivatives[order]
     assert told.count == 2
@@ -30,21 +32,23 @@ def test_segments_jump_as_their_formulas_say(profile):
 
 def test_profiles_jump_as_their_formulas_say():
     for rest in (1, 2, 3):  # the derivative above the rest is (2 r + 1)! / r! of the way, at both ends
-        law = jn.RestToRestMotion(1.0, 3.0, duration=0.5, start_time=0.25, rest=rest)
-        found = jn.continuity(law, 0.0, 1.0)
+        law = jn.laws.RestToRestMotion(1.0, 3.0, duration=0.5, start_time=0.25, rest=rest)
+        found = jn.laws.continuity(law, 0.0, 1.0)
         told = found.derivatives[rest + 1]
         size = 2.0 * math.factorial(2 * rest + 1) / math.factorial(rest) / 0.5 ** (rest + 1)
         assert (found.smoothness, told.count, found.unknown) == (rest, 2, "")
         assert (told.size, told.instant) == (pytest.approx(size), 0.25)
-        assert jn.continuity(law, 0.3, 0.7).smoothness is None
-    cycloid = jn.continuity(jn.CycloidalMotion(0.0, -1.0, duration=2.0), -1.0, 3.0)
+        assert jn.laws.continuity(law, 0.3, 0.7).smoothness is None
+    cycloid = jn.laws.continuity(jn.laws.CycloidalMotion(0.0, -1.0, duration=2.0), -1.0, 3.0)
     assert (cycloid.smoothness, cycloid.derivatives[3].size) == (2, pytest.approx(-(math.pi**2) / 2))
 
 
 def test_what_follows_jumps_where_its_leader_passes_the_knots():
-    lift = jn.SegmentedMotion([jn.Segment("harmonic", math.pi, to=0.02), jn.Segment("harmonic", math.pi, to=0.0)])
-    law = jn.FollowingMotion(lift, "2*pi*t + 0.1*sin(2*pi*t)")
-    found = jn.continuity(law, -0.2, 1.2)
+    lift = jn.laws.SegmentedMotion(
+        [jn.laws.Segment("harmonic", math.pi, to=0.02), jn.laws.Segment("harmonic", math.pi, to=0.0)]
+    )
+    law = jn.laws.FollowingMotion(lift, "2*pi*t + 0.1*sin(2*pi*t)")
+    found = jn.laws.continuity(law, -0.2, 1.2)
     assert found.smoothness == 1
     told = found.derivatives[2]
     speed = 2 * math.pi * 1.1  # at 0 s and at 1 s
@@ -52,9 +56,10 @@ def test_what_follows_jumps_where_its_leader_passes_the_knots():
     assert abs(told.size) == pytest.approx(0.01 * speed**2)
     assert told.instant == pytest.approx(0.0, abs=1e-12)
     assert found.derivatives[3].count == 0  # the leader has no acceleration there
-    repeated = jn.SegmentedMotion([jn.Segment("cycloidal", math.pi, to=1.0), jn.Segment("cycloidal", math.pi, to=0.0)],
-                                  beyond="repeat")  # fmt: skip
-    turning = jn.continuity(jn.FollowingMotion(repeated, "-2*pi*t"), 0.1, 10.1)
+    repeated = jn.laws.SegmentedMotion(
+        [jn.laws.Segment("cycloidal", math.pi, to=1.0), jn.laws.Segment("cycloidal", math.pi, to=0.0)], beyond="repeat"
+    )
+    turning = jn.laws.continuity(jn.laws.FollowingMotion(repeated, "-2*pi*t"), 0.1, 10.1)
     assert turning.smoothness == 2
     assert turning.derivatives[3].count == 20
 
@@ -62,56 +67,58 @@ def test_what_follows_jumps_where_its_leader_passes_the_knots():
 @pytest.mark.parametrize("leader", ["2*pi*t", "2*pi - 2*pi*t"])
 def test_a_leader_that_begins_or_ends_at_a_knot_passes_it(leader):
     """As the same law of the time does: acceleration of a harmonic rise jumps at its beginning and at its end."""
-    rise = [jn.Segment("harmonic", math.pi, by=0.02), jn.Segment("dwell", math.pi)]
+    rise = [jn.laws.Segment("harmonic", math.pi, by=0.02), jn.laws.Segment("dwell", math.pi)]
     for beyond, count in (("hold", 2), ("advance", 3)):
-        found = jn.continuity(jn.FollowingMotion(jn.SegmentedMotion(rise, beyond=beyond), leader), 0.0, 1.0)
+        found = jn.laws.continuity(
+            jn.laws.FollowingMotion(jn.laws.SegmentedMotion(rise, beyond=beyond), leader), 0.0, 1.0
+        )
         assert (found.smoothness, found.derivatives[2].count) == (1, count)
 
 
 @pytest.mark.parametrize("leader", ["sqrt(t)", "sqrt(1 - t)"])
 def test_a_leader_that_has_no_value_beyond_its_ends_passes_nothing_there(leader):
-    rise = [jn.Segment("dwell", 0.5), jn.Segment("harmonic", 0.3, by=0.02), jn.Segment("dwell", 0.7)]
-    found = jn.continuity(jn.FollowingMotion(jn.SegmentedMotion(rise), leader), 0.0, 1.0)
+    rise = [jn.laws.Segment("dwell", 0.5), jn.laws.Segment("harmonic", 0.3, by=0.02), jn.laws.Segment("dwell", 0.7)]
+    found = jn.laws.continuity(jn.laws.FollowingMotion(jn.laws.SegmentedMotion(rise), leader), 0.0, 1.0)
     assert (found.smoothness, found.derivatives[2].count) == (1, 2)
 
 
 def test_pieces_splines_and_expressions():
-    pieces = jn.PiecewiseMotion(["t**3", "3*t - 2"], until=[1.0])
-    told = jn.continuity(pieces, 0.0, 2.0)
+    pieces = jn.laws.PiecewiseMotion(["t**3", "3*t - 2"], until=[1.0])
+    told = jn.laws.continuity(pieces, 0.0, 2.0)
     assert told.smoothness == 1
     assert told.derivatives[2].size == -6.0
-    assert jn.continuity(pieces, 0.0, 0.5).smoothness is None  # nothing happens there
+    assert jn.laws.continuity(pieces, 0.0, 0.5).smoothness is None  # nothing happens there
     t = np.linspace(0.0, 1.0, 21)
-    spline = jn.continuity(jn.SplineMotion(t, np.sin(7 * t), degree=5), 0.0, 1.0)
+    spline = jn.laws.continuity(jn.laws.SplineMotion(t, np.sin(7 * t), degree=5), 0.0, 1.0)
     assert spline.smoothness == 4
     assert spline.derivatives[5].count > 5
-    held = jn.continuity(jn.SplineMotion(t, np.sin(7 * t), beyond="hold"), -1.0, 2.0)
+    held = jn.laws.continuity(jn.laws.SplineMotion(t, np.sin(7 * t), beyond="hold"), -1.0, 2.0)
     assert held.smoothness == 0
     assert held.derivatives[1].size == pytest.approx(7.0, rel=1e-3)
-    assert jn.continuity(jn.ExpressionMotion("sin(t)"), 0.0, 1.0).unknown == ""
-    assert "abs" in jn.continuity(jn.ExpressionMotion("abs(t)"), 0.0, 1.0).unknown
-    assert jn.continuity(jn.FunctionMotion(lambda t: t), 0.0, 1.0).unknown
-    with pytest.raises(jn.TrajectoryError, match="from 0 to 10"):
-        jn.continuity(pieces, 0.0, 1.0, order=11)
+    assert jn.laws.continuity(jn.laws.ExpressionMotion("sin(t)"), 0.0, 1.0).unknown == ""
+    assert "abs" in jn.laws.continuity(jn.laws.ExpressionMotion("abs(t)"), 0.0, 1.0).unknown
+    assert jn.laws.continuity(jn.laws.FunctionMotion(lambda t: t), 0.0, 1.0).unknown
+    with pytest.raises(jn.errors.TrajectoryError, match="from 0 to 10"):
+        jn.laws.continuity(pieces, 0.0, 1.0, order=11)
 
 
 @pytest.mark.parametrize("law", ["0.01*(1 - cos(t))", "0.2*sin(3*t) - 0.1*sin(t)**2"])
 def test_rounding_is_no_jump_where_a_smooth_law_begins_again(law):
     """sin(2 pi) is 2e-16 and not zero: a derivative that vanishes where laws meet is rounding of any size."""
-    told = jn.continuity(jn.ExpressionMotion(law), 0.0, 2 * math.pi, order=6, periodic=True)
+    told = jn.laws.continuity(jn.laws.ExpressionMotion(law), 0.0, 2 * math.pi, order=6, periodic=True)
     assert told.smoothness is None
 
 
 def test_rounding_is_no_jump_between_pieces():
-    law = jn.PiecewiseMotion(["sin(pi*t)", "pi*(1 - t)", "-pi + sin(t - 2)**3"], until=[1.0, 2.0])
-    told = jn.continuity(law, 0.0, 3.0)
+    law = jn.laws.PiecewiseMotion(["sin(pi*t)", "pi*(1 - t)", "-pi + sin(t - 2)**3"], until=[1.0, 2.0])
+    told = jn.laws.continuity(law, 0.0, 3.0)
     assert [x.count for x in told.derivatives] == [0, 1, 0, 2, 0]
     assert told.derivatives[1].size == pytest.approx(math.pi)
     assert told.derivatives[3].size == pytest.approx(-(math.pi**3))
     share = "(t/0.7)"
     rise = f"10*{share}**3 - 15*{share}**4 + 6*{share}**5"
-    for after in ("1", jn.SplineMotion(np.linspace(0.7, 0.9, 11), np.ones(11))):  # these say nothing after 0.9 s
-        told = jn.continuity(jn.PiecewiseMotion([rise, after], until=[0.7]), 0.0, 0.9)
+    for after in ("1", jn.laws.SplineMotion(np.linspace(0.7, 0.9, 11), np.ones(11))):  # these say nothing after 0.9 s
+        told = jn.laws.continuity(jn.laws.PiecewiseMotion([rise, after], until=[0.7]), 0.0, 0.9)
         assert told.smoothness == 2
         assert told.derivatives[3].size == pytest.approx(-60 / 0.7**3)
 
@@ -124,7 +131,7 @@ def test_hermite_laws_keep_all_derivatives_and_are_as_good_as_their_order(levels
     errors = []
     for count in (9, 17):
         times = np.linspace(0.0, 2.0, count)
-        law = jn.HermiteMotion(times, exact(times))
+        law = jn.laws.HermiteMotion(times, exact(times))
         at_knots = np.array(law(jn.Jet.variable(times, levels - 1)).derivatives())
         np.testing.assert_allclose(at_knots, exact(times).T, rtol=1e-15)
         between = np.linspace(0.0, 2.0, 301)
@@ -132,7 +139,7 @@ def test_hermite_laws_keep_all_derivatives_and_are_as_good_as_their_order(levels
     if levels <= 5:
         assert errors[0] / errors[1] > 2 ** (2 * levels - 1)  # order of convergence, less a half
     assert errors[1] < {1: 0.1, 3: 1e-5, 5: 1e-10, 9: 1e-14}[levels] * 3
-    smooth = jn.continuity(law, 0.0, 2.0).smoothness
+    smooth = jn.laws.continuity(law, 0.0, 2.0).smoothness
     assert smooth is None or smooth >= min(levels, 6) - 1
 
 
@@ -141,16 +148,16 @@ def test_hermite_laws_keep_all_derivatives_and_are_as_good_as_their_order(levels
     [([0.0, 1.0], [[1.0]], "derivatives"), ([0.0, 0.0], [[1.0], [1.0]], "times"), ([0.0], [[np.nan]], "derivatives")],
 )
 def test_hermite_laws_refuse_what_does_not_fit(times, rows, name):
-    with pytest.raises(jn.TrajectoryError) as caught:
-        jn.HermiteMotion(times, rows)
+    with pytest.raises(jn.errors.TrajectoryError) as caught:
+        jn.laws.HermiteMotion(times, rows)
     assert caught.value.name == name
 
 
 def test_a_law_that_begins_again_counts_its_end_once():
     quarter = math.pi / 2
-    rise, rest = jn.Segment("harmonic", quarter, to=0.01), jn.Segment("dwell", quarter)
-    fall = jn.Segment("harmonic", quarter, to=0.0)
+    rise, rest = jn.laws.Segment("harmonic", quarter, to=0.01), jn.laws.Segment("dwell", quarter)
+    fall = jn.laws.Segment("harmonic", quarter, to=0.0)
     for beyond in ("repeat", "hold"):
-        law = jn.SegmentedMotion([rise, rest, fall, rest], beyond=beyond)
-        found = jn.continuity(law, 0.0, 2 * math.pi, periodic=True)
+        law = jn.laws.SegmentedMotion([rise, rest, fall, rest], beyond=beyond)
+        found = jn.laws.continuity(law, 0.0, 2 * math.pi, periodic=True)
         assert [(x.order, x.count) for x in found.derivatives if x.order == 2] == [(2, 4)]

@@ -33,13 +33,13 @@ FREE, LIMITED = arm(), arm(jn.Limits(lower=-2.0, upper=2.0, velocity=1e3, accele
 @pytest.mark.parametrize(
     "law",
     [
-        jn.ExpressionMotion("30 + 60*sin(pi*t)"),
-        jn.FunctionMotion(lambda t: 30 + 60 * jnp.sin(np.pi * t)),
-        jn.SplineMotion(T, SWING),
-        jn.MeasuredMotion(T, 60 * np.pi * np.cos(np.pi * T), 1, [30.0]),
-        jn.HermiteMotion(T, np.stack([SWING, 60 * np.pi * np.cos(np.pi * T)], axis=1)),
-        jn.FollowingMotion(jn.SplineMotion(np.pi * T, SWING), "pi*t"),
-        jn.PiecewiseMotion(["30 + 60*sin(pi*t)", "30 + 60*sin(pi*t)"], [1.0]),
+        jn.laws.ExpressionMotion("30 + 60*sin(pi*t)"),
+        jn.laws.FunctionMotion(lambda t: 30 + 60 * jnp.sin(np.pi * t)),
+        jn.laws.SplineMotion(T, SWING),
+        jn.laws.MeasuredMotion(T, 60 * np.pi * np.cos(np.pi * T), 1, [30.0]),
+        jn.laws.HermiteMotion(T, np.stack([SWING, 60 * np.pi * np.cos(np.pi * T)], axis=1)),
+        jn.laws.FollowingMotion(jn.laws.SplineMotion(np.pi * T, SWING), "pi*t"),
+        jn.laws.PiecewiseMotion(["30 + 60*sin(pi*t)", "30 + 60*sin(pi*t)"], [1.0]),
     ],
     ids=lambda law: type(law).__name__,
 )
@@ -53,10 +53,10 @@ def test_values_of_laws_of_every_form(law):
 @pytest.mark.parametrize(
     "law",
     [
-        jn.SegmentedMotion([jn.Segment("modified_sine", 1.0, to=90.0), jn.Segment("dwell", 1.0)]),
-        jn.SegmentedMotion([jn.Segment("cycloidal", 1.0, to=2.0), jn.Segment("cycloidal", 1.0, to=0.0)]),
-        jn.TrapezoidalMotion(0.0, 3.0, duration=2.0),
-        jn.SplineMotion(T, SWING, beyond="hold"),
+        jn.laws.SegmentedMotion([jn.laws.Segment("modified_sine", 1.0, to=90.0), jn.laws.Segment("dwell", 1.0)]),
+        jn.laws.SegmentedMotion([jn.laws.Segment("cycloidal", 1.0, to=2.0), jn.laws.Segment("cycloidal", 1.0, to=0.0)]),
+        jn.laws.TrapezoidalMotion(0.0, 3.0, duration=2.0),
+        jn.laws.SplineMotion(T, SWING, beyond="hold"),
     ],
     ids=lambda law: type(law).__name__,
 )
@@ -81,16 +81,16 @@ def test_values_by_numpy_are_those_of_the_law(law):
     ],
 )
 def test_swings_to_whole_and_half_degrees_of_more_than_a_turn_are_told(law, told):
-    assert degrees_meant(values_of(jn.ExpressionMotion(law), 0.0, 2.0)) == told
+    assert degrees_meant(values_of(jn.laws.ExpressionMotion(law), 0.0, 2.0)) == told
 
 
 @pytest.mark.parametrize("law", ["log(t - 1)", "1.7e308*t", "1e300 + t", "1/(t - 1)"])
 def test_a_law_that_says_nothing_of_the_run_has_no_values(law):
-    assert values_of(jn.ExpressionMotion(law), 0.0, 2.0) is None
+    assert values_of(jn.laws.ExpressionMotion(law), 0.0, 2.0) is None
 
 
 def test_a_pole_is_no_motion_in_degrees():
-    assert degrees_meant(values_of(jn.ExpressionMotion("tan(2*t)"), 0.0, 0.9)) == ""
+    assert degrees_meant(values_of(jn.laws.ExpressionMotion("tan(2*t)"), 0.0, 0.9)) == ""
     there = np.repeat([-90.0, 90.0], 100)  # at once: they stand still on both sides
     assert degrees_meant(there) == "goes from -90 to 90 rad, 29 turns: degrees?"
 
@@ -109,7 +109,7 @@ IN_DEGREES = {
 @pytest.mark.parametrize("robot", [FREE, LIMITED], ids=["free", "limited"])
 @pytest.mark.parametrize("given", IN_DEGREES)
 def test_a_trajectory_in_degrees_is_told(robot, given):
-    with pytest.warns(jn.UnitWarning, match=r"pin goes from .* to 90 rad, .* turns: degrees\?"):
+    with pytest.warns(jn.errors.UnitWarning, match=r"pin goes from .* to 90 rad, .* turns: degrees\?"):
         jn.dynamics.trajectory_torques(robot, IN_DEGREES[given])
 
 
@@ -129,7 +129,7 @@ def test_a_trajectory_in_rad_is_not_doubted(robot, law):
 
 
 def test_waypoints_in_degrees_are_told():
-    with pytest.warns(jn.UnitWarning, match="pin goes from 0 to 91.87 rad"), pytest.raises(jn.JounceError):
+    with pytest.warns(jn.errors.UnitWarning, match="pin goes from 0 to 91.87 rad"), pytest.raises(jn.JounceError):
         jn.retime(LIMITED, [[0.0, 0.0], [90.0, 0.1], [45.0, 0.0]])
 
 

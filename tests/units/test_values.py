@@ -310,7 +310,7 @@ def test_a_torque_in_newton_metres_is_one(tmp_path):
 
 @pytest.mark.parametrize("moment, law", [("5 N", "-M"), ("5 Nm", "-M/arm"), ("5 N", "-half"), ("5 tex", "-M*t")])
 def test_a_parameter_of_another_dimension_is_refused_with_its_place(tmp_path, moment, law):
-    with pytest.raises(jn.MechanismFileError, match=r"line [36], (forces\.brake\.law|parameters\.M)"):
+    with pytest.raises(jn.errors.MechanismFileError, match=r"line [36], (forces\.brake\.law|parameters\.M)"):
         brake(tmp_path, moment, law)
 
 
@@ -326,7 +326,7 @@ def test_new_values_take_units_and_are_checked(tmp_path):
     for wrong in ({"M": "nan"}, {"M": ""}, {"M": "2*q"}, {"M": "M"}):
         with pytest.raises(JounceError):
             known.with_parameters(**wrong)
-    with pytest.raises(jn.MechanismError, match="did you mean 'arm'"):
+    with pytest.raises(jn.errors.MechanismError, match="did you mean 'arm'"):
         known.with_parameters(arn="2 cm")
 
 

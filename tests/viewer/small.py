@@ -6,7 +6,7 @@ import threading
 import numpy as np
 
 import jounce as jn
-from jounce.viewer.shapes.appearance import Appearance, BodyPoint, ColouredMesh
+from jounce.viewer.shapes.appearance import Appearance, BodyPoint, ColoredMesh
 from jounce.viewer.shapes.meshes import box
 from jounce.viewer.shapes.recording import Parameter, Recording
 
@@ -14,13 +14,13 @@ INERTIA, MASS, RADIUS = 0.5, 2.0, 0.3
 
 
 def wheel(**parts):
-    """A wheel on the ground's origin, its angle c*t**3 and its centre of mass in the pivot."""
+    """A wheel on the ground's origin, its angle c*t**3 and its center of mass in the pivot."""
     given = {
         "space": "planar",
         "bodies": {"wheel": jn.Body([0, 0], mass=MASS, inertia=INERTIA)},
         "joints": {"O": jn.planar.Revolute(("ground", "wheel"), [0, 0], [0, 0])},
         "drivers": {"turn": jn.drivers.CoordinateDriver(("ground", "wheel"), "angle", motion="c*t**3")},
-        "outputs": {"rim": jn.PointOutput("wheel", point=["r", 0]), "angle": jn.AngleOutput("wheel")},
+        "outputs": {"rim": jn.outputs.PointOutput("wheel", point=["r", 0]), "angle": jn.outputs.AngleOutput("wheel")},
         "parameters": {"c": 2.0, "r": RADIUS, "twice": "2*r"},
         "gravity": [0, -10.0],
         "time": np.linspace(0.0, 1.0, 101),
@@ -68,7 +68,7 @@ def plain_recording(value=1.0, notice=""):
     motion = np.zeros((5, 2, 3))
     motion[:, 0], motion[:, 1, 0] = position[:, 1], value
     appearance = Appearance(
-        {"ground": (), "box": (ColouredMesh(box([0.1, 0.1, 0.1]), (1, 2, 3)),)},
+        {"ground": (), "box": (ColoredMesh(box([0.1, 0.1, 0.1]), (1, 2, 3)),)},
         (),
         (BodyPoint("box", (0.0, 0.0, 0.0), "box"),),
         1.0,
@@ -97,5 +97,5 @@ class Slow:
         assert self.gate.wait(20.0)
         self.solved.append(values["value"])
         if values["value"] < 0:
-            raise jn.AssemblyError("the bodies cannot be put together", name="value", value=values["value"])
+            raise jn.errors.AssemblyError("the bodies cannot be put together", name="value", value=values["value"])
         return plain_recording(values["value"], "some instants are missing" if values["value"] > 100 else "")

@@ -67,7 +67,7 @@ def test_it_loads_without_a_request_to_elsewhere(opened):
     assert errors == []
     assert page.get_by_text("Planar four-bar").count() >= 1
     canvas = canvas_of(page)
-    assert (canvas.std(axis=-1) > 0.08).mean() > 0.01  # coloured bodies on grey and white
+    assert (canvas.std(axis=-1) > 0.08).mean() > 0.01  # colored bodies on gray and white
 
 
 def test_it_moves_and_stops(opened):

@@ -45,14 +45,14 @@ def test_arrows_are_scaled_derivatives(recording):
     assert 0.1 * recording.size < longest <= 0.3 * recording.size * (1 + 1e-9)
 
 
-def test_paths_run_through_the_point_and_are_coloured_by_a_derivative(recording):
+def test_paths_run_through_the_point_and_are_colored_by_a_derivative(recording):
     expected = derivatives_of_the_rim(recording.time)
     drawn = Overlay.of(recording, DisplayOptions((TracedPoint(rim(recording), ()),), path_order=2))
     assert drawn.lines.shape == (100, 2, 3)
     np.testing.assert_allclose(drawn.lines[:, 0, :2], expected[:-1, 0, :2], rtol=0, atol=1e-14)
     sizes = np.linalg.norm(expected[:, 2], axis=1)
     np.testing.assert_allclose(drawn.extremes, (0.0, sizes.max()), rtol=1e-12)
-    assert drawn.colours[0, 0].tolist() == [68, 1, 84]  # viridis begins so
+    assert drawn.colors[0, 0].tolist() == [68, 1, 84]  # viridis begins so
     assert not drawn.arrows
 
 
@@ -113,7 +113,7 @@ def test_instants_are_enough_to_look_smooth_and_not_too_many():
 
 
 def test_a_mechanism_without_instants_is_refused():
-    with pytest.raises(jn.MechanismError, match="no time grid"):
+    with pytest.raises(jn.errors.MechanismError, match="no time grid"):
         MechanismSubject(wheel(time=None))
 
 

@@ -21,8 +21,8 @@ from jounce.cli.options import (
 from jounce.errors import DesignError, JounceError
 from jounce.reporting.terminal import Bar, say, show_table
 
-OPTIONS = tuple("minimise subject_to vary curves starts samples assemblies seed clearance iterations".split())
-SPELT = {"minimise": "minimize", "subject_to": "subject-to", "curves": "curve"}
+OPTIONS = tuple("minimize subject_to vary curves starts samples assemblies seed clearance iterations".split())
+SPELT = {"minimize": "minimize", "subject_to": "subject-to", "curves": "curve"}
 
 
 def optimize(
@@ -100,11 +100,11 @@ def optimize(
     mechanism = reading.mechanism(file)
     curves = {name: _points(name, path) for name, path in assignments(curve or (), "--curve", "as NAME=FILE").items()}
     spare_inputs(out, overwrite=overwrite)
-    from jounce.design import optimise
+    from jounce.design import optimize
     from jounce.reporting.facts.design_facts import design_facts, design_table, design_words
 
-    with _errors_about(file), Bar("optimising") as bar:
-        design = optimise(
+    with _errors_about(file), Bar("optimizing") as bar:
+        design = optimize(
             mechanism,
             minimize,
             bounds,

@@ -57,7 +57,7 @@ def plot(
     output
         Output, point with a path, or joint; repeatable [all].
     derivative
-        Of a hodograph, a portrait, or the colour of paths.
+        Of a hodograph, a portrait, or the color of paths.
     instant
         Time that a sketch shows, s.
     names

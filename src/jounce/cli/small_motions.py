@@ -97,11 +97,11 @@ def modes(
     subject, settings = _subject(file, reading, without or (), hold or ())
     for target in (out, animation):
         spare_inputs(target, overwrite=overwrite)
-    from jounce.dynamics import equilibrium, linearise
+    from jounce.dynamics import equilibrium, linearize
 
     with _errors_about(file):
         rest = equilibrium(subject, time, method=method, **settings)
-        small = linearise(rest, coordinates=coordinate, release=release or ())
+        small = linearize(rest, coordinates=coordinate, release=release or ())
         modes_found = small.modes
         facts = modes_facts(small, file, without or [])
         moved = None if animation is None else modes_found.motion(mode, amplitude)

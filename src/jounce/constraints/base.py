@@ -108,7 +108,7 @@ class AbstractConstraint(Module):
         the joint of the library that has it; ``none`` for nothing, empty for a mark at each point.
     pair : str
         Class variable: ``revolute``, ``rod`` or ``prismatic`` if the planar joint is nothing else, with the fields of
-        that joint of the library. Linkages are recognised by it.
+        that joint of the library. Linkages are recognized by it.
 
     Raises
     ------

@@ -41,7 +41,7 @@ class Cam(AbstractConstraint):
     >>> import jounce as jn
     >>> axle = jn.planar.Revolute(("ground", "shaft"), [0, 0], [0, 0])
     >>> lift = jn.drivers.CoordinateDriver(("ground", "valve"), "y", motion="0.02*(1 - cos(t))")
-    >>> jn.Cam(lift, axle).bodies
+    >>> jn.joints.Cam(lift, axle).bodies
     ('ground', 'valve', 'shaft')
     """
 

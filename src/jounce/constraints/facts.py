@@ -87,7 +87,7 @@ PAIRS = {
     "rod": ("point_i", "point_j", "length"),
     "prismatic": ("point_i", "point_j", "vector_i"),
 }
-"""Pairs by which planar linkages are recognised, and the fields that a joint has as one of them."""
+"""Pairs by which planar linkages are recognized, and the fields that a joint has as one of them."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

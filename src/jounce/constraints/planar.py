@@ -257,7 +257,7 @@ class Rolling(AbstractConstraint, type="rolling", space="planar"):
     """
 
     point_i: Vector  # m, on the line; in the frame of body i
-    point_j: Vector  # m, centre of the disc
+    point_j: Vector  # m, center of the disc
     vector_i: Vector  # along the line
     radius: Scalar  # m
     offset: Scalar = None  # m

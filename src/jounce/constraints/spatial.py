@@ -272,14 +272,14 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
 
 
 class ConstantVelocity(AbstractConstraint, type="constant_velocity", space="spatial"):
-    """Homokinetic joint, such as a Rzeppa joint: the centres coincide, and both shafts turn about their axes alike.
+    """Homokinetic joint, such as a Rzeppa joint: the centers coincide, and both shafts turn about their axes alike.
 
     What is left of the relative attitude after the shortest tilt of the axis is no turn about it, but for the offset:
     so the balls of such a joint lie in the plane that bisects the angle of the shafts. Hunt, Constant-velocity shaft
     couplings: a general theory, 1973.
     """
 
-    point_i: Vector  # m, centre, in the frame of body i
+    point_i: Vector  # m, center, in the frame of body i
     point_j: Vector
     axis_i: Vector  # of each shaft, in its frame, both from one end of the drive to the other
     axis_j: Vector
@@ -297,17 +297,17 @@ class ConstantVelocity(AbstractConstraint, type="constant_velocity", space="spat
 class Tripod(AbstractConstraint, type="tripod", space="spatial"):
     """Plunging joint: three rollers on the arms of spider j, each in the middle plane of a track of tulip i.
 
-    The tracks hold the axis of the tulip, 120 degrees from one another, and so do the arms at the spider: its centre
+    The tracks hold the axis of the tulip, 120 degrees from one another, and so do the arms at the spider: its center
     may slide along the tulip, and goes round a small circle three times a turn where the shafts are at an angle.
     """
 
     point_i: Vector  # m, on the axis of the tulip, in the frame of body i
-    point_j: Vector  # m, centre of the spider, in the frame of body j
+    point_j: Vector  # m, center of the spider, in the frame of body j
     axis_i: Vector  # of each shaft, in its frame, both from one end of the drive to the other
     axis_j: Vector
     normal_i: Vector  # across the axis, toward the first track
     normal_j: Vector  # across the axis, along the first arm
-    radius: Scalar  # m, of the rollers' centres
+    radius: Scalar  # m, of the rollers' centers
 
     never_parallel = (("normal_i", "axis_i"), ("normal_j", "axis_j"))
     symbol = "spherical"

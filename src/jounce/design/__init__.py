@@ -1,7 +1,7 @@
 """Design: parameters that vary, designs in which something is least, and how tolerances spread."""
 
-from jounce.design.optimise import optimise as optimise
-from jounce.design.result import OptimisedDesign as OptimisedDesign
+from jounce.design.optimize import optimize as optimize
+from jounce.design.result import OptimizedDesign as OptimizedDesign
 from jounce.design.tolerance import tolerance as tolerance
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 

@@ -72,7 +72,7 @@ class Node:
 
 @dataclasses.dataclass(frozen=True)
 class Relation:
-    """A condition that a design must fulfil: ``left <= right``, or ``left == right``.
+    """A condition that a design must fulfill: ``left <= right``, or ``left == right``.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def refuse_name(name: str, known: Mapping[str, str], text: str) -> ExpressionErr
 
 
 def varying_message(text: str) -> MechanismError:
-    """Return the error for a quantity that is compared or minimised though it changes in time."""
+    """Return the error for a quantity that is compared or minimized though it changes in time."""
     return MechanismError(
         f"changes in time; make one number of it, as by peak({text}), rms({text}), mean({text}), span({text}), "
         f"maximum({text}), minimum({text}) or at({text}, 0.5)",

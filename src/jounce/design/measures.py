@@ -1,7 +1,7 @@
 """What makes one number of a quantity that changes in time: its largest value, its mean, its distance from points.
 
 A motion is known as a Taylor series about each instant of a grid, so that it is known between instants too: every
-instant has a cell, up to halfway to its neighbours, in which its series stands for the quantity. The largest value in a
+instant has a cell, up to halfway to its neighbors, in which its series stands for the quantity. The largest value in a
 cell is a smooth function of a design, by the envelope theorem: its slope is that of the value, at the instant held.
 """
 

@@ -70,13 +70,13 @@ class Goals:
     """What is to be least, and what must hold, as functions of the motion of a mechanism.
 
     Quantities become numbers in two ways. Extremes are the largest of the values that some cells of time have; where a
-    goal grows with one, an optimiser may take a number of its own in its place that none of these values may exceed,
+    goal grows with one, an optimizer may take a number of its own in its place that none of these values may exceed,
     which is smooth where the place of the largest jumps. All other measures are smooth as they are.
 
     Parameters
     ----------
     mechanism : Mechanism
-    minimise : str
+    minimize : str
         What is to be least.
     subject_to : sequence of str
         What must hold.
@@ -98,7 +98,7 @@ class Goals:
     order : int
         Of the motion.
     objective : callable
-        What an optimiser makes least.
+        What an optimizer makes least.
     objective_value : callable
         What the designer asked for; the objective may be its square, which is smooth where it is zero.
     conditions : list of Condition
@@ -111,7 +111,7 @@ class Goals:
     def __init__(
         self,
         mechanism: Mechanism,
-        minimise: str,
+        minimize: str,
         subject_to: Sequence[str],
         varied: Sequence[str],
         curves: Mapping[str, PrescribedPath],
@@ -128,9 +128,9 @@ class Goals:
         self.bounded: list[bool] = []
         self.order = 0
         self._arguments = Arguments(self.quantities.fixed, (float(instants[0]), float(instants[-1])))
-        with naming_errors("minimise", whole=True):
-            self.quantities.text = minimise
-            node = parsed(minimise)
+        with naming_errors("minimize", whole=True):
+            self.quantities.text = minimize
+            node = parsed(minimize)
             self.objective_value = self._number(node, 1)
             self.objective = self._squared(node) or self.objective_value
         self.conditions = [condition for text in subject_to for condition in self._conditions(text)]

@@ -1,4 +1,4 @@
-"""What an optimisation found: the design, what became of it, and how sure that is."""
+"""What an optimization found: the design, what became of it, and how sure that is."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -43,8 +43,8 @@ class Comparison:
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class OptimisedDesign(Displayed):
-    """The design that an optimisation found.
+class OptimizedDesign(Displayed):
+    """The design that an optimization found.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class OptimisedDesign(Displayed):
 
     def __repr__(self) -> str:
         before = self.comparisons[0].before
-        return f"<OptimisedDesign {self.status}: {self.comparisons[0].name} {before:.6g} -> {self.objective:.6g}>"
+        return f"<OptimizedDesign {self.status}: {self.comparisons[0].name} {before:.6g} -> {self.objective:.6g}>"
 
     @property
     def table(self) -> list[dict[str, Any]]:

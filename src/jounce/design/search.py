@@ -36,7 +36,7 @@ class SearchResult:
         From 0 to 1 between the bounds.
     evaluation : Evaluation
     objective : float
-        As an optimiser has it.
+        As an optimizer has it.
     broken : array of shape (conditions,)
         By how much each condition is broken, relative to its size.
     near_singular : float

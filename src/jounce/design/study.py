@@ -13,7 +13,7 @@ from jounce.design.law_knots import law_knots
 from jounce.design.measures import PrescribedPath
 from jounce.design.objectives import Goals
 from jounce.design.problem import LOCKS, Locked, Problem
-from jounce.design.result import Comparison, OptimisedDesign
+from jounce.design.result import Comparison, OptimizedDesign
 from jounce.design.samples import Samples, sampled
 from jounce.design.search import CONDITION_TOLERANCE, SMALL, Search, SearchResult
 from jounce.errors import DesignError, SolveError
@@ -33,7 +33,7 @@ SAME_POSITION = 1e-6  # of the spread of the bodies, or rad
 class Asked:
     """What was asked for."""
 
-    minimise: str
+    minimize: str
     subject_to: tuple[str, ...]
     bounds: dict[str, tuple[float, float]]
     curves: dict[str, PrescribedPath]
@@ -54,7 +54,7 @@ class Study:
     ):
         self.mechanism, self.asked, self.seed, self.progress = mechanism, asked, seed, progress
         self.all_instants = asked.instants
-        arguments = asked.minimise, asked.subject_to, tuple(asked.bounds), asked.curves
+        arguments = asked.minimize, asked.subject_to, tuple(asked.bounds), asked.curves
         knots = law_knots(mechanism, asked.bounds, float(asked.instants[0]), float(asked.instants[-1]))
         self.goals = Goals(mechanism, *arguments, _thinned(asked.instants, GRID), knots)
         self.problem = Problem(self.goals, asked.bounds)
@@ -212,7 +212,7 @@ class Study:
 
     def result(
         self, original: Mechanism, end: SearchResult, *, assembly: int | None = None, infeasible: bool = False
-    ) -> OptimisedDesign:
+    ) -> OptimizedDesign:
         """Return what was found, compared with the mechanism as it is, on a finer grid."""
         fine = _split(self.goals.instants, FINER)
         error = self.grid_error(end)
@@ -223,7 +223,7 @@ class Study:
             after = self._on(fine, self.goals.mechanism, parameters)
         except LOCKS:
             after = self.problem.asked(end.point, end.evaluation)
-        return OptimisedDesign(
+        return OptimizedDesign(
             mechanism,
             parameters,
             after[0],
@@ -269,7 +269,7 @@ class Study:
             before = math.nan, np.full(len(self.goals.conditions), math.nan), nothing
         root = end.objective and after[0] and self.goals.objective is not self.goals.objective_value
         factor = 0.5 / after[0] if root else 1.0  # of the slopes of a root, by those of its square
-        yield Comparison("objective", self.asked.minimise, before[0], after[0])
+        yield Comparison("objective", self.asked.minimize, before[0], after[0])
         rows = zip(self.goals.conditions, before[2], after[2], end.multipliers, strict=True)
         for condition, first, last, multiplier in rows:
             relation = condition.relation
@@ -285,7 +285,7 @@ class Study:
             yield Comparison("parameter", name, given[name], values[name], low, high, slope)
 
     def _assembled(self, mechanism: Mechanism, end: SearchResult, assembly: int | None) -> Mechanism:
-        """Return a mechanism that asks for the assembly that was optimised, by its number in the design found."""
+        """Return a mechanism that asks for the assembly that was optimized, by its number in the design found."""
         if assembly is None:
             return mechanism
         first = self.goals.instants[:1]

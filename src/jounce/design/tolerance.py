@@ -242,7 +242,7 @@ class _Spread:
 
     def add_indices(self, count: int, progress: Progress | None) -> None:
         """Estimate how much of the variance of the peaks each parameter causes, alone and with others."""
-        from SALib.analyze import sobol as analyse
+        from SALib.analyze import sobol as analyze
         from SALib.sample import sobol as sample
 
         bounds = [[0.0, 1.0]] * len(self.names)
@@ -269,7 +269,7 @@ class _Spread:
             first, total = np.full((2, len(self.names), flat.shape[1]), np.nan)
             for k in np.flatnonzero(flat.std(axis=0) > 1e-12 * np.abs(flat).max(axis=0)):
                 settings = {"calc_second_order": False, "print_to_console": False, "seed": 1}
-                indices = analyse.analyze(problem, flat[:, k], **settings)
+                indices = analyze.analyze(problem, flat[:, k], **settings)
                 first[:, k], total[:, k] = indices["S1"], indices["ST"]
             dims, shape = self._variables[f"{name}_peak"].dims, (len(self.names), *whole.shape[1:])
             for kind, x, words in (("first", first, "alone"), ("total", total, "alone and with others")):
@@ -277,7 +277,7 @@ class _Spread:
                 self._put(f"{name}_peak_{kind}_order", ("parameter", *dims), x.reshape(shape), "", indices, name)
 
     def dataset(self) -> Any:
-        """Return all that was found, labelled."""
+        """Return all that was found, labeled."""
         import xarray
 
         whole = self.nominal.dataset

@@ -58,9 +58,9 @@ from jounce.dynamics.limits.motion_ends import TrajectoryEnd as TrajectoryEnd, t
 from jounce.dynamics.limits.trajectories import trajectory_torques as trajectory_torques
 from jounce.dynamics.statics.many_equilibria import equilibria as equilibria
 from jounce.dynamics.statics.static_equilibrium import Equilibrium as Equilibrium, equilibrium as equilibrium
-from jounce.dynamics.vibration.linearization import Linearisation as Linearisation, StateSpace as StateSpace
+from jounce.dynamics.vibration.linearization import Linearization as Linearization, StateSpace as StateSpace
 from jounce.dynamics.vibration.modes import Modes as Modes
-from jounce.dynamics.vibration.small_motions import linearise as linearise
+from jounce.dynamics.vibration.small_motions import linearize as linearize
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
 _compute_under_own_settings(__name__)

@@ -18,7 +18,7 @@ Gravity = Float[Numbers, "component 1 #batch"]
 
 
 class Masses(NamedTuple):
-    """Masses, kg, centres of mass, m, and second moments about them, kg m^2, of all bodies, the ground first.
+    """Masses, kg, centers of mass, m, and second moments about them, kg m^2, of all bodies, the ground first.
 
     The second moments are the integrals of rho rho^T dm along the axes of each body.
     """
@@ -55,7 +55,7 @@ def masses_of(mechanism: Mechanism) -> Masses:
 
 
 def second_moments(tensor: Float[Numbers, "3 3 *batch"]) -> Float[Numbers, "3 3 *batch"]:
-    """Return the second moments about the centre of mass from the inertia tensor: Negrean 2025, equation 109."""
+    """Return the second moments about the center of mass from the inertia tensor: Negrean 2025, equation 109."""
     unit = np.eye(3).reshape(3, 3, *[1] * (tensor.ndim - 2))
     return (tensor[0, 0] + tensor[1, 1] + tensor[2, 2])[None, None] / 2 * unit - tensor
 

@@ -1,4 +1,4 @@
-"""Values along a motion: computed in chunks of instants, turned into plain derivatives, labelled."""
+"""Values along a motion: computed in chunks of instants, turned into plain derivatives, labeled."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -118,7 +118,7 @@ def derivatives_along(motion: Motion, coefficients: Float[Numbers, "order *shape
     return values
 
 
-def labelled(
+def labeled(
     motion: Motion,
     coefficients: Float[Numbers, "order *shape time"],
     units: str | None = None,

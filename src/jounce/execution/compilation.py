@@ -97,7 +97,7 @@ def compiler_options(*, narrow: bool = False) -> dict[str, Any] | None:
     ----------
     narrow : bool, default False
         Whether arrays are so short that most of the time is that of calling operations: then LLVM need not do more
-        than the first level of its optimisations, a fifth of the time in which a program is compiled.
+        than the first level of its optimizations, a fifth of the time in which a program is compiled.
     """
     if not on_processor():
         return None
@@ -108,7 +108,7 @@ def compiler_options(*, narrow: bool = False) -> dict[str, Any] | None:
 
 
 def _level_is_set() -> bool:
-    """Tell whether the environment says how much LLVM is to optimise."""
+    """Tell whether the environment says how much LLVM is to optimize."""
     return "xla_backend_optimization_level" in os.environ.get("XLA_FLAGS", "")
 
 
@@ -144,7 +144,7 @@ class Compiled:
         Whether its arrays are short, as `compiler_options` has it.
     brief : bool, optional
         Whether a command calls it so seldom, or has it compute so little, that it waits longer for the compiler: then
-        LLVM optimises nothing where code is wanted soon, in half the time.
+        LLVM optimizes nothing where code is wanted soon, in half the time.
     alone : bool or callable, optional
         Whether machine code, all in one piece, is better where there is a compiler for it; or what tells that from the
         arguments.
@@ -218,7 +218,7 @@ class Compiled:
         return results
 
     def _level(self) -> int | None:
-        """Return how much LLVM is to optimise, where that is less than it does otherwise."""
+        """Return how much LLVM is to optimize, where that is less than it does otherwise."""
         hasty = self.brief and is_wanted_soon() and on_processor() and not _level_is_set()
         return 0 if hasty and "xla_backend_optimization_level" in _known_options() else None
 

@@ -41,9 +41,9 @@ class AbstractForce(Module):
     Examples
     --------
     >>> import jounce as jn
-    >>> class Rubber(jn.AbstractForce, space="planar"):
-    ...     point_j: jn.Vector  # m, in the frame of body j
-    ...     stiffness: jn.Scalar  # N/m^3
+    >>> class Rubber(jn.forces.AbstractForce, space="planar"):
+    ...     point_j: jn.joints.Vector  # m, in the frame of body j
+    ...     stiffness: jn.joints.Scalar  # N/m^3
     ...
     ...     def displacement(self, body_i, body_j, time):
     ...         return body_j.point(self.point_j)[0] - body_i.position[0]

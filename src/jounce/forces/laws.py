@@ -84,7 +84,7 @@ class TimeLaw(AbstractLaw):
     Examples
     --------
     >>> import jounce as jn
-    >>> law = jn.forces.TimeLaw(jn.ExpressionMotion("10*t**2"))
+    >>> law = jn.forces.TimeLaw(jn.laws.ExpressionMotion("10*t**2"))
     >>> at_rest, time = jn.Jet([0.0, 0.0, 0.0]), jn.Jet.variable(1.0, 2)
     >>> [float(rate) for rate in law(at_rest, at_rest, time).derivatives()]
     [10.0, 20.0, 20.0]

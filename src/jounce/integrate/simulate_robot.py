@@ -67,7 +67,7 @@ def simulate_robot(
     start = _start(robot, problem, state, base, float(instants[0]))
     for event in events:
         if not isinstance(event, JointEvent):
-            raise RobotError("must be a jn.JointEvent", name="events", value=event)
+            raise RobotError("must be a jn.integrate.JointEvent", name="events", value=event)
     detectors = [JointEventDetector(event, robot) for event in events]
     if isinstance(method, Taylor) and method.step is not None:
         longest_step = float(method.step)

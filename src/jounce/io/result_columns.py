@@ -118,7 +118,7 @@ def dataset_of(header: list[str], table: Float[np.ndarray, "time columns"], unit
 
 
 def _axes_of(name: str, members: list[str], components: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the axes that neighbouring columns have as one output, and the labels along them; none if they are not.
+    """Return the axes that neighboring columns have as one output, and the labels along them; none if they are not.
 
     All vectors have as many components as the first one; what has others is several outputs.
     """

@@ -28,7 +28,7 @@ def read(path: str | PathLike[str]) -> xarray.Dataset:
     r"""Read a file that `write` wrote back into a dataset; values come back to the bit.
 
     A CSV file may say units in its heading, which become those of the variables: values stay as they are. It does not
-    say what is a vector: neighbouring columns ``NAME_x, NAME_y`` (and ``NAME_z``) of one unit become the vector NAME,
+    say what is a vector: neighboring columns ``NAME_x, NAME_y`` (and ``NAME_z``) of one unit become the vector NAME,
     and those of Euler parameters, Euler angles and rotation matrices likewise.
 
     Returns

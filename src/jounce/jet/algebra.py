@@ -27,7 +27,7 @@ from jounce.jet.coefficients import (
     total,
 )
 from jounce.settings import in_full
-from jounce.shapes import ArrayLike, Labelled, Numbers, Real, no_numbers, real_derivatives, real_or_traced
+from jounce.shapes import ArrayLike, Labeled, Numbers, Real, no_numbers, real_derivatives, real_or_traced
 
 
 @jax.tree_util.register_pytree_node_class
@@ -232,7 +232,7 @@ class Jet:
 Quantity = Jet | Real
 """A jet, or what does not change in time: an array or a number."""
 
-JetLike = Quantity | Sequence[Any] | Labelled
+JetLike = Quantity | Sequence[Any] | Labeled
 """A jet, or what becomes one: an array, a number, or a sequence of them."""
 
 
@@ -270,7 +270,7 @@ def symmetric(product: Product, a: Jet) -> Jet:
 
 
 # Components are cut out once for each coefficient, as slices that keep their axis, and their products are written out:
-# high orders trace them hundreds of times, and XLA vectorises them along the batch, which it does not do for sums.
+# high orders trace them hundreds of times, and XLA vectorizes them along the batch, which it does not do for sums.
 
 
 def components(vector: Jet | Numbers) -> list[Any]:

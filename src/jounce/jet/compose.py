@@ -48,7 +48,7 @@ def compose(function: Callable[[Any], Any], x: Jet) -> Jet:
     >>> import jax.numpy as jnp
     >>> import jounce as jn
     >>> t = jn.Jet.variable(0.0, order=3)
-    >>> [round(float(x), 12) for x in jn.compose(lambda t: jnp.exp(-2 * t), t).derivatives()]
+    >>> [round(float(x), 12) for x in jn.jet.compose(lambda t: jnp.exp(-2 * t), t).derivatives()]
     [1.0, -2.0, 4.0, -8.0]
     """
     return Composed.of(function)(x)

@@ -1,4 +1,4 @@
-"""Kinematics: assembly, positions, all derivatives from one factorisation, diagnosis, and the result."""
+"""Kinematics: assembly, positions, all derivatives from one factorization, diagnosis, and the result."""
 
 from jounce.kinematics.assembly.mobility import Branch as Branch, Mobility as Mobility, mobility as mobility
 from jounce.kinematics.cams import (

@@ -1,4 +1,4 @@
-"""Orthogonal elimination of large sparse matrices, front by front: a multifrontal QR factorisation, the batch last."""
+"""Orthogonal elimination of large sparse matrices, front by front: a multifrontal QR factorization, the batch last."""
 
 from typing import Any
 
@@ -84,7 +84,7 @@ class FrontalFactor(Module):
         left = jnp.zeros((len(count), height - width, lanes))
         _, y = jax.lax.scan(forward, left, (count, plan.rights, plan.left_rows, self.vectors, self.factors))
         known = jnp.zeros((len(count) + 1, width, lanes))
-        levels = (count, plan.neighbours, self.triangle, self.inverted, y)
+        levels = (count, plan.neighbors, self.triangle, self.inverted, y)
         known, _ = jax.lax.scan(backward, known, levels, reverse=True)
         return known[plan.of_body].reshape(-1, lanes)
 
@@ -107,7 +107,7 @@ class FrontalFactor(Module):
             return owed.at[beside].add(share, mode="drop"), found
 
         owed = jnp.zeros((len(count), width, lanes))
-        _, u = jax.lax.scan(forward, owed, (count, plan.neighbours, order, self.triangle, self.inverted))
+        _, u = jax.lax.scan(forward, owed, (count, plan.neighbors, order, self.triangle, self.inverted))
 
         def backward(carry: Any, level: Any) -> Any:
             left, solution = carry

@@ -30,7 +30,7 @@ class InversePlan(Module):
     sources : array of int, shape (fronts, rows)
         Where a row of a front is among the right sides, a zero, and what fronts leave over, one after the other.
     responses : array of int, shape (fronts, columns, left rows)
-        Of the columns of neighbours and what the front leaves over: which entry of all blocks of the inverse, by front,
+        Of the columns of neighbors and what the front leaves over: which entry of all blocks of the inverse, by front,
         column and row, tells how the column responds; one beyond the last where there is none.
     diagonal : array of int, shape (rows of the matrix,)
         The entry of these blocks in which a row meets its own column.
@@ -48,11 +48,11 @@ class InversePlan(Module):
         left_height, nothing = height - width, count * height * columns
         inherited = fronts.left_rows < count * left_height
         sources = np.where(inherited, size + 1 + fronts.left_rows, fronts.rights).astype(np.int32)
-        wanted = np.concatenate([np.arange(count)[:, None], fronts.neighbours], axis=1)  # of a block, its bodies
+        wanted = np.concatenate([np.arange(count)[:, None], fronts.neighbors], axis=1)  # of a block, its bodies
         responses = np.full((count, columns - width, left_height), nothing, np.int32)
         for front, at in np.argwhere(inherited).tolist():
             child, row = divmod(int(fronts.left_rows[front, at]), left_height)
-            for slot, body in enumerate(fronts.neighbours[child].tolist()):
+            for slot, body in enumerate(fronts.neighbors[child].tolist()):
                 if body < count:
                     column = int(np.flatnonzero(wanted[front] == body)[0]) * width + np.arange(width)
                     responses[child, slot * width : (slot + 1) * width, row] = (front * columns + column) * height + at
@@ -74,8 +74,8 @@ class FrontalInverse(Module):
         Of their pattern.
     inward : array of shape (fronts, rows, rows, batch)
         What a right side adds, first, to the columns of the front, and then to what is left over.
-    outward : array of shape (fronts, columns of neighbours, width, batch)
-        What each unknown of a neighbour takes off the columns of the front.
+    outward : array of shape (fronts, columns of neighbors, width, batch)
+        What each unknown of a neighbor takes off the columns of the front.
     """
 
     plan: InversePlan
@@ -119,13 +119,13 @@ class FrontalInverse(Module):
         _, begun = jax.lax.scan(inwards, known, (numbers, plan.sources, self.inward))
 
         def outwards(known: Any, level: Any) -> tuple[Any, None]:
-            front, neighbours, outward, own = level
-            beside = known.at[neighbours].get(mode="promise_in_bounds").reshape(-1, lanes)
+            front, neighbors, outward, own = level
+            beside = known.at[neighbors].get(mode="promise_in_bounds").reshape(-1, lanes)
             own = own - total(outward[j] * beside[j][None] for j in range(len(outward)))
             return jax.lax.dynamic_update_index_in_dim(known, own, front, 0), None
 
         known = jnp.zeros((count + 1, width, lanes))
-        levels = (numbers, plan.fronts.neighbours, self.outward, begun)
+        levels = (numbers, plan.fronts.neighbors, self.outward, begun)
         known, _ = jax.lax.scan(outwards, known, levels, reverse=True)
         return known[plan.fronts.of_body].reshape(-1, lanes)
 

@@ -1,9 +1,9 @@
 """Which rows and columns of a Jacobian meet when it is eliminated body by body: known before any number.
 
 The rows of a Jacobian touch two bodies, seldom three, so that most of it is zero, and where is known before any number.
-Bodies are eliminated one by one, those with the fewest neighbours first (George and Liu 1989, the evolution of the
+Bodies are eliminated one by one, those with the fewest neighbors first (George and Liu 1989, the evolution of the
 minimum degree ordering algorithm). The front of a body holds the rows that touch it: its own, and those left over by
-the fronts before; Householder reflections clear its columns, and the rows that are left touch its neighbours only
+the fronts before; Householder reflections clear its columns, and the rows that are left touch its neighbors only
 (Duff and Reid 1983; Davis 2011, algorithm 915). Nothing is chosen by the numbers, so that all lanes of a batch, and all
 instants of a motion, go through one program, and all fronts through one scan of it: neither the program nor the time to
 compile it grows with the number of bodies.
@@ -37,7 +37,7 @@ class Fronts(Module):
         Which row of all those that fronts leave over is taken in there; one beyond the last where there is none.
     left_columns : array of int, shape (fronts, rows, columns)
         Which column of that row stands there; one beyond the last where there is none.
-    neighbours : array of int, shape (fronts, neighbours)
+    neighbors : array of int, shape (fronts, neighbors)
         Fronts of the bodies that the rest of the columns belong to; one beyond the last where there are fewer.
     of_body : array of int, shape (bodies,)
         The front of each body.
@@ -51,7 +51,7 @@ class Fronts(Module):
     rights: Int[Numbers, "front row"]
     left_rows: Int[Numbers, "front row"]
     left_columns: Int[Numbers, "front row column"]
-    neighbours: Int[Numbers, "front neighbour"]
+    neighbors: Int[Numbers, "front neighbor"]
     of_body: Int[Numbers, " front"]
     row_count: int = eqx.field(static=True)
     width: int = eqx.field(static=True)
@@ -76,10 +76,10 @@ class Fronts(Module):
         rights = np.full((count, height), len(bodies), np.int32)
         left_rows = np.full((count, height), count * left_height, np.int32)
         left_columns = np.full((count, height, columns), width * beside, np.int32)
-        neighbours = np.full((count, beside), count, np.int32)
+        neighbors = np.full((count, beside), count, np.int32)
         ordered = [sorted(position[list(s)]) if s else [] for s in separators]
         for front, members in enumerate(held):
-            neighbours[front, : len(ordered[front])] = ordered[front]
+            neighbors[front, : len(ordered[front])] = ordered[front]
             block = {p: k for k, p in enumerate([front, *ordered[front]])}
             for at, (source, row) in enumerate(members):
                 if source < 0:
@@ -93,13 +93,13 @@ class Fronts(Module):
                     for k, p in enumerate(ordered[source]):
                         first = block[p] * width
                         left_columns[front, at, first : first + width] = k * width + np.arange(width)
-        return cls(entries, rights, left_rows, left_columns, neighbours, position.astype(np.int32), len(bodies), width)
+        return cls(entries, rights, left_rows, left_columns, neighbors, position.astype(np.int32), len(bodies), width)
 
 
 def _ordered(pattern: Pattern) -> tuple[Int[np.ndarray, " body"], list[set[int]], list[list[Row]]]:
-    """Return the bodies in the order of their elimination, and the neighbours and rows that each has then.
+    """Return the bodies in the order of their elimination, and the neighbors and rows that each has then.
 
-    Of bodies with as many neighbours, one with the fewest rows is the first.
+    Of bodies with as many neighbors, one with the fewest rows is the first.
     """
     count, width = pattern.body_count, pattern.width
     beside: list[set[int]] = [set() for _ in range(count)]

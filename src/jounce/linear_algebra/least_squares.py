@@ -37,7 +37,7 @@ class LeastSquaresFactor(Module):
         at, put = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim
         places = np.arange(columns)[:, None]
 
-        def orthogonalise(k: Any, carry: Any) -> Any:
+        def orthogonalize(k: Any, carry: Any) -> Any:
             basis, triangle = carry
             column, along = at(matrix, k, 1, False), jnp.zeros((columns, lanes))
             for _ in range(2):
@@ -48,7 +48,7 @@ class LeastSquaresFactor(Module):
             return basis, put(triangle, jnp.where(places == k, size[None], along), k, 1)
 
         blank = cls.blank(matrix.shape, lanes)
-        return cls(*jax.lax.fori_loop(0, columns, orthogonalise, (blank.basis, blank.triangle)))
+        return cls(*jax.lax.fori_loop(0, columns, orthogonalize, (blank.basis, blank.triangle)))
 
     @classmethod
     def blank(cls, shape: tuple[int, ...], lanes: int) -> "LeastSquaresFactor":

@@ -67,7 +67,7 @@ class Model:
     prescribed : tuple of PrescribedAngle
         Angles that drivers prescribe there, with their whole turns.
     history : AttitudeHistory, optional
-        In space, from the starting guess to where the drivers fulfil their laws, where that is more than half a turn.
+        In space, from the starting guess to where the drivers fulfill their laws, where that is more than half a turn.
     """
 
     system: System
@@ -305,7 +305,7 @@ def _row_count_of(structure: Any, shapes: tuple[tuple[int, ...], ...], pose_type
 
 
 def with_offsets(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Group:
-    """Fill in the offsets that were not given: those with which the starting guess fulfils the joint."""
+    """Fill in the offsets that were not given: those with which the starting guess fulfills the joint."""
     fields = value_fields(type(group.element))
     if "offset" not in fields or group.element.offset is not None:
         return group

@@ -15,7 +15,7 @@ from jounce.rigid.inertia import ADVICE, Inertia
 def body_mass(
     name: str, body: Body, parameters: Mapping[str, Any], components: int, *, solid: bool = True
 ) -> tuple[Any, Any, Any]:
-    """Return mass, centre of mass, (2,) or (3,), and inertia about it, () or (3, 3), of a body; zero where not given.
+    """Return mass, center of mass, (2,) or (3,), and inertia about it, () or (3, 3), of a body; zero where not given.
 
     Parameters
     ----------

@@ -51,14 +51,14 @@ class Body:
     angle : number or expression, default 0
         Starting guess of the angle of a planar body, rad.
     orientation : sequence of 4 numbers, or dict, optional
-        Starting guess of the Euler parameters [e0, e1, e2, e3] of a spatial body, normalised when used; or
+        Starting guess of the Euler parameters [e0, e1, e2, e3] of a spatial body, normalized when used; or
         ``{"axis": [x, y, z], "angle": ...}``, or ``{"euler": "zxz", "angles": [...]}`` (lower-case letters for fixed
         axes, upper-case ones for those of the body), rad. Numbers may be expressions of the parameters.
     mass : number or expression, optional
         For the dynamics; kinematics does not use it. kg.
     inertia : number, sequence, expression or Inertia, optional
-        Moment of inertia about the centre of mass, kg m^2: one number in the plane; in space three principal moments
-        along the axes of the body, or a symmetric matrix in these axes. An `Inertia` gives the mass and the centre of
+        Moment of inertia about the center of mass, kg m^2: one number in the plane; in space three principal moments
+        along the axes of the body, or a symmetric matrix in these axes. An `Inertia` gives the mass and the center of
         mass too.
     center_of_mass : sequence, optional
         In the frame of the body, m; its origin unless given.
@@ -66,7 +66,7 @@ class Body:
     Raises
     ------
     MechanismError
-        If a mass or a centre of mass is given beside an `Inertia`.
+        If a mass or a center of mass is given beside an `Inertia`.
 
     Examples
     --------
@@ -85,7 +85,7 @@ class Body:
     def __post_init__(self):
         if isinstance(self.inertia, Inertia):
             if self.mass is not None or self.center_of_mass is not None:
-                message = "an Inertia contains the mass and the centre of mass; do not give them besides"
+                message = "an Inertia contains the mass and the center of mass; do not give them besides"
                 raise MechanismError(message, name="inertia")
             whole, planar = self.inertia, len(self.position) == 2
             tensor = float(whole.tensor[2, 2]) if planar else whole.tensor
@@ -154,7 +154,7 @@ class Mechanism(Displayed):
     ...     bodies={"crank": jn.Body(position=[0.0, 0.0])},
     ...     joints={"O": jn.planar.Revolute(("ground", "crank"), point_i=[0, 0], point_j=[0, 0])},
     ...     drivers={"theta": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion="speed*t")},
-    ...     outputs={"tip": jn.PointOutput("crank", point=[0.1, 0.0])},
+    ...     outputs={"tip": jn.outputs.PointOutput("crank", point=[0.1, 0.0])},
     ... )
     >>> motion = jn.solve(crank, [0.0, 0.1], order=1)
     >>> float(motion.dataset["tip"].sel(component="y", derivative=1)[0])

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from jounce.plot.style import GREY, blank_figure
+from jounce.plot.style import GRAY, blank_figure
 
 NOTE_SIZE = 7.5  # points
 
@@ -17,7 +17,7 @@ def panels(
     """Return a figure, in inches, with a note below it, and its panels, (rows, columns)."""
     figure = blank_figure(*size, title)
     if note:
-        figure.supxlabel(note, fontsize=NOTE_SIZE, color=GREY)
+        figure.supxlabel(note, fontsize=NOTE_SIZE, color=GRAY)
     return figure, figure.subplots(rows, columns, squeeze=False, **shared)
 
 

@@ -22,7 +22,7 @@ from jounce.plot.drawing import VIEW, View
 from jounce.plot.instants import solved_instants
 from jounce.plot.scene import scene_of
 from jounce.plot.sketch import SketchFigure, check_names, paths_of
-from jounce.plot.style import GREY, style
+from jounce.plot.style import GRAY, style
 
 __all__ = ["ANIMATION_SUFFIXES", "animate", "check_animation", "frame_instants"]
 
@@ -178,7 +178,7 @@ def animate(
         drawing = SketchFigure(scene, path_lines, mechanism.title, None if mechanism.space == "planar" else view)
         drawing.show(0)
         drawing.write_names(0, names, fixed=False)
-        at_the_corner = {"transform": drawing.axes.transAxes, "ha": "right", "va": "bottom", "color": GREY}
+        at_the_corner = {"transform": drawing.axes.transAxes, "ha": "right", "va": "bottom", "color": GRAY}
         clock = drawing.axes.text(0.99, 0.01, _clock_text(motion.time, float(motion.time[0])), **at_the_corner)
         drawing.figure.set_layout_engine("none")
         _even_pixels(drawing.figure)

@@ -9,7 +9,7 @@ import numpy as np
 
 from jounce.errors import MechanismError
 from jounce.plot.labels import scale_of, symbol, unit_label
-from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, shown_name, style
+from jounce.plot.style import GRAY, LINE_COLORS, blank_figure, set_ticks, shown_name, style
 from jounce.reporting.facts.spread_facts import Column, chosen
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["draw_bands"]
 
 WIDTH, ROW = 9.5, 1.9  # inches
-BAND = 0.3  # of a colour
+BAND = 0.3  # of a color
 TWO_SIDED = 1.959964  # standard deviations that hold 95 percent of a normal distribution
 MOST_SHARES = 8
 
@@ -85,27 +85,27 @@ def _draw_row(spread: Any, column: Column, panels: Any, parameters: list[str]) -
     label = symbol(name, order, component) or shown_name(f"{name} {component}".strip())
     units = spread[name].attrs["units"]
     value.set_ylabel(f"{label}  ({unit_label(units, order, exponent)})")
-    value.plot(time, nominal * 10.0**-exponent, color=LINE_COLOURS[0])
+    value.plot(time, nominal * 10.0**-exponent, color=LINE_COLORS[0])
     bounds = [chosen(spread, f"{name}_{side}", column) for side in ("low", "high") if f"{name}_{side}" in spread]
     linear = f"{name}_linear_std"
     sides = [chosen(spread, linear, column) * TWO_SIDED * sign for sign in (-1, 1)] if linear in spread else []
     away = scale_of(np.concatenate([*(bound - nominal for bound in bounds), *sides, np.zeros(1)]))
     if bounds:
-        value.fill_between(time, *(x * 10.0**-exponent for x in bounds), color=LINE_COLOURS[0], alpha=BAND, linewidth=0)
+        value.fill_between(time, *(x * 10.0**-exponent for x in bounds), color=LINE_COLORS[0], alpha=BAND, linewidth=0)
         differences = [(x - nominal) * 10.0**-away for x in bounds]
-        deviation.fill_between(time, *differences, color=LINE_COLOURS[0], alpha=BAND, linewidth=0, label="samples")
+        deviation.fill_between(time, *differences, color=LINE_COLORS[0], alpha=BAND, linewidth=0, label="samples")
     for side in sides:
         label = "first order" if side is sides[0] else None
-        deviation.plot(time, side * 10.0**-away, color=GREY, linewidth=0.9, linestyle=(0, (4, 2)), label=label)
-    deviation.axhline(0.0, color=LINE_COLOURS[0], linewidth=0.8)
+        deviation.plot(time, side * 10.0**-away, color=GRAY, linewidth=0.9, linestyle=(0, (4, 2)), label=label)
+    deviation.axhline(0.0, color=LINE_COLORS[0], linewidth=0.8)
     deviation.set_ylabel(f"({unit_label(units, order, away)})")
     if f"{name}_share" in spread:
         parts = chosen(spread, f"{name}_share", column)
         first = np.argsort(-parts.mean(axis=1), kind="stable")[:MOST_SHARES]
-        ordered = [k for k in range(len(parameters)) if k in first]  # of one colour in all rows
-        colours = [LINE_COLOURS[k % len(LINE_COLOURS)] for k in ordered]
+        ordered = [k for k in range(len(parameters)) if k in first]  # of one color in all rows
+        colors = [LINE_COLORS[k % len(LINE_COLORS)] for k in ordered]
         names = [shown_name(parameters[k]) for k in ordered]
-        share.stackplot(time, parts[ordered], labels=names, colors=colours, alpha=0.75, linewidth=0)
+        share.stackplot(time, parts[ordered], labels=names, colors=colors, alpha=0.75, linewidth=0)
     share.set_ylim(0.0, 1.0)
     for axes in panels:
         axes.set_xlim(time[0], time[-1])

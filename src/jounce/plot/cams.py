@@ -12,7 +12,7 @@ from jounce.errors import MechanismError
 from jounce.kinematics import OscillatingFollower, PlateCam
 from jounce.kinematics.cams.plate_cam import SENSES
 from jounce.plot.labels import axis_range
-from jounce.plot.style import BLUE, GREY, ORANGE, PALE_GREY, VERMILION, blank_figure, set_ticks, shown_name, style
+from jounce.plot.style import BLUE, GRAY, ORANGE, PALE_GRAY, VERMILION, blank_figure, set_ticks, shown_name, style
 from jounce.units.shown_units import ShownUnits
 
 if TYPE_CHECKING:
@@ -49,12 +49,12 @@ def draw_cam(cam: PlateCam, units: Mapping[str, str] | ShownUnits | None = None)
     --------
     >>> import jounce as jn
     >>> from jounce.plot import draw_cam
-    >>> figure = draw_cam(jn.load_cam("examples/cams/intake.yaml"))
+    >>> figure = draw_cam(jn.cams.load_cam("examples/cams/intake.yaml"))
     >>> [axes.get_ylabel() for axes in figure.axes[1:]]
     ['lift (mm)', 'pressure angle (deg)', 'radius (mm)']
     """
     if not isinstance(cam, PlateCam):
-        raise MechanismError("must be a jn.PlateCam", name="cam", value=cam)
+        raise MechanismError("must be a jn.cams.PlateCam", name="cam", value=cam)
     shown = cam.shown_units if units is None else units
     shown = shown if isinstance(shown, ShownUnits) else cam.shown_units.merged(shown)
     with style():
@@ -73,23 +73,23 @@ def _draw_profile(axes: Any, cam: PlateCam, shown: ShownUnits) -> None:
     unit, factor = shown.of("m")
     table, turn = cam.table, np.linspace(0, 2 * np.pi, 181)
     base = cam.base_radius * factor
-    axes.plot(base * np.cos(turn), base * np.sin(turn), color=PALE_GREY, linewidth=0.8, linestyle=":")
+    axes.plot(base * np.cos(turn), base * np.sin(turn), color=PALE_GRAY, linewidth=0.8, linestyle=":")
     x, y = table.profile * factor
     if cam.follower.shape == "roller":
-        axes.plot(*(table.pitch * factor), color=GREY, linewidth=0.8, linestyle="--")
+        axes.plot(*(table.pitch * factor), color=GRAY, linewidth=0.8, linestyle="--")
     axes.fill(x, y, color=BLUE, alpha=0.12, linewidth=0)
     axes.plot(x, y, color=BLUE, linewidth=1.4)
     lost = (cam.table.lift - cam.followed_lift) > 0
     back = table.forward < 0
     axes.plot(np.where(lost | back, x, np.nan), np.where(lost | back, y, np.nan), color=VERMILION, linewidth=2.0)
-    axes.plot(0, 0, marker="+", color=GREY, markersize=8)
+    axes.plot(0, 0, marker="+", color=GRAY, markersize=8)
     _draw_follower(axes, cam, factor)
     sign = SENSES[cam.sense]
     arc = np.linspace(0.35, 1.15, 31) * sign + (np.pi / 2 if sign < 0 else 0.0)
     radius = 0.45 * base
     tip, before = (radius * np.array([np.cos(a), np.sin(a)]) for a in (arc[-1], arc[-4]))
-    axes.plot(radius * np.cos(arc), radius * np.sin(arc), color=GREY, linewidth=0.9)
-    axes.annotate("", tip, before, arrowprops={"arrowstyle": "->", "color": GREY, "linewidth": 0.9})
+    axes.plot(radius * np.cos(arc), radius * np.sin(arc), color=GRAY, linewidth=0.9)
+    axes.annotate("", tip, before, arrowprops={"arrowstyle": "->", "color": GRAY, "linewidth": 0.9})
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(f"x ({unit})")
     axes.set_ylabel(f"y ({unit})")
@@ -150,7 +150,7 @@ def _draw_curves(panels: Any, cam: PlateCam, shown: ShownUnits) -> None:
         axes.set_ylabel(shown_name(label))
         axes.set_xlim(angle[0], angle[-1])
         axes.set_ylim(*axis_range(values, 0.08))
-        axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
+        axes.axhline(0.0, color=PALE_GRAY, linewidth=0.7, zorder=1)
         set_ticks(axes.yaxis, 4, least=3)
         axes.tick_params(labelbottom=axes is panels[-1])
     if np.any(cam.followed_lift < table.lift):

@@ -11,7 +11,7 @@ from jounce.errors import MechanismError, check_name
 from jounce.kinematics import Curve
 from jounce.mechanism import PointOutput
 from jounce.plot.labels import scale_of, symbol, unit_label
-from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, shown_name, style
+from jounce.plot.style import GRAY, LINE_COLORS, blank_figure, set_ticks, shown_name, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ def draw_curves(curves: Curve | Sequence[Curve], outputs: Sequence[str] | None =
     Parameters
     ----------
     curves : Curve or sequence of Curve
-        One, or the circuits of a mechanism, each in a colour of its own.
+        One, or the circuits of a mechanism, each in a color of its own.
     outputs : sequence of str, optional
         Which; all unless given.
 
@@ -102,13 +102,13 @@ def _draw_panel(axes: Any, curves: Sequence[Curve], name: str, pair: tuple[int, 
         values = curve.outputs[name][:, 0] * factor * 10.0**-exponent
         along = curve.arc_lengths if curve.driver is None else curve.values[:, 0]
         x, y = (values[:, k] for k in pair) if pair else (along, values)
-        colour = LINE_COLOURS[number % len(LINE_COLOURS)]
-        axes.plot(x, y, color=colour, label=f"circuit {number + 1}")
+        color = LINE_COLORS[number % len(LINE_COLORS)]
+        axes.plot(x, y, color=color, label=f"circuit {number + 1}")
         marks = [(point.arc_length, MARKS[point.kind]) for point in curve.limits]
         marks += [(point.arc_length, "x") for point in curve.change_points]
         for arc_length, mark in marks:
             at = int(np.argmin(np.abs(curve.arc_lengths - arc_length)))
-            axes.plot(x[at], y[at], marker=mark, color=GREY, fillstyle="none", markersize=5.5, linestyle="", zorder=4)
+            axes.plot(x[at], y[at], marker=mark, color=GRAY, fillstyle="none", markersize=5.5, linestyle="", zorder=4)
     if pair:
         for label, k in zip((axes.set_xlabel, axes.set_ylabel), pair, strict=True):
             label(f"{symbol(name, 0, output.labels[k]) or shown_name(name)}  ({unit})")

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot.frames import Frame, points_at, within
 from jounce.plot.geometry import Point, Skeleton, Symbol, frame_along
-from jounce.plot.style import BODY_COLOURS
+from jounce.plot.style import BODY_COLORS
 
 __all__ = ["Drawing", "Flat", "Label", "Shape", "View", "screen_of", "tinted"]
 
@@ -39,7 +39,7 @@ class Shape:
     points : numpy.ndarray of shape (time, points, 2)
         In the plane of the drawing, m.
     stroke, fill : str
-        Colours; empty where there is none.
+        Colors; empty where there is none.
     width : float
         Of the line, in points of print.
     dashes : tuple of float
@@ -69,7 +69,7 @@ class Label:
 
     text: str
     anchor: Flat
-    colour: str
+    color: str
     owner: str
 
 
@@ -128,10 +128,10 @@ class Drawing:
         return screen_of(self.view)
 
     @cached_property
-    def colours(self) -> dict[str, str]:
-        """Colour of each moving body."""
+    def colors(self) -> dict[str, str]:
+        """Color of each moving body."""
         moving = [body for body in self.skeleton.links if body != GROUND]
-        return {body: BODY_COLOURS[k % len(BODY_COLOURS)] for k, body in enumerate(moving)}
+        return {body: BODY_COLORS[k % len(BODY_COLORS)] for k, body in enumerate(moving)}
 
     @cached_property
     def unit(self) -> float:
@@ -201,9 +201,9 @@ class Drawing:
         """Draw a disc around a place."""
         self._add("disc", center[:, None], {"radius": float(radius), **look})
 
-    def name(self, text: str, anchor: Flat, colour: str) -> None:
+    def name(self, text: str, anchor: Flat, color: str) -> None:
         """Write a name near a place."""
-        self.labels.append(Label(text, anchor, colour, self.owner))
+        self.labels.append(Label(text, anchor, color, self.owner))
 
     def move_name(self, owner: str, anchor: Flat) -> None:
         """Write a name near another place."""
@@ -217,13 +217,13 @@ class Drawing:
         self.shapes.append(Shape(kind, points, **{"owner": self.owner, **look}))
 
 
-def tinted(colour: str, share: float = 0.2) -> str:
-    """Return a colour mixed with white.
+def tinted(color: str, share: float = 0.2) -> str:
+    """Return a color mixed with white.
 
     Examples
     --------
     >>> tinted("#0072B2"), tinted("#000000", 0.5)
     ('#cce3f0', '#808080')
     """
-    parts = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
+    parts = [int(color[k : k + 2], 16) for k in (1, 3, 5)]
     return "#" + "".join(f"{round(255 - share * (255 - part)):02x}" for part in parts)

@@ -9,7 +9,7 @@ import numpy as np
 from jounce.planning.elastic.link_errors import LinkErrors
 from jounce.planning.elastic.motor_motion import Feedforward
 from jounce.plot.instants import evenly_chosen
-from jounce.plot.style import BLUE, GREY, LINE_COLOURS, PALE_GREY, VERMILION, blank_figure, set_ticks, shown_name, style
+from jounce.plot.style import BLUE, GRAY, LINE_COLORS, PALE_GRAY, VERMILION, blank_figure, set_ticks, shown_name, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,8 +47,8 @@ def draw_feedforward(feedforward: Feedforward, errors: LinkErrors, title: str = 
     >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
     >>> pin = jn.Joint("pin", "base", "rod", axis=[0, 0, 1])
     >>> arm = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", rod)], [pin])
-    >>> drives = {"pin": jn.Drive(stiffness=100.0, rotor_inertia=1e-4, gear_ratio=50)}
-    >>> found = jn.feedforward(arm, jn.JointTrajectory({"pin": "sin(t)"}, start=0.0, stop=0.5), drives)
+    >>> drives = {"pin": jn.planning.Drive(stiffness=100.0, rotor_inertia=1e-4, gear_ratio=50)}
+    >>> found = jn.planning.feedforward(arm, jn.JointTrajectory({"pin": "sin(t)"}, start=0.0, stop=0.5), drives)
     >>> errors = jn.planning.LinkErrors(("pin",), ("rad",), found.time, 1e-14 * found.q[:, 0], None)
     >>> figure = draw_feedforward(found, errors)  # in earnest: those that jn.planning.link_errors finds
     >>> [axes.get_ylabel().split()[0] for axes in figure.axes]
@@ -63,10 +63,10 @@ def draw_feedforward(feedforward: Feedforward, errors: LinkErrors, title: str = 
         axes_column = figure.subplots(len(panels) + 1, 1, sharex=True, squeeze=False)[:, 0]
         chosen = evenly_chosen(np.arange(len(feedforward.time)), DRAWN)
         for axes, (turning, joints) in zip(axes_column, panels, strict=False):
-            axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
+            axes.axhline(0.0, color=PALE_GRAY, linewidth=0.7, zorder=1)
             for k in joints:
-                rounds, colour = divmod(int(k), len(LINE_COLOURS))
-                line = {"color": LINE_COLOURS[colour], "linestyle": DASHES[rounds % len(DASHES)]}
+                rounds, color = divmod(int(k), len(LINE_COLORS))
+                line = {"color": LINE_COLORS[color], "linestyle": DASHES[rounds % len(DASHES)]}
                 values = 1e3 * feedforward.deflection[chosen, 0, k]
                 axes.plot(feedforward.time[chosen], values, label=shown_name(feedforward.names[k]), **line)
             axes.set_ylabel(f"deflection\n({'mrad' if turning else 'mm'})")
@@ -84,10 +84,10 @@ def _draw_errors(errors: LinkErrors, axes: Any) -> None:
     lines = [(errors.exact, BLUE, "exact torques")]
     if errors.rigid is not None:
         lines.append((errors.rigid, VERMILION, "without $\\ddot\\tau$"))
-    for values, colour, label in lines:
-        axes.plot(errors.time, np.maximum(values.max(axis=1), LEAST), color=colour, label=label)
+    for values, color, label in lines:
+        axes.plot(errors.time, np.maximum(values.max(axis=1), LEAST), color=color, label=label)
     axes.set_yscale("log")
-    axes.axhline(1e-9, color=GREY, linewidth=0.7, linestyle=":", zorder=1)
+    axes.axhline(1e-9, color=GRAY, linewidth=0.7, linestyle=":", zorder=1)
     unit = errors.units[0] if len(set(errors.units)) == 1 else "rad, m"
     axes.set_ylabel(f"error of links\n({unit})")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, handlelength=1.8)

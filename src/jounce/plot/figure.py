@@ -16,7 +16,7 @@ from jounce.kinematics import Motion
 from jounce.mechanism.outputs import AbstractQuantity
 from jounce.plot.instants import unsolved_runs
 from jounce.plot.labels import axis_range, quantity_word, scale_of, symbol, unit_label
-from jounce.plot.style import COLOURS, PALE_GREY, RESOLUTION, blank_figure, set_ticks, shown_name, style
+from jounce.plot.style import COLORS, PALE_GRAY, RESOLUTION, blank_figure, set_ticks, shown_name, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,7 +31,7 @@ SUFFIXES = (".png", ".svg", ".pdf")
 COLUMNS = 5  # of outputs beside each other, at most
 PANEL, SINGLE_PANEL = (3.5, 1.25), (4.8, 1.25)  # inches
 LEGEND = {"borderaxespad": 0.1, "handlelength": 1.2, "handletextpad": 0.5, "columnspacing": 1.2}
-STROKES = ("-", "--", ":")  # of more components than there are colours
+STROKES = ("-", "--", ":")  # of more components than there are colors
 
 
 def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Figure:
@@ -109,8 +109,8 @@ def _draw_column(motion: Motion, name: str, column: Column, panels: Any, first: 
             axes.plot(
                 motion.time,
                 scaled[:, c],
-                color=COLOURS[c % len(COLOURS)],
-                linestyle=STROKES[c // len(COLOURS)],
+                color=COLORS[c % len(COLORS)],
+                linestyle=STROKES[c // len(COLORS)],
                 marker="o" if len(motion.time) == 1 else None,
                 markersize=3,
                 label=symbol(name, component=output.labels[c]) if vector else None,
@@ -124,7 +124,7 @@ def _draw_column(motion: Motion, name: str, column: Column, panels: Any, first: 
     top.set_title(shown_name(name), loc="left", pad=6)
     if vector:
         lines = panels[-1].get_lines()[: values.shape[2]]
-        at_side = len(lines) > len(COLOURS)  # too many for a line above
+        at_side = len(lines) > len(COLORS)  # too many for a line above
         count = -(-len(lines) // 4) if at_side else len(lines)
         legend_position = {"loc": "upper left" if at_side else "lower right", "ncols": count}
         top.legend(handles=lines, bbox_to_anchor=(1.0, 1.0), **legend_position, **LEGEND)
@@ -141,7 +141,7 @@ def finish(axes: Any, motion: Motion, scaled: Float[np.ndarray, "time *lines"]) 
     low, high = axis_range(scaled, 0.08)
     axes.set_ylim(low, high)
     if np.nanmin(scaled, initial=0.0) < 0 < np.nanmax(scaled, initial=0.0):
-        axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
+        axes.axhline(0.0, color=PALE_GRAY, linewidth=0.7, zorder=1)
     time = motion.time
     if len(time) > 1:
         axes.set_xlim(time[0], time[-1])

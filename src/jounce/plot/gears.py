@@ -24,7 +24,7 @@ Pins = list[dict[str, Center]]  # the points of each revolute joint by body
 def pitch_radii(
     mechanism: Mechanism, bodies: tuple[str, ...], ratio: float
 ) -> tuple[list[Center], tuple[float, float] | None]:
-    """Return the centres of two gears, each in the frame of its body, and their pitch radii, m.
+    """Return the centers of two gears, each in the frame of its body, and their pitch radii, m.
 
     Parameters
     ----------
@@ -37,17 +37,17 @@ def pitch_radii(
 
     Returns
     -------
-    centres : list of numpy.ndarray
+    centers : list of numpy.ndarray
         Where each is pinned; its origin where it is not.
     radii : tuple of float, or None
-        None where no gears with this ratio can stand so: two bodies on one centre, or turning alike.
+        None where no gears with this ratio can stand so: two bodies on one center, or turning alike.
 
     Examples
     --------
     >>> import jounce as jn
     >>> from jounce.plot.gears import pitch_radii
     >>> train = jn.load("examples/epicyclic.yaml")  # teeth of 2 mm: 24 of the sun, 18 of the planet
-    >>> centres, radii = pitch_radii(train, ("sun", "planet", "carrier"), -24 / 18)
+    >>> centers, radii = pitch_radii(train, ("sun", "planet", "carrier"), -24 / 18)
     >>> [round(radius, 6) for radius in radii]
     [0.024, 0.018]
     """
@@ -87,7 +87,7 @@ def _center(pins: Pins, body: str, carrier: str) -> Center:
 
 
 def _seen_from(mechanism: Mechanism, pins: Pins, body: str, carrier: str, center: Center) -> Center:
-    """Return the centre of a gear in the frame of its carrier: by a pin, by two on one line, else by the guess."""
+    """Return the center of a gear in the frame of its carrier: by a pin, by two on one line, else by the guess."""
     holding = [pin for pin in pins if body in pin and np.array_equal(pin[body], center)]
     for pin in holding:
         if carrier in pin:
@@ -129,7 +129,7 @@ def shaft_wheels(mechanism: Mechanism, gear: Any) -> tuple[list[Center], list[fl
     ...         "mesh": jn.spatial.Gear(("pinion", "wheel", "ground"), x, y, -2 / 3),
     ...     },
     ... )
-    >>> centres, radii = shaft_wheels(pair, pair.joints["mesh"])
+    >>> centers, radii = shaft_wheels(pair, pair.joints["mesh"])
     >>> [round(radius, 6) for radius in radii]
     [0.04, 0.06]
     """

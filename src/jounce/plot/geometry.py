@@ -49,7 +49,7 @@ class DrawnLink:
     points : numpy.ndarray of shape (points, components)
         In the frame of the body, m; at least one.
     names : tuple of tuple of str
-        Joints, drivers, forces and outputs at each point; none at a centre of mass or an origin that stands in.
+        Joints, drivers, forces and outputs at each point; none at a center of mass or an origin that stands in.
     edges : tuple of tuple of int
         Pairs of points with a bar between them: one, the closed outline of a plate, with bars to points beside it, or
         for points that lie in no plane a tree.
@@ -73,10 +73,10 @@ class Symbol:
     bodies : tuple of str
         Those it acts on, in the order i, j, m.
     points : tuple of numpy.ndarray
-        One on each body, in its frame, m; the centre of a gear.
+        One on each body, in its frame, m; the center of a gear.
     axes : tuple of numpy.ndarray or None
         Axis, direction of travel or normal on each body, in its frame, of any length. Of a rack, the first leads from
-        the centre of the wheel to where they touch; the first of a coordinate is its direction, both in the global
+        the center of the wheel to where they touch; the first of a coordinate is its direction, both in the global
         frame.
     radii : tuple of float or None
         Pitch radii of gears, the radius of a wheel, of each body, m.
@@ -285,7 +285,7 @@ def _touched(elements: Mapping[str, Any], values: Values) -> Iterator[tuple[str,
 
 
 def _complete(body: str, points: _Points, mechanism: Mechanism, components: int, near: float) -> None:
-    """Add the centre of mass, or the origin, to a body that has too few points to be seen."""
+    """Add the center of mass, or the origin, to a body that has too few points to be seen."""
     if body != GROUND and len(points.positions) < 2:
         center = mechanism.bodies[body].center_of_mass
         if center is not None:
@@ -313,15 +313,15 @@ def _bars(points: Points, near: float, is_held: list[bool]) -> tuple[tuple[int, 
         return ()
     if count == 2:
         return ((0, 1),)
-    centred = points - points.mean(axis=0)
-    _, sizes, directions = np.linalg.svd(centred, full_matrices=False)
+    centered = points - points.mean(axis=0)
+    _, sizes, directions = np.linalg.svd(centered, full_matrices=False)
     if sizes[1] <= near:  # all on one line
-        order = np.argsort(centred @ directions[0]).tolist()
+        order = np.argsort(centered @ directions[0]).tolist()
         return tuple(pairwise(order))
     if points.shape[1] == 2 or sizes[2] <= near:  # a plate
         from scipy.spatial import ConvexHull
 
-        around = ConvexHull(centred @ directions[:2].T).vertices.tolist()
+        around = ConvexHull(centered @ directions[:2].T).vertices.tolist()
         return tuple(pairwise([*around, around[0]]))
     corners = np.flatnonzero(is_held)
     if 3 <= len(corners) < count:

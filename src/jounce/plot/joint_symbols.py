@@ -46,11 +46,11 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
 def _draw_wheel(drawing: Drawing, wheel: Wheel) -> None:
     """Draw a wheel with a mark that shows how it turns; one with its teeth inside is hollow."""
     body, radius, rim = wheel.body, wheel.radius, 1.2 * drawing.unit
-    center, colour = drawing.flat(drawing.at(body, wheel.center)), drawing.colours.get(body, INK)
-    look = {"stroke": colour, "layer": WHEELS, "owner": f"bodies.{body}"}
+    center, color = drawing.flat(drawing.at(body, wheel.center)), drawing.colors.get(body, INK)
+    look = {"stroke": color, "layer": WHEELS, "owner": f"bodies.{body}"}
     if wheel.internal:
         drawing.disc(center, radius + rim, width=1.2, **look)
-    drawing.disc(center, radius, fill="" if wheel.internal else tinted(colour, 0.15), width=1.6, **look)
+    drawing.disc(center, radius, fill="" if wheel.internal else tinted(color, 0.15), width=1.6, **look)
     if not drawing.skeleton.links[body].edges:  # its name stands in the wheel, or at its rim
         above = np.array([0.0, radius if wheel.internal else 0.55 * radius])
         drawing.move_name(f"bodies.{body}", center + above)
@@ -89,8 +89,8 @@ def _prismatic(drawing: Drawing, symbol: Symbol) -> None:
 def _draw_block(drawing: Drawing, body: str, point: Flat, along: Flat) -> None:
     u, side = drawing.unit, parts.normal_of(along)
     corners = [point + a * 1.7 * u * along + b * 0.9 * u * side for a, b in parts.CORNERS]
-    colour = drawing.colours.get(body, INK)
-    drawing.area(*corners, stroke=colour, fill=tinted(colour, 0.35), width=1.6, layer=BARS)
+    color = drawing.colors.get(body, INK)
+    drawing.area(*corners, stroke=color, fill=tinted(color, 0.35), width=1.6, layer=BARS)
 
 
 def _pin_in_slot(drawing: Drawing, symbol: Symbol) -> None:
@@ -102,14 +102,14 @@ def _pin_in_slot(drawing: Drawing, symbol: Symbol) -> None:
 def _curve(drawing: Drawing, symbol: Symbol) -> None:
     """Draw the curve of a body as a groove, or the lines of a surface, and what is held on it."""
     body, held = symbol.bodies[0], drawing.global_point(symbol, 1)
-    colour = "#888888" if body == GROUND else drawing.colours.get(body, INK)
+    color = "#888888" if body == GROUND else drawing.colors.get(body, INK)
     for line in shown(symbol.curve, drawing.within(body, held), 4 * drawing.unit):
         flat = drawing.flat(drawing.at(body, line))
         if symbol.kind == "curve":
-            drawing.curve(flat, stroke=colour, width=5.0, layer=GUIDES)
+            drawing.curve(flat, stroke=color, width=5.0, layer=GUIDES)
             drawing.curve(flat, stroke=parts.PAPER, width=3.2, layer=GUIDES)
         else:
-            drawing.curve(flat, stroke=tinted(colour, 0.6), width=0.6, layer=GUIDES - 1)
+            drawing.curve(flat, stroke=tinted(color, 0.6), width=0.6, layer=GUIDES - 1)
     (parts.pin if drawing.planar else parts.ball)(drawing, drawing.flat(held))
 
 
@@ -159,8 +159,8 @@ def _hinge(drawing: Drawing, symbol: Symbol) -> None:
 def _sliding_body(drawing: Drawing, symbol: Symbol, block: int) -> tuple[Flat, Float[np.ndarray, "time 3 3"], Any]:
     """Return place, axes and look of what slides in space."""
     body = symbol.bodies[block]
-    axes, colour = drawing.frame_along(body, symbol.axis_on(block)), drawing.colours.get(body, INK)
-    return drawing.point(symbol, block), axes, {"stroke": colour, "fill": tinted(colour, 0.35), "width": 1.2}
+    axes, color = drawing.frame_along(body, symbol.axis_on(block)), drawing.colors.get(body, INK)
+    return drawing.point(symbol, block), axes, {"stroke": color, "fill": tinted(color, 0.35), "width": 1.2}
 
 
 def _sleeve(drawing: Drawing, symbol: Symbol) -> None:
@@ -186,11 +186,11 @@ def _universal(drawing: Drawing, symbol: Symbol) -> None:
     parts.stand(drawing, symbol)
     point, u = drawing.point(symbol), drawing.unit
     for slot, body in enumerate(symbol.bodies):
-        colour = drawing.colours.get(body, INK)
+        color = drawing.colors.get(body, INK)
         arm = drawing.flat(drawing.toward(body, symbol.axis_on(slot))) * 1.7 * u
-        drawing.line(point - arm, point + arm, stroke=colour, width=2.4, layer=SYMBOLS)
+        drawing.line(point - arm, point + arm, stroke=color, width=2.4, layer=SYMBOLS)
         for end in (point - arm, point + arm):
-            drawing.disc(end, 0.4 * u, stroke=colour, fill=parts.PAPER, width=1.2, layer=SYMBOLS)
+            drawing.disc(end, 0.4 * u, stroke=color, fill=parts.PAPER, width=1.2, layer=SYMBOLS)
 
 
 def _shafts(drawing: Drawing, symbol: Symbol) -> None:
@@ -198,11 +198,9 @@ def _shafts(drawing: Drawing, symbol: Symbol) -> None:
     for slot, (body, radius) in enumerate(zip(symbol.bodies[:2], symbol.radii, strict=False)):
         if radius is None or body == GROUND:
             continue
-        axes, colour = drawing.frame_along(body, symbol.axis_on(slot)), drawing.colours.get(body, INK)
-        center, look = drawing.point(symbol, slot), {"stroke": colour, "layer": WHEELS, "owner": f"bodies.{body}"}
-        parts.cylinder(
-            drawing, center, axes, (0.7, radius / drawing.unit), fill=tinted(colour, 0.15), width=1.2, **look
-        )
+        axes, color = drawing.frame_along(body, symbol.axis_on(slot)), drawing.colors.get(body, INK)
+        center, look = drawing.point(symbol, slot), {"stroke": color, "layer": WHEELS, "owner": f"bodies.{body}"}
+        parts.cylinder(drawing, center, axes, (0.7, radius / drawing.unit), fill=tinted(color, 0.15), width=1.2, **look)
         rim = center + radius * drawing.flat(axes[:, 1])
         drawing.line(center, rim, width=1.0, **look)
 

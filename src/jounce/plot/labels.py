@@ -52,7 +52,7 @@ def quantity_word(output: AbstractQuantity, order: int) -> str:
     Examples
     --------
     >>> import jounce as jn
-    >>> quantity_word(jn.AngleOutput("crank"), 0), quantity_word(jn.AngleOutput("crank"), 1)
+    >>> quantity_word(jn.outputs.AngleOutput("crank"), 0), quantity_word(jn.outputs.AngleOutput("crank"), 1)
     ('angle', 'velocity')
     """
     word = rate_name(output, order)

@@ -11,7 +11,7 @@ from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
 from jounce.errors import RobotError
 from jounce.plot.instants import evenly_chosen
 from jounce.plot.labels import unit_label
-from jounce.plot.style import GREY, LINE_COLOURS, PALE_GREY, blank_figure, set_ticks, shown_name, style
+from jounce.plot.style import GRAY, LINE_COLORS, PALE_GRAY, blank_figure, set_ticks, shown_name, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -91,8 +91,8 @@ def _per_line(report: LimitReport, joints: Any) -> int:
 
 
 def _line_style(joint: int) -> dict[str, Any]:
-    rounds, index = divmod(joint, len(LINE_COLOURS))
-    return {"color": LINE_COLOURS[index], "linestyle": DASHES[rounds % len(DASHES)]}
+    rounds, index = divmod(joint, len(LINE_COLORS))
+    return {"color": LINE_COLORS[index], "linestyle": DASHES[rounds % len(DASHES)]}
 
 
 def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any) -> None:
@@ -108,9 +108,9 @@ def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any
     axes.set_ylim(low - margin, high + margin)
     axes.set_xlim(report.times[0], report.times[-1])
     for sign in (-1, 1):
-        axes.axhline(sign, color=GREY, linewidth=1.1, zorder=1.5)
+        axes.axhline(sign, color=GRAY, linewidth=1.1, zorder=1.5)
         axes.axhspan(sign, sign * (abs(low) + abs(high) + margin), color=FORBIDDEN, linewidth=0, zorder=0)
-    axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
+    axes.axhline(0.0, color=PALE_GRAY, linewidth=0.7, zorder=1)
     mark = ("^" if side > 0 else "v") if worst.infinite else "o"
     axes.plot([worst.time], [at], marker=mark, markersize=4, color="black", fillstyle="none", zorder=5, clip_on=False)
     set_ticks(axes.yaxis, 5, least=3)
@@ -120,7 +120,7 @@ def _draw_panel(report: LimitReport, quantity: int, joints: list[int], axes: Any
     name = shown_name(worst.joint)
     size = "infinite" if worst.infinite else f"{worst.value:.5g} {unit_label(worst.unit, 0)}"
     note = f"worst: {name}, {size} (limit {worst.limit:.5g})"
-    axes.set_title(note, loc="left", pad=4, fontsize=7.5, color=BROKEN if worst.broken else GREY)
+    axes.set_title(note, loc="left", pad=4, fontsize=7.5, color=BROKEN if worst.broken else GRAY)
 
 
 def _rows_of(report: LimitReport, quantity: int) -> list[LimitRow]:

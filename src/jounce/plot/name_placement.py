@@ -68,7 +68,7 @@ def place_names(
         anchor = label.anchor[min(instant, len(label.anchor) - 1)]
         if not np.isfinite(anchor).all():
             continue
-        text = axes.text(*anchor, shown_name(label.text), color=label.colour, fontsize=8, ha="center", va="center")
+        text = axes.text(*anchor, shown_name(label.text), color=label.color, fontsize=8, ha="center", va="center")
         text.set(zorder=9, path_effects=[withStroke(linewidth=1.8, foreground="white")])
         text.set_gid(printable(f"name.{label.owner}"))
         if label.owner.startswith("bodies."):
@@ -81,14 +81,14 @@ def place_names(
         text.set_position(at)
         texts.append((label, text))
         if distance > LEADER and fixed:
-            axes.plot([anchor[0], at[0]], [anchor[1], at[1]], color=label.colour, linewidth=0.5, alpha=0.6, zorder=5.5)
+            axes.plot([anchor[0], at[0]], [anchor[1], at[1]], color=label.color, linewidth=0.5, alpha=0.6, zorder=5.5)
     return texts
 
 
 def _best(
     anchor: Pixels, half: Pixels, pixels: float, taken: Points, boxes: Boxes, frame: Float[np.ndarray, "4"]
 ) -> tuple[Pixels, float]:
-    """Return the centre of a name in pixels, and how far it is from its place in units, by the least cost."""
+    """Return the center of a name in pixels, and how far it is from its place in units, by the least cost."""
     angle = 2 * np.pi * np.arange(1, DIRECTIONS + 1) / DIRECTIONS
     directions = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     reach = np.minimum((half / np.maximum(np.abs(directions), 1e-9)).min(axis=1), half.max())  # to the edge of the name

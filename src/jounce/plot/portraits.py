@@ -11,7 +11,7 @@ from jounce.errors import MechanismError, check_name, did_you_mean
 from jounce.kinematics import Motion
 from jounce.plot.instants import evenly_chosen
 from jounce.plot.labels import axis_range, quantity_word, scale_of, symbol, unit_label
-from jounce.plot.style import COLOURS, GREY, PALE_GREY, blank_figure, set_ticks, style
+from jounce.plot.style import COLORS, GRAY, PALE_GRAY, blank_figure, set_ticks, style
 from jounce.reporting.peaks import rate_name
 
 if TYPE_CHECKING:
@@ -69,9 +69,9 @@ def hodograph(motion: Motion, output: str, order: int = 1) -> Figure:
         for axes, (i, j) in zip(np.atleast_1d(figure.subplots(1, len(pairs))), pairs, strict=True):
             solved = np.flatnonzero(np.isfinite(scaled).all(axis=1))
             for x, y in scaled[evenly_chosen(solved, ARROWS + 1)][:, [i, j]]:
-                axes.plot([0, x], [0, y], color=PALE_GREY, linewidth=0.7, zorder=1.5)
-            axes.plot(scaled[:, i], scaled[:, j], color=COLOURS[0])
-            axes.plot([0], [0], marker="+", color=GREY, markersize=7, linestyle="")
+                axes.plot([0, x], [0, y], color=PALE_GRAY, linewidth=0.7, zorder=1.5)
+            axes.plot(scaled[:, i], scaled[:, j], color=COLORS[0])
+            axes.plot([0], [0], marker="+", color=GRAY, markersize=7, linestyle="")
             _mark_start(axes, scaled[:, i], scaled[:, j])
             for label, k in ((axes.set_xlabel, i), (axes.set_ylabel, j)):
                 label(f"{symbol(output, order, its_output.labels[k])}  ({unit})")
@@ -126,8 +126,8 @@ def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)
                 label(f"{mark}  ({unit_label(unit, order, exponent)})")
                 size = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values))) * 10.0**-exponent
                 limits(axis_range(scaled[-1], 0.06, size))  # where nothing changes but rounding, it is not magnified
-            axes.plot(*scaled, color=COLOURS[k % len(COLOURS)])
-            axes.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
+            axes.plot(*scaled, color=COLORS[k % len(COLORS)])
+            axes.axhline(0.0, color=PALE_GRAY, linewidth=0.7, zorder=1)
             _mark_start(axes, *scaled)
             _few_ticks(axes)
     return figure
@@ -154,7 +154,7 @@ def _title(motion: Motion, output: str, orders: tuple[int, ...]) -> str:
 def _mark_start(axes: Any, x: Float[np.ndarray, " time"], y: Float[np.ndarray, " time"]) -> None:
     """Mark the first instant, and the sense of time by an arrow on the curve."""
     for start in np.flatnonzero(np.isfinite(x) & np.isfinite(y))[:1]:
-        axes.plot(x[start], y[start], marker="o", color=GREY, fillstyle="none", markersize=5, linestyle="", zorder=4)
+        axes.plot(x[start], y[start], marker="o", color=GRAY, fillstyle="none", markersize=5, linestyle="", zorder=4)
     spread = np.array([np.nanmax(v) - np.nanmin(v) if np.isfinite(v).any() else 0.0 for v in (x, y)])
     spread[spread == 0] = 1.0
     steps = np.hypot(np.diff(x) / spread[0], np.diff(y) / spread[1])
@@ -164,7 +164,7 @@ def _mark_start(axes: Any, x: Float[np.ndarray, " time"], y: Float[np.ndarray, "
     at = min(int(np.searchsorted(distance, 0.12 * distance[-1])) + 1, len(x) - 1)
     begin = max(at - 1, 0)
     if np.isfinite([x[begin], y[begin], x[at], y[at]]).all():
-        look = {"arrowstyle": "-|>", "color": GREY, "mutation_scale": 11, "linewidth": 0}
+        look = {"arrowstyle": "-|>", "color": GRAY, "mutation_scale": 11, "linewidth": 0}
         axes.annotate("", (x[at], y[at]), (x[begin], y[begin]), arrowprops=look, zorder=5)
 
 

@@ -25,7 +25,7 @@ from jounce.plot.instants import evenly_chosen, unsolved_runs
 from jounce.plot.labels import quantity_word, rounded_down
 from jounce.plot.scene import scene_of
 from jounce.plot.sketch import length_text, limits_with, paths_of
-from jounce.plot.style import BODY_COLOURS
+from jounce.plot.style import BODY_COLORS
 from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.peaks import Peak, derivative_name, peaks, shown_peaks
 from jounce.reporting.text.summaries import motion_summary
@@ -205,8 +205,8 @@ def _bodies(mechanism: Mechanism) -> list[dict[str, Any]]:
     for k, (name, body) in enumerate(mechanism.rigid_bodies.items()):
         position = ", ".join(f"{value:.6g}" for value in np.asarray(resolve(body.position, parameters), float))
         mass = None if body.mass is None else _number(np.asarray(resolve(body.mass, parameters), float))
-        colour = BODY_COLOURS[k % len(BODY_COLOURS)]
-        rows.append({"name": name, "mass": mass, "position": position, "colour": colour})
+        color = BODY_COLORS[k % len(BODY_COLORS)]
+        rows.append({"name": name, "mass": mass, "position": position, "color": color})
     return rows
 
 
@@ -244,7 +244,7 @@ def _scene(
             vars(shape) | {"points": moved(shape.points), "count": shape.points.shape[1]} for shape in scene.shapes
         ],
         "labels": [
-            {"text": label.text, "colour": label.colour, "points": moved(label.anchor[:, None])}
+            {"text": label.text, "color": label.color, "points": moved(label.anchor[:, None])}
             for label in scene.labels
             if label.owner != f"bodies.{GROUND}"
         ],

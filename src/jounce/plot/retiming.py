@@ -9,7 +9,7 @@ import numpy as np
 
 from jounce.errors import TrajectoryError
 from jounce.jet import Jet
-from jounce.plot.style import GREY, LINE_COLOURS, blank_figure, set_ticks, shown_name, style
+from jounce.plot.style import GRAY, LINE_COLORS, blank_figure, set_ticks, shown_name, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,16 +58,16 @@ def draw_retiming(retimed: RetimedTrajectory, title: str = "") -> Figure:
         rate, bars = figure.subplots(2, 1, sharex=True, height_ratios=[RATE, BAR * len(chosen) + 0.3])
         _draw_rate(retimed, rate)
         for row, k in enumerate(chosen):
-            colour = LINE_COLOURS[words.index(_quantity(names[k])) % len(LINE_COLOURS)]
+            color = LINE_COLORS[words.index(_quantity(names[k])) % len(LINE_COLORS)]
             for first, last in _runs(binds[:, k]):
                 duration = max(edges[last + 1] - edges[first], 0.002 * retimed.stop)
-                bars.broken_barh([(edges[first], duration)], (row - 0.36, 0.72), facecolors=colour)
+                bars.broken_barh([(edges[first], duration)], (row - 0.36, 0.72), facecolors=color)
             price_text = f"{10 * price[k]:.2g} ms" if price[k] > 0 else "0"
-            bars.text(1.01, row, price_text, transform=bars.get_yaxis_transform(), va="center", fontsize=7, color=GREY)
+            bars.text(1.01, row, price_text, transform=bars.get_yaxis_transform(), va="center", fontsize=7, color=GRAY)
         bars.set_yticks(range(len(chosen)), [shown_name(names[k]) for k in chosen], fontsize=7)
         bars.set_ylim(len(chosen) - 0.4, -0.6)
         bars.set_xlabel("time  $t$  (s)")
-        bars.set_title("limits that bind; right: saved if 1 % higher", loc="left", fontsize=7.5, color=GREY, pad=4)
+        bars.set_title("limits that bind; right: saved if 1 % higher", loc="left", fontsize=7.5, color=GRAY, pad=4)
         set_ticks(bars.xaxis, 6)
         bars.set_xlim(0, retimed.stop)
     return figure
@@ -77,7 +77,7 @@ def _draw_rate(retimed: RetimedTrajectory, axes: Any) -> None:
     times = np.linspace(0.0, retimed.stop, 1001)
     s = np.asarray(retimed.progress(Jet.variable(jnp.asarray(times), 1)).derivatives())
     length = retimed.path.stop - retimed.path.start
-    axes.plot(times, s[1] / length, color=LINE_COLOURS[0])
+    axes.plot(times, s[1] / length, color=LINE_COLORS[0])
     axes.set_ylabel("rate along the path\n(1/s)")
     axes.set_ylim(0, None)
     set_ticks(axes.yaxis, 4, least=3)

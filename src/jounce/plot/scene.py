@@ -109,15 +109,15 @@ def drawing_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Insta
 
 def _draw_link(drawing: Drawing, link: DrawnLink) -> None:
     """Draw the bars of a body, or its plate, and write its name."""
-    colour, drawing.owner = drawing.colours[link.body], f"bodies.{link.body}"
+    color, drawing.owner = drawing.colors[link.body], f"bodies.{link.body}"
     points = drawing.flat(drawing.at(link.body, link.points))  # time, n, 2
     ring = _ring(link)
     if ring:
-        drawing.curve(points[:, ring], closed=True, stroke=colour, fill=tinted(colour), width=2.0, layer=PLATES)
+        drawing.curve(points[:, ring], closed=True, stroke=color, fill=tinted(color), width=2.0, layer=PLATES)
     for edge in link.edges[len(ring) :]:
-        drawing.curve(points[:, [*edge]], stroke=colour, width=2.0 if ring else 4.0, layer=BARS)
+        drawing.curve(points[:, [*edge]], stroke=color, width=2.0 if ring else 4.0, layer=BARS)
     longest = max(link.edges, key=lambda edge: np.linalg.norm(np.diff(link.points[[*edge]], axis=0)), default=(0,))
-    drawing.name(link.body, points[:, ring or [*longest]].mean(axis=1), colour)
+    drawing.name(link.body, points[:, ring or [*longest]].mean(axis=1), color)
 
 
 def _ring(link: DrawnLink) -> list[int]:

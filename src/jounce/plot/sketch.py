@@ -17,7 +17,7 @@ from jounce.plot.instants import evenly_chosen, solved_instants
 from jounce.plot.labels import rounded_down, scale_of, unit_label
 from jounce.plot.name_placement import place_names
 from jounce.plot.scene import Scene, outline, scene_of
-from jounce.plot.style import GREY, blank_figure, printable, shown_name, style
+from jounce.plot.style import GRAY, blank_figure, printable, shown_name, style
 from jounce.reporting.peaks import rate_name
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ WIDEST, TALLEST, LEAST = 6.4, 5.2, 2.6  # inches
 LETTER = 0.07  # inches of a title at least, which is then written smaller
 WIDEST_TITLE = 8.0  # inches; what is longer is cut
 MOST = 400  # instants that a drawing is made for; more would not be seen
-PATH_MAP = "cividis"  # rises evenly in lightness, for the colour-blind too
+PATH_MAP = "cividis"  # rises evenly in lightness, for the color-blind too
 
 
 class Paths:
@@ -43,7 +43,7 @@ class Paths:
     names : sequence of str
         Outputs that are positions of points; at least one.
     order : int
-        Derivative by whose size they are coloured; 0 for none.
+        Derivative by whose size they are colored; 0 for none.
     view : tuple of float
         From where a spatial mechanism is seen.
     """
@@ -131,7 +131,7 @@ class SketchFigure:
 
     @staticmethod
     def _blank(wide: float, tall: float, bar: float, title: str) -> Any:
-        """Return the axes of an empty figure for what is wide and tall, m, with a bar of colours, inches, beside it."""
+        """Return the axes of an empty figure for what is wide and tall, m, with a bar of colors, inches, beside it."""
         scale = min((WIDEST - 0.3) / wide, (TALLEST - 0.3) / tall)
         least = max(LEAST, min(LETTER * len(title), WIDEST_TITLE))
         size = max(least, wide * scale + 0.3 + bar), max(LEAST, tall * scale + 0.3 + 0.35 * bool(title))
@@ -197,7 +197,7 @@ def sketch(
     paths : sequence of str, optional
         Outputs whose paths are drawn; those of all points unless given.
     order : int, default 0
-        Paths are coloured by the size of this derivative: 1 velocity, 2 acceleration, 3 jerk, ...
+        Paths are colored by the size of this derivative: 1 velocity, 2 acceleration, 3 jerk, ...
     view : tuple of float, default (-60, 25)
         Azimuth and elevation from which a spatial mechanism is seen, degrees.
 
@@ -242,7 +242,7 @@ def sketch(
 
 
 def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
-    """Draw the paths of points, coloured by the size of a derivative where one is asked for."""
+    """Draw the paths of points, colored by the size of a derivative where one is asked for."""
     from matplotlib.collections import LineCollection
     from matplotlib.colors import Normalize
 
@@ -270,7 +270,7 @@ def draw_scale(axes: Any, view: View | None = None) -> None:
     (left, right), (lower, upper) = axes.get_xlim(), axes.get_ylim()
     length = rounded_down(0.22 * (right - left))
     start, foot = left + 0.03 * (right - left), lower + 0.03 * (upper - lower)
-    look = {"color": GREY, "gid": "scale"}
+    look = {"color": GRAY, "gid": "scale"}
     axes.plot([start, start + length], [foot, foot], linewidth=1.6, solid_capstyle="butt", zorder=8, **look)
     axes.text(start, foot + 0.008 * (upper - lower), length_text(length), fontsize=7.5, va="bottom", **look)
     if view is None:
@@ -280,10 +280,10 @@ def draw_scale(axes: Any, view: View | None = None) -> None:
     origin = np.array([right - 1.5 * arm, lower + 1.2 * arm])
     for name, direction in zip("xyz", screen[:2].T, strict=True):
         tip = origin + arm * direction
-        look = {"arrowstyle": "-|>", "color": GREY, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6}
+        look = {"arrowstyle": "-|>", "color": GRAY, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0, "mutation_scale": 6}
         axes.annotate("", tip, origin, arrowprops=look, zorder=8, gid="scale")
         far = origin + 1.3 * arm * direction
-        axes.text(*far, name, color=GREY, fontsize=7.5, ha="center", va="center", gid="scale")
+        axes.text(*far, name, color=GRAY, fontsize=7.5, ha="center", va="center", gid="scale")
 
 
 def length_text(length: float) -> str:

@@ -1,4 +1,4 @@
-"""The one style of all figures: type, lines and colours that the colour-blind tell apart (Okabe and Ito)."""
+"""The one style of all figures: type, lines and colors that the color-blind tell apart (Okabe and Ito)."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BLUE",
-    "BODY_COLOURS",
-    "COLOURS",
+    "BODY_COLORS",
+    "COLORS",
+    "GRAY",
     "GREEN",
-    "GREY",
-    "LINE_COLOURS",
+    "LINE_COLORS",
     "ORANGE",
     "PURPLE",
     "RESOLUTION",
@@ -31,15 +31,15 @@ __all__ = [
 ]
 
 BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9"
-COLOURS = (BLUE, VERMILION, GREEN)  # of components
-LINE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, "#000000")
+COLORS = (BLUE, VERMILION, GREEN)  # of components
+LINE_COLORS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION, "#000000")
 """Of many lines in one panel; the yellow of Okabe and Ito is too pale for lines."""
-BODY_COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
-GREY = "#444444"
+BODY_COLORS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+GRAY = "#444444"
 TITLE_SIZE, SMALLEST_TITLE = 11.0, 4.0  # points
 LONGEST_NAME = 100  # characters, as files have it
 LETTER = 0.0088  # inches that a bold letter takes for each point of its size
-PALE_GREY = "#999999"  # of lines through zero
+PALE_GRAY = "#999999"  # of lines through zero
 RESOLUTION = 200  # dots per inch
 
 
@@ -65,7 +65,7 @@ def style(**changes: Any) -> Iterator[None]:
 
     with as_file(files("jounce.plot") / "jounce.mplstyle") as path:
         settings = mpl.rc_params_from_file(path, use_default_template=False)
-    settings["axes.prop_cycle"] = cycler(color=LINE_COLOURS)
+    settings["axes.prop_cycle"] = cycler(color=LINE_COLORS)
     changed: dict[Any, Any] = {name.replace("_", "."): value for name, value in changes.items()}
     with mpl.rc_context(dict(settings) | changed), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing", category=UserWarning)

@@ -109,7 +109,7 @@ def rail(
     middle = np.nanmean(foot, axis=0)
     first, last = (drawing.flat(drawing.at(body, middle + end * along)) for end in (low, high))
     if body != GROUND:
-        drawing.line(first, last, stroke=drawing.colours[body], width=2.2, layer=GUIDES)
+        drawing.line(first, last, stroke=drawing.colors[body], width=2.2, layer=GUIDES)
         return
     direction = unit_vector(last - first)
     side = normal_of(direction)

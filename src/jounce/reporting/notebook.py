@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from jounce.design import OptimisedDesign
+from jounce.design import OptimizedDesign
 from jounce.display import Displayed
-from jounce.dynamics import Equilibrium, LimitReport, Linearisation, Modes
+from jounce.dynamics import Equilibrium, LimitReport, Linearization, Modes
 from jounce.errors import JounceError, SampleWarning
 from jounce.integrate import Batch
 from jounce.kinematics import Curve, Motion, Status
@@ -30,7 +30,7 @@ from jounce.robot import Robot
 from jounce.trajectory import JointTrajectory
 
 ROWS = 30  # of a table, before the rest is counted
-# Colours are left to the page, so that light and dark themes both fit; lines are see-through grey.
+# Colors are left to the page, so that light and dark themes both fit; lines are see-through gray.
 STYLE = (
     "<style scoped>.jounce{font-size:90%}.jounce table{border-collapse:collapse;margin:.3em 0 .6em}"
     ".jounce th,.jounce td{text-align:left;padding:.15em .8em .15em 0;border-bottom:1px solid rgba(128,128,128,.3);"
@@ -64,15 +64,15 @@ def shown(thing: Displayed) -> str:
             parts = _batch(thing)
         case Equilibrium():
             parts = _equilibrium(thing)
-        case Linearisation():
-            parts = _linearisation(thing)
+        case Linearization():
+            parts = _linearization(thing)
         case Modes():
             parts = _tables([modes_table(thing)])
         case Curve():
             facts = curve_facts(thing)
             parts = [*_title(*(curve_summary(facts, "Curve").split("\n"))), *_tables(curve_tables(facts))]
-        case OptimisedDesign():
-            design = design_facts(thing, "Optimised design")
+        case OptimizedDesign():
+            design = design_facts(thing, "Optimized design")
             parts = [*_title(*design_words(design).split("\n")), *_tables([design_table(design)])]
         case LimitReport():
             parts = [
@@ -167,7 +167,7 @@ def _equilibrium(rest: Equilibrium) -> list[str]:
     return [*_title(rest.mechanism.title or "Equilibrium", *lines), *_tables(equilibrium_tables(rest))]
 
 
-def _linearisation(small: Linearisation) -> list[str]:
+def _linearization(small: Linearization) -> list[str]:
     where = "a motion" if small.equilibrium is None else f"an equilibrium that is {small.equilibrium.stability}"
     title = _title(small.mechanism.title or "Small motions", f"about {where} at t = {small.time:g} s")
     tables = []

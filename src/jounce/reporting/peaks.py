@@ -95,9 +95,9 @@ def rate_name(output: AbstractQuantity, order: int) -> str:
     Examples
     --------
     >>> import jounce as jn
-    >>> [rate_name(jn.AngleOutput("crank"), k) for k in (0, 1, 4)]
+    >>> [rate_name(jn.outputs.AngleOutput("crank"), k) for k in (0, 1, 4)]
     ['position', 'velocity', 'jounce']
-    >>> [rate_name(jn.DriverTorqueOutput("theta"), k) for k in (0, 1, 2, 6)]
+    >>> [rate_name(jn.outputs.DriverTorqueOutput("theta"), k) for k in (0, 1, 2, 6)]
     ['torque', 'yank', 'second rate', '6th rate']
     """
     names = output.rate_names

@@ -1,4 +1,4 @@
-"""What a command shows: tables, a progress bar, messages; in colour on a terminal, plain text elsewhere."""
+"""What a command shows: tables, a progress bar, messages; in color on a terminal, plain text elsewhere."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def show_peaks(given: Sequence[Peak]) -> None:
 
 
 def show_table(table: Table, style: str = "bold") -> None:
-    """Print a table, in colour on a terminal that is wide enough for its numbers; marked cells have a style there."""
-    if not (sys.stdout.isatty() and _show_coloured(table, style)):
+    """Print a table, in color on a terminal that is wide enough for its numbers; marked cells have a style there."""
+    if not (sys.stdout.isatty() and _show_colored(table, style)):
         say("\n" + "\n".join(_plain_lines(table)))
 
 
@@ -84,8 +84,8 @@ def _plain_lines(table: Table) -> list[str]:
     return [*lines, *(["", f"* {table.meaning}"] if table.meaning else [])]
 
 
-def _show_coloured(table: Table, style: str) -> bool:
-    """Print a table in colour, unless the terminal cannot show marks or is so narrow that rich would cut numbers."""
+def _show_colored(table: Table, style: str) -> bool:
+    """Print a table in color, unless the terminal cannot show marks or is so narrow that rich would cut numbers."""
     from rich import box
     from rich.console import Console
     from rich.table import Table as Grid
@@ -96,8 +96,8 @@ def _show_coloured(table: Table, style: str) -> bool:
     grid.title_style = "bold"
     for k, heading in enumerate(table.headings):
         whole = k > 0 if table.grouped else k in table.numbers
-        justify, colour = ("right" if k in table.numbers else "left"), ("cyan" if k == 0 else "")
-        grid.add_column(heading, justify=justify, no_wrap=whole, style=colour, overflow="fold")
+        justify, color = ("right" if k in table.numbers else "left"), ("cyan" if k == 0 else "")
+        grid.add_column(heading, justify=justify, no_wrap=whole, style=color, overflow="fold")
     before = ""
     for row, marked in zip(table.rows, table.marks or [[]] * len(table.rows), strict=True):
         cells = [Text(_clean(cell)) for cell in row]
@@ -120,8 +120,8 @@ def _show_coloured(table: Table, style: str) -> bool:
 def show_columns(pairs: Sequence[tuple[str, str]]) -> None:
     """Print names and what they mean, in two columns."""
     width = max(len(name) for name, _ in pairs)
-    coloured = sys.stdout.isatty()
-    if coloured:
+    colored = sys.stdout.isatty()
+    if colored:
         from rich.console import Console
         from rich.text import Text
 

@@ -1,4 +1,4 @@
-"""Outputs that grow without bound towards the change points of a motion, so that no largest value says anything.
+"""Outputs that grow without bound toward the change points of a motion, so that no largest value says anything.
 
 A motion passes a change point smoothly. What follows from its factored Jacobian can have a pole there: reactions do.
 """
@@ -19,7 +19,7 @@ LIKENESS = 0.05  # of these growths
 
 
 def unbounded_outputs(motion: Motion | Stretches) -> dict[str, list[float]]:
-    """Return the outputs that grow without bound, and towards which instants, s, where a motion passes change points.
+    """Return the outputs that grow without bound, and toward which instants, s, where a motion passes change points.
 
     Parameters
     ----------

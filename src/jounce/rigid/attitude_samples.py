@@ -19,7 +19,7 @@ UNIT = 1e-6  # how far the length of a sampled quaternion may be from one: print
 class AttitudeSamples:
     """Attitude of a body interpolated through samples in time.
 
-    A spline runs through the unit quaternions of the samples, their signs chosen so that neighbours are near; at any
+    A spline runs through the unit quaternions of the samples, their signs chosen so that neighbors are near; at any
     instant it is scaled to unit length as a jet, so that attitude and angular velocity are exact derivatives of the
     interpolated motion. How near this comes to the true motion depends on the spacing of the samples: the error of the
     n-th derivative of the attitude falls as spacing^(degree + 1 - n).
@@ -38,7 +38,7 @@ class AttitudeSamples:
     ------
     TrajectoryError
         If the samples are too few for the degree, not finite, not increasing in time, of unequal number, not of unit
-        length, or so far apart that the turn between neighbours is half a turn, of unknown sense.
+        length, or so far apart that the turn between neighbors is half a turn, of unknown sense.
 
     Examples
     --------
@@ -234,7 +234,7 @@ def _check_times(times: np.ndarray, samples: np.ndarray, name: str, shape: tuple
 def _continuous(
     times: Float[np.ndarray, " sample"], quaternions: Float[np.ndarray, "sample 4"]
 ) -> Float[np.ndarray, "sample 4"]:
-    """Choose the sign of each quaternion so that it is the nearer one to its neighbour: both are the same rotation."""
+    """Choose the sign of each quaternion so that it is the nearer one to its neighbor: both are the same rotation."""
     along = np.sum(quaternions[1:] * quaternions[:-1], axis=1)
     unknown = np.abs(along) < UNIT
     if unknown.any():

@@ -166,7 +166,7 @@ def from_euler(sequence: str, angles: Sequence[float]) -> Quaternion:
     Parameters
     ----------
     sequence : str
-        Three letters, neighbours different. Lower case (``zxz``): about the axes of the global frame, which stay
+        Three letters, neighbors different. Lower case (``zxz``): about the axes of the global frame, which stay
         (extrinsic). Upper case (``ZXZ``): about the axes of the body, which move (intrinsic). This is the convention of
         ``scipy.spatial.transform.Rotation.from_euler``.
     angles : sequence of 3 numbers

@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia of a rigid body, and their sums. Negrean 2025, equations 72 and 109."""
+"""Mass, center of mass and inertia of a rigid body, and their sums. Negrean 2025, equations 72 and 109."""
 
 import dataclasses
 from collections.abc import Callable, Iterable
@@ -38,7 +38,7 @@ class Inertia:
     center_of_mass : array_like of shape (3,), default zero
         m, in the frame of the body.
     tensor : array_like of shape (3, 3) or (3,), default zero
-        Inertia about the centre of mass, in axes parallel to those of the body, kg m^2; three numbers are its
+        Inertia about the center of mass, in axes parallel to those of the body, kg m^2; three numbers are its
         diagonal. Zero is a point mass.
     strict : bool, default True
         Refuse what no real body has. Otherwise all is computed with the numbers as they are, and `fault` says what is
@@ -96,7 +96,7 @@ class Inertia:
 
     @property
     def second_moments(self) -> np.ndarray:
-        """Integral of rho rho^T dm about the centre of mass, (3, 3), kg m^2: Negrean 2025, equation 109."""
+        """Integral of rho rho^T dm about the center of mass, (3, 3), kg m^2: Negrean 2025, equation 109."""
         return np.trace(self.tensor) / 2 * np.eye(3) - self.tensor
 
     @property

@@ -120,7 +120,7 @@ def rotation_matrix(sequence: str, angles: JetLike) -> Any:
     Parameters
     ----------
     sequence : str
-        Three letters, neighbours different. Upper case ("ZXZ"): each turn is about an axis that the turns before have
+        Three letters, neighbors different. Upper case ("ZXZ"): each turn is about an axis that the turns before have
         moved. Lower case ("zxz"): about axes that stay.
     angles : Jet, array_like of shape (3, ...), or three of either
         Angles in the order of the letters, rad.
@@ -166,7 +166,7 @@ def check_sequence(sequence: str, error: type[JounceError] = JounceError, name: 
     """Raise an error unless the sequence is one of the 24."""
     if sequence not in SEQUENCES:
         message = (
-            "not an Euler sequence; write three letters with neighbours different, such as ZXZ (moving axes) or zxz "
+            "not an Euler sequence; write three letters with neighbors different, such as ZXZ (moving axes) or zxz "
             "(fixed axes)"
         )
         raise error(message, name=name, value=sequence)

@@ -82,7 +82,7 @@ def solid_moments(kind: str, axis: str, sizes: dict[str, Any]) -> tuple[Any, tup
 
 
 def pseudo_parts(pseudo: Any) -> tuple[Any, list[Any], list[list[Any]]]:
-    """Return the mass, the centre of mass and the second moments about it from a matrix of pseudo-inertia.
+    """Return the mass, the center of mass and the second moments about it from a matrix of pseudo-inertia.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ def quaternion_spins(quaternion: Float[Numbers, "4 *batch"]) -> Quadruples:
     )
 
 
-def _normalised(quaternion: Float[Numbers, "4 *batch"]) -> Float[Numbers, "4 *batch"]:
+def _normalized(quaternion: Float[Numbers, "4 *batch"]) -> Float[Numbers, "4 *batch"]:
     return quaternion / jnp.sqrt(dot(quaternion, quaternion))[None]
 
 
@@ -86,9 +86,9 @@ class SpatialPose(AbstractFrame):
     def at(
         cls, position: Float[Numbers, "3 *batch"] | Refused, quaternion: Float[Numbers, "4 *batch"] | Refused
     ) -> "SpatialPose":
-        """Build the pose of order zero; the quaternion is normalised."""
+        """Build the pose of order zero; the quaternion is normalized."""
         position = real_or_traced("position", position, JounceError)
-        quaternion = _normalised(real_or_traced("quaternion", quaternion, JounceError))
+        quaternion = _normalized(real_or_traced("quaternion", quaternion, JounceError))
         spins, axes = (tuple(Jet([x]) for x in f(quaternion)) for f in (quaternion_spins, body_axes))
         return cls(Jet([position]), Jet([quaternion]), spins, axes, None)
 

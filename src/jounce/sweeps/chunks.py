@@ -1,4 +1,4 @@
-"""The work of one chunk of designs: computed, summarised and written where it is computed, by one worker or another."""
+"""The work of one chunk of designs: computed, summarized and written where it is computed, by one worker or another."""
 
 import dataclasses
 import os

@@ -145,7 +145,7 @@ def check_joint(
     Rolling keeps: jacobian, frames, facts
     """
     if not (isinstance(kind, type) and issubclass(kind, AbstractConstraint)):
-        raise MechanismError("must be a class derived from jn.AbstractConstraint", name="kind", value=kind)
+        raise MechanismError("must be a class derived from jn.joints.AbstractConstraint", name="kind", value=kind)
     space = kind.space or space
     check_choice("space", space, SPACES, MechanismError)
     whole_number("order", order, 1, error=MechanismError)

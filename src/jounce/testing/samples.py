@@ -109,7 +109,7 @@ def random_motion(
 ) -> dict[str, np.ndarray]:
     """Return coefficients of a random motion of all bodies: polynomials of time, the ground at rest.
 
-    Planar: position (2, bodies, batch) and angle (bodies, batch); spatial: position and a quaternion, not normalised.
+    Planar: position (2, bodies, batch) and angle (bodies, batch); spatial: position and a quaternion, not normalized.
     """
     degree = order if degree is None else degree
     count, components = len(BODIES), POSITION_COMPONENTS[space]
@@ -141,7 +141,7 @@ def pose_of(motion: Motion) -> Any:
 
 
 def unit_quaternion_and_rate(series: Sequence[Sequence[Any]]) -> tuple[Jet, Jet | None]:
-    """Return the jets of the normalised quaternion and of the body-fixed angular velocity ``2 conj(p) p'``."""
+    """Return the jets of the normalized quaternion and of the body-fixed angular velocity ``2 conj(p) p'``."""
     q = [Jet([jnp.asarray(level[k]) for level in series]) for k in range(4)]
     length = sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
     p = [x / length for x in q]

@@ -43,8 +43,9 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
     Examples
     --------
     >>> import jounce as jn
-    >>> ramp = jn.SegmentedMotion([jn.Segment("dwell", 0.25), jn.Segment("cycloidal", 0.5, by=0.1)], beyond="hold")
-    >>> bent = jn.ExpressionMotion(jn.Expression("abs(t - 0.1)"), {})
+    >>> segments = [jn.laws.Segment("dwell", 0.25), jn.laws.Segment("cycloidal", 0.5, by=0.1)]
+    >>> ramp = jn.laws.SegmentedMotion(segments, beyond="hold")
+    >>> bent = jn.laws.ExpressionMotion(jn.laws.Expression("abs(t - 0.1)"), {})
     >>> law_breaks([ramp, bent], 0.0, 1.0, 4).round(9).tolist()
     [0.1, 0.25, 0.75]
     """

@@ -82,9 +82,9 @@ class FollowingMotion(MadeOfOthers):
     --------
     >>> import math
     >>> import jounce as jn
-    >>> rise, fall = (jn.Segment("cycloidal", duration=math.pi, to=x) for x in (0.02, 0.0))
-    >>> lift = jn.SegmentedMotion([rise, fall], beyond="repeat")
-    >>> follower = jn.FollowingMotion(lift, leader="2*pi*t")  # the shaft turns once a second
+    >>> rise, fall = (jn.laws.Segment("cycloidal", duration=math.pi, to=x) for x in (0.02, 0.0))
+    >>> lift = jn.laws.SegmentedMotion([rise, fall], beyond="repeat")
+    >>> follower = jn.laws.FollowingMotion(lift, leader="2*pi*t")  # the shaft turns once a second
     >>> [round(float(x), 12) for x in follower(jn.Jet.variable(7.25, order=1)).derivatives()]
     [0.01, 0.08]
     """
@@ -157,10 +157,11 @@ class OutputMotion(MadeOfOthers):
     >>> import jounce as jn
     >>> rod = jn.Body([0, 0], angle=0.2)
     >>> pin = jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])
-    >>> motor = jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion=jn.OutputMotion("tip_y", "0.1 + 0.1*t"))
+    >>> law = jn.laws.OutputMotion("tip_y", "0.1 + 0.1*t")
+    >>> motor = jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion=law)
     >>> lift = jn.Mechanism(
     ...     space="planar", bodies={"rod": rod}, joints={"pin": pin}, drivers={"motor": motor},
-    ...     outputs={"tip": jn.PointOutput("rod", [0.2, 0])},
+    ...     outputs={"tip": jn.outputs.PointOutput("rod", [0.2, 0])},
     ... )
     >>> jn.solve(lift, [0.0, 0.5], order=1).driver("motor").values.round(6).tolist()  # arcsin(y / 0.2)
     [[0.523599, 0.57735], [0.848062, 0.755929]]

@@ -46,7 +46,7 @@ class ParametricCurve:
     Examples
     --------
     >>> import jounce as jn
-    >>> jn.ParametricCurve(["0.2*cos(s)", "0.1*sin(s)"], range=[0, "2*pi"], closed=True).closed
+    >>> jn.joints.ParametricCurve(["0.2*cos(s)", "0.1*sin(s)"], range=[0, "2*pi"], closed=True).closed
     True
     """
 
@@ -91,7 +91,7 @@ class SampledCurve(Module):
     >>> import numpy as np
     >>> import jounce as jn
     >>> angle = 2 * np.pi * np.arange(60) / 60
-    >>> circle = jn.SampledCurve(np.stack([np.cos(angle), np.sin(angle)], axis=1), closed=True)
+    >>> circle = jn.joints.SampledCurve(np.stack([np.cos(angle), np.sin(angle)], axis=1), closed=True)
     >>> round(circle.length, 2)
     6.28
     """

@@ -39,7 +39,7 @@ class HermiteMotion(SplineMotion):
     Examples
     --------
     >>> import jounce as jn
-    >>> law = jn.HermiteMotion([0.0, 1.0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])  # rest to rest: 3-4-5
+    >>> law = jn.laws.HermiteMotion([0.0, 1.0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])  # rest to rest: 3-4-5
     >>> [round(float(x), 12) for x in law(jn.Jet.variable(0.5, order=2)).derivatives()]
     [0.5, 1.875, -0.0]
     """

@@ -66,7 +66,7 @@ class IntegratedMotion(MadeOfOthers):
     Examples
     --------
     >>> import jounce as jn
-    >>> run_up = jn.IntegratedMotion("100*(1 - exp(-t/0.2))")  # rad/s
+    >>> run_up = jn.laws.IntegratedMotion("100*(1 - exp(-t/0.2))")  # rad/s
     >>> [round(float(x), 4) for x in run_up(jn.Jet.variable(0.5, order=2)).derivatives()]
     [31.6417, 91.7915, 41.0425]
     """

@@ -272,7 +272,7 @@ class JointTrajectory(Displayed):
         """Estimate the errors of the derivatives that come from samples, relative to their peaks.
 
         The error of interpolation is told by comparing the splines with others through every second sample; to it three
-        standard deviations of the noise of the samples are added (rounding and quantisation are noise too), as the
+        standard deviations of the noise of the samples are added (rounding and quantization are noise too), as the
         splines amplify it. Meant to be on the safe side: 1 to 10 times the true error for the degrees 3 and 5, up to 30
         times for 7, measured on sines and Gaussians.
 

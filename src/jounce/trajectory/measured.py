@@ -60,7 +60,7 @@ class MeasuredMotion(SplineMotion):
     >>> import numpy as np
     >>> import jounce as jn
     >>> t = np.linspace(0.0, 1.0, 11)
-    >>> law = jn.MeasuredMotion(t, 6 * t, derivative=2, initial=[2.0, 1.0])  # accelerations of t^3
+    >>> law = jn.laws.MeasuredMotion(t, 6 * t, derivative=2, initial=[2.0, 1.0])  # accelerations of t^3
     >>> [round(float(x), 9) for x in law(jn.Jet.variable(0.5, order=3)).derivatives()]
     [2.625, 1.75, 3.0, 6.0]
     """

@@ -54,7 +54,7 @@ class ExpressionMotion(AbstractMotion):
     Examples
     --------
     >>> import jounce as jn
-    >>> law = jn.ExpressionMotion(jn.Expression("a*t**2"), {"a": 3.0})
+    >>> law = jn.laws.ExpressionMotion(jn.laws.Expression("a*t**2"), {"a": 3.0})
     >>> [float(x) for x in law(jn.Jet.variable(1.0, order=2)).derivatives()]
     [3.0, 6.0, 6.0]
     """
@@ -87,7 +87,7 @@ class FunctionMotion(AbstractMotion):
     --------
     >>> import jax.numpy as jnp
     >>> import jounce as jn
-    >>> law = jn.FunctionMotion(lambda t: jnp.exp(-2 * t))
+    >>> law = jn.laws.FunctionMotion(lambda t: jnp.exp(-2 * t))
     >>> [float(x) for x in law(jn.Jet.variable(0.0, order=3)).derivatives()]
     [1.0, -2.0, 4.0, -8.0]
     """
@@ -133,10 +133,10 @@ class SplineMotion(AbstractMotion):
     >>> import numpy as np
     >>> import jounce as jn
     >>> t = np.linspace(0.0, 1.0, 21)
-    >>> law = jn.SplineMotion(t, t**3, degree=5)
+    >>> law = jn.laws.SplineMotion(t, t**3, degree=5)
     >>> [round(float(x), 9) for x in law(jn.Jet.variable(0.5, order=3)).derivatives()]
     [0.125, 0.75, 3.0, 6.0]
-    >>> held = jn.SplineMotion(t, t**3, beyond="hold")
+    >>> held = jn.laws.SplineMotion(t, t**3, beyond="hold")
     >>> [round(float(x), 9) for x in held(jn.Jet.variable(2.0, order=1)).derivatives()]
     [1.0, 0.0]
     """

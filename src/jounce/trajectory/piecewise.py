@@ -47,13 +47,13 @@ class PiecewiseMotion(MadeOfOthers):
     Examples
     --------
     >>> import jounce as jn
-    >>> law = jn.PiecewiseMotion(["t**2", "2*t - 1"], until=[1.0])
+    >>> law = jn.laws.PiecewiseMotion(["t**2", "2*t - 1"], until=[1.0])
     >>> [float(x) for x in law(jn.Jet.variable(3.0, order=2)).derivatives()]
     [5.0, 2.0, 0.0]
     >>> instants, jumps = law.jumps(2)
     >>> instants.tolist(), jumps[:, 0].tolist()  # acceleration goes from 2 to 0 at 1 s
     ([1.0], [0.0, 0.0, -2.0])
-    >>> table = jn.PiecewiseMotion(["t", "1"], until=[1.0, 3.0], beyond="advance")  # goes on by 1 every 3 s
+    >>> table = jn.laws.PiecewiseMotion(["t", "1"], until=[1.0, 3.0], beyond="advance")  # goes on by 1 every 3 s
     >>> [float(x) for x in table(jn.Jet.variable(6.5, order=1)).derivatives()]
     [2.5, 1.0]
     """
@@ -177,7 +177,7 @@ class PiecewiseMotion(MadeOfOthers):
         Examples
         --------
         >>> import jounce as jn
-        >>> jn.PiecewiseMotion(["t**3", "0"], until=[0.0]).jumps(3)[1][:, 0].tolist()
+        >>> jn.laws.PiecewiseMotion(["t**3", "0"], until=[0.0]).jumps(3)[1][:, 0].tolist()
         [0.0, 0.0, 0.0, -6.0]
         """
         parts = self._known_parts()
@@ -204,7 +204,7 @@ class PiecewiseMotion(MadeOfOthers):
         return np.array(instants, float), np.stack(found, axis=-1) if found else np.zeros((order + 1, 0))
 
     def _sizes(self, order: int) -> list[Float[np.ndarray, " levels"]]:
-        """Return how large the derivatives of each law are; the first and the last go as far as their neighbours."""
+        """Return how large the derivatives of each law are; the first and the last go as far as their neighbors."""
         known = [float(x) for x in self.until]
         if self.beyond != "continue":
             borders = [float(self.start), *known]

@@ -72,14 +72,14 @@ class PolynomialMotion(SplineMotion):
     Examples
     --------
     >>> import jounce as jn
-    >>> law = jn.PolynomialMotion([0.0, 1.0, 2.0], [0.0, 1.0, 0.0], continuity=2, ends="natural")
+    >>> law = jn.laws.PolynomialMotion([0.0, 1.0, 2.0], [0.0, 1.0, 0.0], continuity=2, ends="natural")
     >>> [float(x) for x in law(jn.Jet.variable(1.0, order=2)).derivatives()]
     [1.0, 0.0, -3.0]
 
     From rest, with both ends at rest to the second derivative:
 
     >>> rest = {1: 0.0, 2: 0.0}
-    >>> law = jn.PolynomialMotion([0.0, 1.0], [0.0, 1.0], continuity=4, start=rest, end=rest)
+    >>> law = jn.laws.PolynomialMotion([0.0, 1.0], [0.0, 1.0], continuity=4, start=rest, end=rest)
     >>> round(float(law(jn.Jet.variable(0.5, order=1)).coefficients[1]), 12)
     1.875
     """
@@ -161,7 +161,7 @@ class PolynomialMotion(SplineMotion):
         >>> import numpy as np
         >>> import jounce as jn
         >>> t = np.linspace(0.0, 1.0, 11)
-        >>> law = jn.PolynomialMotion.from_accelerations(t, 6 * t, start={0: 2.0}, end={0: 3.0})
+        >>> law = jn.laws.PolynomialMotion.from_accelerations(t, 6 * t, start={0: 2.0}, end={0: 3.0})
         >>> [round(float(x), 9) for x in law(jn.Jet.variable(0.5, order=3)).derivatives()]
         [2.125, 0.75, 3.0, 6.0]
         """
@@ -208,7 +208,7 @@ class PolynomialMotion(SplineMotion):
         Examples
         --------
         >>> import jounce as jn
-        >>> law = jn.PolynomialMotion([0.0, 1.0], [2.0, 2.0], continuity=2, derivative=2, start={0: 5.0, 1: 0.0})
+        >>> law = jn.laws.PolynomialMotion([0.0, 1.0], [2.0, 2.0], continuity=2, derivative=2, start={0: 5.0, 1: 0.0})
         >>> law.integration_constants().round(12).tolist()  # q = (1 - t)^3 / 3 + t^3 / 3 + a_1 t + a_2
         [[1.0], [4.666666666667]]
         """

@@ -95,7 +95,7 @@ class RestToRestMotion(AbstractProfile):
     Examples
     --------
     >>> import jounce as jn
-    >>> law = jn.RestToRestMotion(0.0, 1.0, duration=2.0)
+    >>> law = jn.laws.RestToRestMotion(0.0, 1.0, duration=2.0)
     >>> [float(x) for x in law(jn.Jet.variable(1.0, order=1)).derivatives()]
     [0.5, 0.9375]
     """
@@ -160,7 +160,7 @@ class CycloidalMotion(AbstractProfile):
     Examples
     --------
     >>> import jounce as jn
-    >>> law = jn.CycloidalMotion(0.0, 1.0, duration=2.0)
+    >>> law = jn.laws.CycloidalMotion(0.0, 1.0, duration=2.0)
     >>> [round(float(x), 12) for x in law(jn.Jet.variable(0.5, order=2)).derivatives()]
     [0.090845056908, 0.5, 1.570796326795]
     """
@@ -218,7 +218,7 @@ def motion_profile(
     Examples
     --------
     >>> import jounce as jn
-    >>> law = jn.motion_profile("cycloidal", 0.0, 1.0, limits=(2.0, 20.0, 500.0))
+    >>> law = jn.laws.motion_profile("cycloidal", 0.0, 1.0, limits=(2.0, 20.0, 500.0))
     >>> float(law.duration)
     1.0
     """

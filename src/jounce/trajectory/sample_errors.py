@@ -17,7 +17,7 @@ def derivative_errors(
 
     Two errors are added. The one of interpolation is the largest difference between the spline and another through
     every second sample, divided by the ``2^(degree + 1 - k) - 1`` by which derivative k of the finer one is better. The
-    one of noise (rounding and quantisation too) is the standard deviation of the noise, which is what the divided
+    one of noise (rounding and quantization too) is the standard deviation of the noise, which is what the divided
     differences of the samples do not explain by a smooth function, times what the spline makes of it at the worst
     place. To be on the safe side the first is doubled and the second taken threefold. Measured on sines and Gaussians,
     their sum is 1 to 10 times the largest true error for the degrees 3 and 5, and up to 30 times for 7; more for higher

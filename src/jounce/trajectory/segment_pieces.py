@@ -47,7 +47,7 @@ class Segment:
     Examples
     --------
     >>> import jounce as jn
-    >>> jn.Segment("cycloidal", duration=0.5, by=0.02).profile
+    >>> jn.laws.Segment("cycloidal", duration=0.5, by=0.02).profile
     'cycloidal'
     """
 

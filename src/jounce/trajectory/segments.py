@@ -57,10 +57,10 @@ class SegmentedMotion(SplineMotion):
     Examples
     --------
     >>> import jounce as jn
-    >>> lift = jn.SegmentedMotion([
-    ...     jn.Segment("dwell", 1.0),
-    ...     jn.Segment("cycloidal", 2.0, to=0.03),
-    ...     jn.Segment("polynomial_3_4_5", 1.0, to=0.0),
+    >>> lift = jn.laws.SegmentedMotion([
+    ...     jn.laws.Segment("dwell", 1.0),
+    ...     jn.laws.Segment("cycloidal", 2.0, to=0.03),
+    ...     jn.laws.Segment("polynomial_3_4_5", 1.0, to=0.0),
     ... ], beyond="repeat")
     >>> [round(float(x), 12) for x in lift(jn.Jet.variable(6.0, order=1)).derivatives()]
     [0.015, 0.03]
@@ -74,7 +74,7 @@ class SegmentedMotion(SplineMotion):
     def __init__(self, segments: Sequence[Segment], initial: Value = 0.0, start: Value = 0.0, beyond: str = "hold"):
         check_choice("beyond", beyond, BEYOND, TrajectoryError)
         if not isinstance(segments, Sequence) or not segments:
-            raise TrajectoryError("must be a list of at least one jn.Segment", name="segments", value=segments)
+            raise TrajectoryError("must be a list of at least one jn.laws.Segment", name="segments", value=segments)
         for k, segment in enumerate(segments):
             _check_segment(segment, f"segments[{k}]")
         self.recipe = Untraced((tuple(segments), initial, start, beyond))
@@ -184,7 +184,7 @@ class SegmentedMotion(SplineMotion):
         Examples
         --------
         >>> import jounce as jn
-        >>> law = jn.SegmentedMotion([jn.Segment("harmonic", 1.0, to=2.0)])
+        >>> law = jn.laws.SegmentedMotion([jn.laws.Segment("harmonic", 1.0, to=2.0)])
         >>> instants, jumps = law.jumps(2)
         >>> jumps[2].round(6).tolist()  # acceleration, at the beginning and at the end
         [9.869604, 9.869604]
@@ -223,7 +223,7 @@ def _array(values: Any) -> Numbers:
 def _check_segment(segment: Any, name: str) -> None:
     """Raise TrajectoryError for what a segment lacks, or has too much."""
     if not isinstance(segment, Segment):
-        raise TrajectoryError("must be a jn.Segment", name=name, value=segment)
+        raise TrajectoryError("must be a jn.laws.Segment", name=name, value=segment)
     check_name("profile", segment.profile, SEGMENT_PROFILES, TrajectoryError, name=f"{name}.profile")
     given = [key for key in ("to", "by") if getattr(segment, key) is not None]
     if segment.profile == "dwell" and given:

@@ -95,8 +95,9 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
     Examples
     --------
     >>> import jounce as jn
-    >>> law = jn.SegmentedMotion([jn.Segment("cycloidal", 0.5, by=0.1), jn.Segment("dwell", 0.5)], beyond="advance")
-    >>> found = jn.continuity(law, 0.0, 2.0)
+    >>> segments = [jn.laws.Segment("cycloidal", 0.5, by=0.1), jn.laws.Segment("dwell", 0.5)]
+    >>> law = jn.laws.SegmentedMotion(segments, beyond="advance")
+    >>> found = jn.laws.continuity(law, 0.0, 2.0)
     >>> found.smoothness, [(x.order, x.count, x.instant) for x in found.derivatives if x.count]
     (2, [(3, 5, 0.0)])
     """
@@ -136,7 +137,7 @@ def knots(law: AbstractMotion, first: float, last: float) -> Float[np.ndarray, "
     Examples
     --------
     >>> import jounce as jn
-    >>> law = jn.SegmentedMotion([jn.Segment("dwell", 0.5), jn.Segment("cycloidal", 0.5, by=0.1)])
+    >>> law = jn.laws.SegmentedMotion([jn.laws.Segment("dwell", 0.5), jn.laws.Segment("cycloidal", 0.5, by=0.1)])
     >>> knots(law, 0.0, 2.0).tolist()
     [0.5, 1.0]
     """
@@ -161,7 +162,7 @@ def known_jumps(
     Examples
     --------
     >>> import jounce as jn
-    >>> instants, sizes, all_of_them = known_jumps(jn.PiecewiseMotion(["t", "2*t - 1"], until=[1.0]), 0.0, 2.0, 2)
+    >>> instants, sizes, all_of_them = known_jumps(jn.laws.PiecewiseMotion(["t", "2*t - 1"], until=[1.0]), 0.0, 2.0, 2)
     >>> instants.tolist(), sizes[:, 0].tolist(), all_of_them  # expressions may have kinks of their own
     ([1.0], [0.0, 1.0, 0.0], False)
     """

@@ -41,7 +41,7 @@ class TrapezoidalMotion(SplineMotion):
     Examples
     --------
     >>> import jounce as jn
-    >>> law = jn.TrapezoidalMotion(0.0, 4.0, velocity=1.0, acceleration=1.0, jerk=1.0)
+    >>> law = jn.laws.TrapezoidalMotion(0.0, 4.0, velocity=1.0, acceleration=1.0, jerk=1.0)
     >>> law.switches.tolist()
     [0.0, 1.0, 1.0, 2.0, 4.0, 5.0, 5.0, 6.0]
     >>> [float(x) for x in law(jn.Jet.variable(3.0, order=3)).derivatives()]

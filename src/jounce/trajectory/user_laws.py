@@ -47,9 +47,9 @@ def read_laws(tree: Any) -> Any:
     >>> import jounce as jn
     >>> from jounce.trajectory.user_laws import read_laws
     >>> gain = [2.0]
-    >>> first = read_laws(jn.FunctionMotion(lambda t: gain[0] * t))
+    >>> first = read_laws(jn.laws.FunctionMotion(lambda t: gain[0] * t))
     >>> gain[0] = 3.0
-    >>> second = read_laws(jn.FunctionMotion(lambda t: gain[0] * t))
+    >>> second = read_laws(jn.laws.FunctionMotion(lambda t: gain[0] * t))
     >>> import jax
     >>> jax.tree.structure(first) == jax.tree.structure(second)
     True

@@ -56,7 +56,7 @@ def derivative_unit(unit: str, order: int) -> str:
 
 
 def time_axes(instants: Float[Numbers, " time"], levels: int) -> dict[str, Any]:
-    """Return the axes of an array of a quantity and its derivatives at instants, s, labelled for `xarray`."""
+    """Return the axes of an array of a quantity and its derivatives at instants, s, labeled for `xarray`."""
     orders = {"long_name": "order of the time derivative"}
     return {
         "time": ("time", instants, {"units": "s", "long_name": "time"}),

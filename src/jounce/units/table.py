@@ -55,7 +55,7 @@ LONG = tuple(
     for prefix in ("", "milli", "centi", "micro", "kilo")
     for ending in ("", "s")
 )
-"""Units written out, which pint knows, for the suggestion of one that is misspelt."""
+"""Units written out, which pint knows, for the suggestion of one that is misspelled."""
 
 
 def nearest_unit(name: str) -> str:

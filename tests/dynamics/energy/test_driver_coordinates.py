@@ -63,7 +63,7 @@ def laws():
 FORMS = {  # the others, and their rates, are judged with the closed loop
     "lagrange": lambda system, *q: lagrange(system, *q),
     "mangeron": lambda system, *q: mangeron_nielsen(system, *q),
-    "energy_slope": lambda system, *q: jn.energy_slope(system, *q, m=1, order=2),
+    "energy_slope": lambda system, *q: jn.energy.energy_slope(system, *q, m=1, order=2),
 }
 
 
@@ -130,31 +130,31 @@ def test_balances_of_a_closed_loop():
     for function in (newton_euler, virtual_work):
         assert (np.abs(function(heavy, rates=2)[..., 0] - inertia) <= 1e-12 * scale).all()
     weight = gravity_forces(heavy, rates=2)[..., 0]
-    power = jn.potential_energy(heavy)[:, 1]  # gravity takes what the driver gives to lift
+    power = jn.energy.potential_energy(heavy)[:, 1]  # gravity takes what the driver gives to lift
     np.testing.assert_allclose(weight[:, 0] * 3 * np.cos(3 * TIMES), power, rtol=0, atol=1e-12)
-    with pytest.raises(jn.MechanismError, match="order 5"):
+    with pytest.raises(jn.errors.MechanismError, match="order 5"):
         newton_euler(heavy, rates=3)
 
 
 @pytest.mark.slow
 def test_numbers_are_refused_as_those_of_a_mechanism():
     for call in (
-        lambda: jn.acceleration_energy(sled(), order=-1),
-        lambda: jn.energy_terms(sled(), order=99),
-        lambda: jn.energy_slope(sled(), m=-1),
+        lambda: jn.energy.acceleration_energy(sled(), order=-1),
+        lambda: jn.energy.energy_terms(sled(), order=99),
+        lambda: jn.energy.energy_slope(sled(), m=-1),
         lambda: lagrange(sled(), rates=-1),
         lambda: newton_euler(sled(), rates=-1),
     ):
-        with pytest.raises(jn.MechanismError, match="whole number"):
+        with pytest.raises(jn.errors.MechanismError, match="whole number"):
             call()
 
 
 @pytest.mark.slow
 def test_what_is_refused():
     free = jn.Mechanism(space="planar", bodies={"puck": jn.Body([0, 0], mass=1.0, inertia=1.0)}, joints={})
-    with pytest.raises(jn.MechanismError, match="do not prescribe all"):
+    with pytest.raises(jn.errors.MechanismError, match="do not prescribe all"):
         lagrange(jn.simulate(free, [0.0, 0.1], order=2))
-    with pytest.raises(jn.MechanismError, match="coordinates already"):
+    with pytest.raises(jn.errors.MechanismError, match="coordinates already"):
         lagrange(sled(), np.zeros((3, 2)))
-    with pytest.raises(jn.RobotError, match="q"):
+    with pytest.raises(jn.errors.RobotError, match="q"):
         lagrange(robot())

@@ -320,7 +320,7 @@ def test_equations_078_and_079_theorem_of_kinetic_energy():
 
 
 def slopes(robot, q, link, m):
-    """Return d r^(n) / d q_j^(m) of the centre of mass of a link for all n, (n, 3, joints).
+    """Return d r^(n) / d q_j^(m) of the center of mass of a link for all n, (n, 3, joints).
 
     The n-th derivative is linear in the m-th derivative of a coordinate where n < 2 m, and m is taken so large.
     """
@@ -439,16 +439,16 @@ def test_spatial_mechanism_against_point_masses():
 
 @pytest.mark.parametrize("order", [-1, True])
 def test_an_order_that_is_none(order):
-    with pytest.raises(jn.RobotError, match="order: must be a whole number from 0"):
+    with pytest.raises(jn.errors.RobotError, match="order: must be a whole number from 0"):
         acceleration_energy(arm(), [[0.0], [1.0], [2.0]], order=order)
 
 
 def test_too_few_derivatives():
-    with pytest.raises(jn.RobotError, match="needs derivatives of q to order 3"):
+    with pytest.raises(jn.errors.RobotError, match="needs derivatives of q to order 3"):
         acceleration_energy(arm(), [[0.0], [1.0], [2.0]], order=2)
-    with pytest.raises(jn.RobotError, match="shape"):
+    with pytest.raises(jn.errors.RobotError, match="shape"):
         acceleration_energy(arm(), [0.0, 1.0, 2.0])
-    with pytest.raises(jn.MechanismError, match="needs a motion solved to order 6"):
+    with pytest.raises(jn.errors.MechanismError, match="needs a motion solved to order 6"):
         acceleration_energy(four_bar()[1], order=5)
     with pytest.raises(ValueError, match="needs order 3"):
         library(Short, 2)
@@ -464,16 +464,16 @@ class Short:
 
 def test_a_mechanism_without_masses_or_with_half_of_them():
     motion = jn.solve(jn.load(example("four_bar")), TIMES[:1], order=2)
-    with pytest.raises(jn.MechanismError, match="no body has a mass"):
+    with pytest.raises(jn.errors.MechanismError, match="no body has a mass"):
         acceleration_energy(motion)
     half = jn.solve(with_masses("four_bar", {"crank": {"inertia": 0.1}}), TIMES[:1], order=2)
-    with pytest.raises(jn.MechanismError, match="an inertia needs a mass beside it"):
+    with pytest.raises(jn.errors.MechanismError, match="an inertia needs a mass beside it"):
         kinetic_energy(half)
 
 
-def test_energies_of_a_motion_are_labelled():
+def test_energies_of_a_motion_are_labeled():
     _, motion = four_bar()
-    energy, potential = kinetic_energy(motion), jn.potential_energy(motion)
+    energy, potential = kinetic_energy(motion), jn.energy.potential_energy(motion)
     assert energy.total.dims == potential.dims == ("time", "derivative")
     assert energy.translation.dims == ("time", "derivative", "body")
     assert energy.rotation.body.values.tolist() == list(motion.mechanism.bodies)
@@ -490,5 +490,5 @@ def test_total_energy_is_nan_where_the_motion_was_not_solved():
 
 
 def test_a_motion_has_coordinates_of_its_own():
-    with pytest.raises(jn.MechanismError, match="has its coordinates already"):
+    with pytest.raises(jn.errors.MechanismError, match="has its coordinates already"):
         kinetic_energy(four_bar()[1], [[0.0], [1.0]])

@@ -69,8 +69,8 @@ def found_terms(terms, sample, body=-1):
 @ABOUT
 @pytest.mark.parametrize("p", range(3))
 def test_equations_083_to_106_each_term_is_its_integral(p, about):
-    terms = jn.energy_terms(free_body(), state(), order=p, about=about)
-    whole = jn.acceleration_energy(free_body(), state(), order=p)
+    terms = jn.energy.energy_terms(free_body(), state(), order=p, about=about)
+    whole = jn.energy.acceleration_energy(free_body(), state(), order=p)
     for sample in range(SAMPLES):
         right = Fields(sample, p, about).terms()
         size = np.abs(right).max()
@@ -90,7 +90,7 @@ def test_equations_083_to_106_each_term_is_its_integral(p, about):
 @ABOUT
 def test_equations_084_to_106_closed_forms_of_first_order(about):
     robot = free_body()
-    terms, motion = jn.energy_terms(robot, state(), about=about), jn.forward_kinematics(robot, state(), "body")
+    terms, motion = jn.energy.energy_terms(robot, state(), about=about), jn.forward_kinematics(robot, state(), "body")
     inertia = robot.links["body"].inertia
     for sample in range(SAMPLES):
         R, w, e = motion.rotation[sample, 0], *motion.angular_velocity[sample, :2]
@@ -115,7 +115,7 @@ def test_equations_084_to_106_closed_forms_of_first_order(about):
 def test_equations_089_to_102_of_one_particle():
     rho, mass = np.array([0.3, -0.2, 0.5]), 0.7
     robot = free_body(rho[None], np.array([mass]))
-    terms, motion = jn.energy_terms(robot, state(), about="origin"), jn.forward_kinematics(robot, state(), "body")
+    terms, motion = jn.energy.energy_terms(robot, state(), about="origin"), jn.forward_kinematics(robot, state(), "body")
     for sample in range(SAMPLES):
         R, w, e = motion.rotation[sample, 0], *motion.angular_velocity[sample, :2]
         arm = R @ rho
@@ -137,10 +137,10 @@ def test_equations_089_to_102_of_one_particle():
 def test_equations_073_and_075_kinetic_energy_is_of_translation_and_of_rotation():
     slides = random_robot(9, 3, tree=False, prismatic=1.0, fixed=0.0)
     q = np.random.default_rng(1).uniform(-1, 1, (2, 3, 3))
-    still = jn.energy_terms(slides, q, order=0)
+    still = jn.energy.energy_terms(slides, q, order=0)
     assert not still.rotation.any()  # the factor of 74 for translation alone is 0
     robot = random_robot(9, 3, tree=False, prismatic=0.3, fixed=0.0)
-    terms = jn.energy_terms(robot, q, order=0)
+    terms = jn.energy.energy_terms(robot, q, order=0)
     motions = [
         jn.forward_kinematics(robot, q, link, robot.links[link].inertia.center_of_mass) for link in robot.moving_links
     ]
@@ -152,18 +152,18 @@ def test_equations_073_and_075_kinetic_energy_is_of_translation_and_of_rotation(
         turning = np.einsum("si,sij,sj->s", w, tensor, w) / 2
         np.testing.assert_allclose(terms.rotation[:, 0, k], turning, rtol=0, atol=1e-13)
     close(terms.total, (terms.translation + terms.rotation).sum(axis=-1))  # 75
-    close(terms.total, jn.kinetic_energy(robot, q, drives=False).total)
+    close(terms.total, jn.energy.kinetic_energy(robot, q, drives=False).total)
 
 
 @pytest.mark.slow
 def test_equations_110_to_115_of_a_robot_and_rates():
     robot = random_robot(7, 3, prismatic=0.4, fixed=0.4)
     q = np.random.default_rng(3).uniform(-1, 1, (1, 5, 3))
-    terms = jn.energy_terms(robot, q)
+    terms = jn.energy.energy_terms(robot, q)
     assert terms.bodies == robot.moving_links
     step = 1e-3
     later = np.stack([sum(q[:, k + j] * step**j / [1, 1, 2, 6, 24][j] for j in range(5 - k)) for k in range(5)], axis=1)
-    after = jn.energy_terms(robot, later)
+    after = jn.energy.energy_terms(robot, later)
     for name in ("translation", "leading", "mixed", "remaining"):
         value, moved = getattr(terms, name), getattr(after, name)
         series = value[:, 0] + step * value[:, 1] + step**2 / 2 * value[:, 2]
@@ -186,13 +186,13 @@ def test_equations_110_to_115_of_a_robot_and_rates():
 
 def test_a_plane_mechanism():
     masses, motion = four_bar()
-    terms = jn.energy_terms(motion)
+    terms = jn.energy.energy_terms(motion)
     for k, (name, body) in enumerate(masses.items()):
         angle = np.asarray(motion.angle(name))
         close(terms.leading[:, 0, k], body["inertia"] / 2 * angle[:, 2] ** 2)
         close(terms.remaining[:, 0, k], body["inertia"] / 2 * angle[:, 1] ** 4)
         np.testing.assert_allclose(terms.mixed[:, 0, k], 0.0, atol=1e-13 * np.abs(terms.leading).max())
-    close(terms.total, jn.acceleration_energy(motion).total, rel=1e-12)
+    close(terms.total, jn.energy.acceleration_energy(motion).total, rel=1e-12)
 
 
 @pytest.mark.slow
@@ -202,8 +202,8 @@ def test_a_mechanism_in_space():
     coupler = list(motion.mechanism.bodies).index("coupler")
     spin = np.asarray(motion.angular_velocity("coupler", "body"))
     for about in ("origin", "center_of_mass"):
-        terms = jn.energy_terms(motion, about=about)
-        close(terms.total, jn.acceleration_energy(motion).total, rel=1e-12)
+        terms = jn.energy.energy_terms(motion, about=about)
+        close(terms.total, jn.energy.acceleration_energy(motion).total, rel=1e-12)
     w, e = spin[:, 0], spin[:, 1]
     I = np.diag([0.02, 0.03, 0.04])  # noqa: E741 - the usual letter
     close(terms.leading[:, 0, coupler], np.einsum("si,ij,sj->s", e, I, e) / 2, rel=1e-12)
@@ -211,5 +211,5 @@ def test_a_mechanism_in_space():
 
 
 def test_a_point_that_is_none():
-    with pytest.raises(jn.RobotError, match="center_of_mass"):
-        jn.energy_terms(free_body(), state(), about="centre")
+    with pytest.raises(jn.errors.RobotError, match="center_of_mass"):
+        jn.energy.energy_terms(free_body(), state(), about="center")

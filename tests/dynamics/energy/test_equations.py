@@ -173,7 +173,7 @@ def test_high_rates():
 def test_slopes_of_energies_of_a_tree_against_differences_in_fifty_digits(p, n, m, rates):
     """The slopes come from energies of point masses, so that nothing of the closed form is in them."""
     robot, q = tree(), np.random.default_rng(2).uniform(-1, 1, (p + n + rates + 2, 3))
-    found = jn.energy_slope(robot, q, m=m, order=p, rate=n, rates=rates)
+    found = jn.energy.energy_slope(robot, q, m=m, order=p, rate=n, rates=rates)
     with mp.workdps(50):
         made, rows = in_digits(robot, q)
         right = negrean_dynamics.slope(made, rows, p, n, m)
@@ -219,7 +219,7 @@ def test_derivatives_that_drop_out_are_not_asked_for():
     robot, q, right = case(tree)
     agree(gibbs_appell(robot, q[:, :3], m=6), right[:, :1])
     agree(higher_order(robot, q[:, :5], 3)[:, None], right[:, 2:3])
-    assert not jn.energy_slope(robot, q[:, :1], m=4, order=1, rate=1).any()
+    assert not jn.energy.energy_slope(robot, q[:, :1], m=4, order=1, rate=1).any()
 
 
 # what the paper prints, in fifty digits
@@ -241,14 +241,14 @@ def off(found, right):
 @pytest.mark.slow
 def test_equation_130_by_slopes_of_energies():
     robot, q, right = case(chain, order=8, samples=1)
-    first = jn.energy_slope(robot, q, m=3, order=2) + jn.energy_slope(robot, q, m=1, order=1) / 2
+    first = jn.energy.energy_slope(robot, q, m=3, order=2) + jn.energy.energy_slope(robot, q, m=1, order=1) / 2
     agree(first, right[:, 1:2])
 
 
 @pytest.mark.slow
 def test_equation_131_by_slopes_of_energies():
     robot, q, right = case(chain, order=8, samples=1)
-    third, second, zeroth = (jn.energy_slope(robot, q, m=m, order=p) for p, m in ((3, 4), (2, 2), (1, 0)))
+    third, second, zeroth = (jn.energy.energy_slope(robot, q, m=m, order=p) for p, m in ((3, 4), (2, 2), (1, 0)))
     agree(third + 2 / 3 * second + zeroth, right[:, 2:3], 1e-12)  # a third is printed
 
 
@@ -398,21 +398,21 @@ def test_equations_144_to_146_torques_about_one_axis():
 @pytest.mark.parametrize("form", [lagrange, mangeron_nielsen, gibbs_appell, newton_euler, virtual_work])
 def test_too_few_derivatives_or_no_number_of_rates(form):
     robot, q, _ = case(tree)
-    with pytest.raises(jn.RobotError, match="needs derivatives of q to order"):
+    with pytest.raises(jn.errors.RobotError, match="needs derivatives of q to order"):
         form(robot, q[:, :4], 2)
-    with pytest.raises(jn.RobotError, match=r"rates.*must be a whole number, 0 or greater"):
+    with pytest.raises(jn.errors.RobotError, match=r"rates.*must be a whole number, 0 or greater"):
         form(robot, q, -1)
 
 
 def test_an_order_of_derivatives_that_is_too_small():
     robot, q, _ = case(tree)
-    with pytest.raises(jn.RobotError, match=r"m.*must be a whole number, 1 or greater"):
+    with pytest.raises(jn.errors.RobotError, match=r"m.*must be a whole number, 1 or greater"):
         mangeron_nielsen(robot, q, m=0)
-    with pytest.raises(jn.RobotError, match=r"m.*must be a whole number, 2 or greater"):
+    with pytest.raises(jn.errors.RobotError, match=r"m.*must be a whole number, 2 or greater"):
         gibbs_appell(robot, q, m=1)
-    with pytest.raises(jn.RobotError, match=r"m.*must be a whole number, 4 or greater"):
+    with pytest.raises(jn.errors.RobotError, match=r"m.*must be a whole number, 4 or greater"):
         higher_order(robot, q, 3, 3)
-    with pytest.raises(jn.RobotError, match=r"k.*must be a whole number, 1 or greater"):
+    with pytest.raises(jn.errors.RobotError, match=r"k.*must be a whole number, 1 or greater"):
         higher_order(robot, q, 0)
-    with pytest.raises(jn.RobotError, match="needs derivatives of q to order 9"):
+    with pytest.raises(jn.errors.RobotError, match="needs derivatives of q to order 9"):
         higher_order(robot, q, 8)

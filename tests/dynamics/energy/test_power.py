@@ -35,7 +35,7 @@ def disc(share):
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [1.0, 0.5])
 def test_power_that_grows_evenly_balances_at_every_order(share):
-    balance = jn.power_balance(jn.solve(disc(share), TIME, order=6))
+    balance = jn.energy.power_balance(jn.solve(disc(share), TIME, order=6))
     assert (abs(balance["residual"]) <= 1e-14 * balance["scale"]).all()
     acceleration = -share * 9.81 * math.sin(SLOPE) * 2 / 3
     wanted = 1.5 * MASS * acceleration**2 * TIME  # of kinetic energy: 3/4 m v^2
@@ -48,7 +48,7 @@ def test_a_force_bent_by_a_billionth_shows(monkeypatch):
     motion = jn.solve(disc(0.5), TIME, order=6)
     exact = MotionForces.driver_force
     monkeypatch.setattr(MotionForces, "driver_force", lambda self, name: exact(self, name) * (1 + 1e-9))
-    balance = jn.power_balance(motion)
+    balance = jn.energy.power_balance(motion)
     share = (abs(balance["residual"]) / balance["scale"].where(balance["scale"] > 0, 1.0)).values
     assert (share[1:, :2] > 1e-12).all()  # hundred times rounding; the rates above are zero
 
@@ -67,8 +67,8 @@ def arm(**applied):
 ASKED = {
     "driver": lambda motion: jn.driver_force(motion, "turn"),
     "reaction": lambda motion: jn.joint_reaction(motion, "pin"),
-    "force": lambda motion: jn.applied_force(motion, "f"),
-    "power": jn.power_balance,
+    "force": lambda motion: jn.dynamics.applied_force(motion, "f"),
+    "power": jn.energy.power_balance,
 }
 
 

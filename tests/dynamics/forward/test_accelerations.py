@@ -44,7 +44,7 @@ def derivatives(coefficients):
 
 
 def close(found, wanted, tolerance):
-    """Assert that derivatives agree, order first, by the size of each order, or of its neighbours where it vanishes."""
+    """Assert that derivatives agree, order first, by the size of each order, or of its neighbors where it vanishes."""
     found, wanted = (np.asarray(x, float).reshape(len(x), -1) for x in (found, wanted))
     size = np.max(np.abs(wanted), axis=1)
     growth = np.maximum.accumulate(size)  # derivatives grow from order to order
@@ -67,7 +67,7 @@ def test_double_pendulum_at_random_states(seed):
 
 
 def swinging_plates(values):
-    """Two bodies in the plane, with their centres of mass off the line of their pins, driven by a spring and weight."""
+    """Two bodies in the plane, with their centers of mass off the line of their pins, driven by a spring and weight."""
     return jn.Mechanism(
         space="planar",
         gravity=[0.4, -9.81],
@@ -122,7 +122,7 @@ def test_multipliers_and_rates_in_space():
             "top": jn.Body([0.1, 0.2, 0.3], None, [0.6, -0.4, 0.5, 0.48], 1.3, [0.02, 0.03, 0.04], [0.1, 0.2, -0.3])
         },
         joints={"tip": spatial.Spherical(("ground", "top"), [0.1, 0.2, 0.3], [0.0, 0.0, 0.0])},
-        outputs={"centre": jn.PointOutput("top", [0.1, 0.2, -0.3])},
+        outputs={"center": jn.outputs.PointOutput("top", [0.1, 0.2, -0.3])},
     )
     ready = consistent_start(top, 0.0)
     state = ready.state._replace(spin=spin[:, None, None])  # a ball lets the body turn as it will
@@ -217,7 +217,7 @@ def test_inverse_after_forward_returns_the_applied_torque_and_its_rates():
     moved = jn.simulate(free, [0.0], order=order).outputs["crank"][0]
     names = [f"c{k}" for k in range(order + 1)]
     series = " + ".join(f"{name}*t**{k}" for k, name in enumerate(names))
-    law = jn.ExpressionMotion(series, dict(zip(names, moved / factorial(np.arange(order + 1)), strict=True)))
+    law = jn.laws.ExpressionMotion(series, dict(zip(names, moved / factorial(np.arange(order + 1)), strict=True)))
     driver = drivers.CoordinateDriver(bodies, "angle", law)
     driven = dataclasses.replace(free, forces={}, initial={}, drivers={"motor": driver})
     found = np.asarray(jn.driver_force(jn.solve(driven, [0.0], order=order), "motor"))[0]
@@ -249,7 +249,7 @@ def test_multiplier_rates_are_those_of_differenced_multipliers():
     rate = np.concatenate([found.acceleration[1].reshape(6), found.multipliers[1, :, 0]])
 
     def errors(near, far):
-        """Return the errors of differences of order 2 and 4, from neighbours at one and two widths."""
+        """Return the errors of differences of order 2 and 4, from neighbors at one and two widths."""
         first = (values[:, near[1]] - values[:, near[0]]) / (steps[near[1]] - steps[near[0]])
         second = (values[:, far[1]] - values[:, far[0]]) / (steps[far[1]] - steps[far[0]])
         return np.linalg.norm(first - rate), np.linalg.norm((4 * first - second) / 3 - rate)

@@ -79,7 +79,7 @@ def test_the_rest_is_assembled_where_conditions_repeat_each_other_or_give_the_si
 
 @pytest.mark.slow
 def test_velocities_left_open_are_those_of_least_kinetic_energy():
-    # a double rod: only the tip's vertical speed is told; minimise 1/2 v^T M v by hand over the two rates
+    # a double rod: only the tip's vertical speed is told; minimize 1/2 v^T M v by hand over the two rates
     rods = jn.Mechanism(
         space="planar",
         bodies={
@@ -118,9 +118,9 @@ def reach(law):
 def test_a_speed_in_the_limit_of_a_reach_is_refused():
     """The tip is 1.8 m away, as far as it goes; rounding hides that no joint can move it on, at 1e7 rad/s or more."""
     words = "dead point.*only 4 equations are independent and lower, upper can move"
-    refused(jn.MobilityError, words, two_rods(r=reach("1.8 + 0.3*t")))
-    refused(jn.MobilityError, words, two_rods(r=reach("1.8 - 0.3*t")))
-    refused(jn.MobilityError, words, two_rods(r=reach("1.8")))
+    refused(jn.errors.MobilityError, words, two_rods(r=reach("1.8 + 0.3*t")))
+    refused(jn.errors.MobilityError, words, two_rods(r=reach("1.8 - 0.3*t")))
+    refused(jn.errors.MobilityError, words, two_rods(r=reach("1.8")))
     near = consistent_start(two_rods(r=reach("1.8 - 1e-8 - 0.3*t")), 0.0).state
     bend = np.sqrt(2e-8 * 1.8 / 0.8)  # 1.8^2 - r^2 = 2 * 0.8 (1 - cos bend)
     wanted = 0.3 * 1.8 / (0.8 * np.sin(bend))
@@ -142,17 +142,19 @@ def body(**changes):
 )
 def test_gravity_is_a_vector_of_the_space(gravity):
     mechanism = dataclasses.replace(simple_pendulum(0.3, 1.0), gravity=gravity)
-    refused(jn.MechanismError, "gravity: must be (a vector of 2 numbers|finite)", mechanism)
+    refused(jn.errors.MechanismError, "gravity: must be (a vector of 2 numbers|finite)", mechanism)
 
 
 def test_a_parameter_is_a_real_number():
     mechanism = dataclasses.replace(simple_pendulum(0.3, 1.0), parameters={"a": np.complex128(1 + 1j)})
-    refused(jn.MechanismError, "parameters.a: a parameter must be one finite number, got", mechanism)
+    refused(jn.errors.MechanismError, "parameters.a: a parameter must be one finite number, got", mechanism)
 
 
 def test_masses_that_determine_no_motion():
-    refused(jn.MechanismError, "bodies: no body has a mass; the equations", body(mass=None))
-    refused(jn.MechanismError, "bodies.bob.inertia: the body can move but has no inertia", body(center_of_mass=None))
+    refused(jn.errors.MechanismError, "bodies: no body has a mass; the equations", body(mass=None))
+    refused(
+        jn.errors.MechanismError, "bodies.bob.inertia: the body can move but has no inertia", body(center_of_mass=None)
+    )
 
 
 def test_a_massless_body_that_can_move_is_named():
@@ -160,7 +162,7 @@ def test_a_massless_body_that_can_move_is_named():
     bodies = {**mechanism.bodies, "dust": jn.Body([0, 0])}
     pin = planar.Revolute(("ground", "dust"), [0, 0], [0, 0])
     loose = dataclasses.replace(mechanism, bodies=bodies, joints={**mechanism.joints, "pin": pin})
-    refused(jn.MechanismError, "bodies.dust.(mass|inertia): the body can move but has no", loose)
+    refused(jn.errors.MechanismError, "bodies.dust.(mass|inertia): the body can move but has no", loose)
 
 
 def machine(mass, inertia, size=1.0):
@@ -177,7 +179,7 @@ def machine(mass, inertia, size=1.0):
             "P": planar.Revolute(("ground", "disc"), [2 * size, 0], [0, 0]),
         },
         forces={"spring": forces.TorsionalSpring(("ground", "disc"), stiffness=100 * inertia, angle=1.0)},
-        outputs={"disc": jn.AngleOutput("disc")},
+        outputs={"disc": jn.outputs.AngleOutput("disc")},
     )
 
 
@@ -196,13 +198,17 @@ def test_a_wheel_of_which_only_the_inertia_is_known_turns():
         bodies={"wheel": jn.Body([0, 0], mass=0.0, inertia="J")},
         joints={"O": planar.Revolute(("ground", "wheel"), [0, 0], [0, 0])},
         forces={"motor": forces.Torque(("ground", "wheel"), "0.3*t")},
-        outputs={"turn": jn.AngleOutput("wheel")},
+        outputs={"turn": jn.outputs.AngleOutput("wheel")},
         parameters={"J": 0.1},
     )
     exact = [4.0, 6.0, 6.0, 3.0]  # 0.3 t^3 / (6 J) at 2 s
     runs = jn.simulate_batch(wheel, {"J": [0.05, 0.1]}, [0.0, 2.0], order=3).outputs["turn"][:, -1]
     assert runs == pytest.approx(np.outer([2, 1], exact), rel=1e-14)
-    refused(jn.MechanismError, "bodies.wheel.mass: the body can move but has no", dataclasses.replace(wheel, joints={}))
+    refused(
+        jn.errors.MechanismError,
+        "bodies.wheel.mass: the body can move but has no",
+        dataclasses.replace(wheel, joints={}),
+    )
 
 
 def turning(moments):
@@ -213,7 +219,9 @@ def turning(moments):
 
 
 def test_a_body_that_can_move_with_negative_kinetic_energy_is_named():
-    refused(jn.MechanismError, r"bodies\.x\.inertia: .* kinetic energy is negative", turning([-0.01, 0.02, 0.02]))
+    refused(
+        jn.errors.MechanismError, r"bodies\.x\.inertia: .* kinetic energy is negative", turning([-0.01, 0.02, 0.02])
+    )
     assert consistent_start(turning([0.01, 0.02, 0.05]), 0.0).mobility  # no real body, but its motion is determined
 
 
@@ -223,14 +231,16 @@ def test_a_massless_link_at_the_end_of_a_robot_has_to_be_driven_in_a_simulation(
     links = [jn.Link("base"), jn.Link("arm", inertia), jn.Link("tip")]
     joints = [jn.Joint("b", "base", "arm", axis=[0, 1, 0]), jn.Joint("c", "arm", "tip", position=[0.5, 0, 0])]
     robot = jn.Robot("end", links, joints, strict=False)
-    refused(jn.MechanismError, r"bodies\.tip\.mass: the body can move but has no mass", robot.mechanism())
+    refused(jn.errors.MechanismError, r"bodies\.tip\.mass: the body can move but has no mass", robot.mechanism())
     assert consistent_start(robot.mechanism(drivers={"c": 0.3}), 0.0).mobility.startswith("1 degree of freedom")
 
 
 def test_conditions_that_contradict_each_other_or_the_joints():
-    refused(jn.AssemblyError, "initial.a, initial.b stay open", with_initial(a=turn("bob", 0.3), b=turn("bob", 1.0)))
+    refused(
+        jn.errors.AssemblyError, "initial.a, initial.b stay open", with_initial(a=turn("bob", 0.3), b=turn("bob", 1.0))
+    )
     shifted = drivers.CoordinateDriver(("ground", "bob"), "x", 1.0)
-    refused(jn.AssemblyError, "joints, drivers and initial conditions contradict", with_initial(a=shifted))
+    refused(jn.errors.AssemblyError, "joints, drivers and initial conditions contradict", with_initial(a=shifted))
 
 
 @pytest.mark.slow
@@ -238,13 +248,13 @@ def test_conditions_drivers_and_joints_that_say_the_same_twice_must_agree():
     begun = jn.simulate(with_initial(a=turn("bob", 0.3), b=turn("bob", "0.3")), [0.0], order=1)
     assert begun.mobility.startswith("1 degree of freedom")
     driven = dataclasses.replace(simple_pendulum(0.3, 1.0), drivers={"a": turn("bob", 0.3)})
-    refused(jn.AssemblyError, "redundant constraints contradict each other in their rates", driven)
+    refused(jn.errors.AssemblyError, "redundant constraints contradict each other in their rates", driven)
     both = dataclasses.replace(driven, drivers={"a": turn("bob", 0.3), "b": turn("bob", 0.3)}, initial={})
     assert jn.simulate(both, [0.0], order=1).mobility.startswith("no degree of freedom")
 
 
 def test_a_joint_is_no_initial_condition():
-    with pytest.raises(jn.MechanismError, match=r"initial\.pin: .*driver"):
+    with pytest.raises(jn.errors.MechanismError, match=r"initial\.pin: .*driver"):
         with_initial(pin=planar.Revolute(("ground", "bob"), [0, 0], [0, 0]))
 
 
@@ -265,7 +275,7 @@ def test_a_joint_is_no_initial_condition():
 )
 def test_options_are_checked_before_any_computing(keywords, words, monkeypatch):
     monkeypatch.setattr(sys.modules[jn.simulate.__module__], "consistent_start", None)
-    with pytest.raises(jn.MechanismError, match=words):
+    with pytest.raises(jn.errors.MechanismError, match=words):
         jn.simulate(simple_pendulum(), **{"time": [0.0, 1.0], **keywords})
 
 

@@ -100,7 +100,7 @@ def pendulums(count, length=0.1):
         gravity=[0, -9.81],
         bodies={name: jn.Body((k * way).tolist(), **rod) for k, name in enumerate(names[1:])},
         joints={f"pin{k}": jn.planar.Revolute(pair, [length * (k > 0), 0], [0, 0]) for k, pair in enumerate(pairs)},
-        outputs={"tip": jn.PointOutput(names[-1], [length, 0])},
+        outputs={"tip": jn.outputs.PointOutput(names[-1], [length, 0])},
     )
 
 
@@ -140,7 +140,7 @@ def test_a_long_chain_goes_through_fronts_and_balances_its_weight():
     np.testing.assert_allclose(np.sum(0.1 * moment + inertia), np.sum(0.1 * weight), rtol=1e-11)
 
 
-def test_where_a_body_has_many_neighbours_the_matrix_stays_dense():
+def test_where_a_body_has_many_neighbors_the_matrix_stays_dense():
     count = 40
     spokes = {f"rod{k}": jn.Body([0, 0]) for k in range(count)}
     hub = jn.Mechanism(

@@ -281,7 +281,7 @@ STATES = {
 def test_states_that_do_not_fit_are_refused(state, named):
     joints = {"O": jn.planar.Revolute(("ground", "arm"), [0, 0], [0, 0])}
     mechanism = jn.Mechanism(space="planar", bodies={"arm": jn.Body([0, 0])}, joints=joints)
-    with pytest.raises(jn.MechanismError, match=named):
+    with pytest.raises(jn.errors.MechanismError, match=named):
         jn.constraint_equations(mechanism, state)
 
 
@@ -289,7 +289,7 @@ def test_a_law_without_a_value_is_refused():
     joints = {"O": jn.planar.Revolute(("ground", "arm"), [0, 0], [0, 0])}
     driver = jn.drivers.CoordinateDriver(("ground", "arm"), "angle", motion="sqrt(t - 1)")
     mechanism = jn.Mechanism(space="planar", bodies={"arm": jn.Body([0, 0])}, joints=joints, drivers={"turn": driver})
-    with pytest.raises(jn.MechanismError, match="turn"):
+    with pytest.raises(jn.errors.MechanismError, match="turn"):
         jn.constraint_equations(mechanism, {"arm": {"position": [0, 0], "angle": 0}}, time=0.5)
 
 
@@ -315,7 +315,7 @@ def rotated(p, v):
 
 
 def flap():
-    """Return a solid on a skew hinge, its frame drawn anyhow, its centre of mass and inertia off every axis."""
+    """Return a solid on a skew hinge, its frame drawn anyhow, its center of mass and inertia off every axis."""
     tensor = np.array([[0.30, 0.02, -0.05], [0.02, 0.40, 0.03], [-0.05, 0.03, 0.35]])
     axis = rotated(TURN * [1, -1, -1, -1], SKEW)
     return jn.Mechanism(
@@ -361,7 +361,7 @@ def test_equations_of_motion_in_space_with_frames_drawn_anyhow():
 
 
 def test_a_time_without_a_state_is_refused(linkage_motion):
-    with pytest.raises(jn.MechanismError, match=r"time.*0\.2"):
+    with pytest.raises(jn.errors.MechanismError, match=r"time.*0\.2"):
         jn.constraint_equations(linkage_motion, time=0.2)
 
 

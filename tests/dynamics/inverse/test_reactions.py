@@ -21,7 +21,7 @@ BANK = {"slider_crank": 4, "epicyclic": 4, "rolling_disc": 4, "rack_pinion": 3, 
 @pytest.mark.parametrize("name", BANK)
 def test_power_balance_of_the_bank(name):
     # the two sides share no code but the motion; 2e-15 measured
-    balance = jn.power_balance(jn.solve(massed_example(name), TIME, order=BANK[name]))
+    balance = jn.energy.power_balance(jn.solve(massed_example(name), TIME, order=BANK[name]))
     left = (np.abs(balance["residual"]) / balance["scale"].max("time")).max("time")
     assert float(balance["scale"].min()) > 0
     assert (left <= 3e-13).all(), left.values
@@ -128,10 +128,10 @@ def test_long_motions_in_chunks_agree_with_short_ones():
 def test_outputs_are_the_functions_with_as_many_derivatives_as_the_motion():
     mechanism = massed_example("slider_crank")
     outputs = {
-        "T": jn.DriverTorqueOutput("theta"),
-        "B": jn.JointForceOutput("B", "crank"),
-        "M": jn.JointTorqueOutput("guide", point=["r", 0.0]),
-        "x": jn.PointOutput("slider", [0.0, 0.0]),
+        "T": jn.outputs.DriverTorqueOutput("theta"),
+        "B": jn.outputs.JointForceOutput("B", "crank"),
+        "M": jn.outputs.JointTorqueOutput("guide", point=["r", 0.0]),
+        "x": jn.outputs.PointOutput("slider", [0.0, 0.0]),
     }
     with_outputs = dataclasses.replace(mechanism, outputs=outputs)
     motion = jn.solve(with_outputs, TIME, order=2)
@@ -154,7 +154,7 @@ def test_instants_that_fail_are_nan():
     force = jn.driver_force(motion, "reach")
     assert np.isfinite(force[:2]).all()
     assert np.isnan(force[2]).all()
-    assert np.isnan(jn.power_balance(motion)["residual"][2]).all()
+    assert np.isnan(jn.energy.power_balance(motion)["residual"][2]).all()
 
 
 @pytest.mark.parametrize(
@@ -169,9 +169,13 @@ def test_instants_that_fail_are_nan():
             "unknown frame, got 'local'; did you mean 'global'? valid: arm, body",
         ),
         (lambda m: jn.joint_reaction(m, "pin", point=[1.0]), "outputs.pin.point", "must be a vector of 2 numbers"),
-        (lambda m: jn.applied_force(m, "spring"), "force", "no force has this name, got 'spring'; none is defined"),
         (
-            lambda m: m.evaluate(jn.DriverForceOutput("turn")),
+            lambda m: jn.dynamics.applied_force(m, "spring"),
+            "force",
+            "no force has this name, got 'spring'; none is defined",
+        ),
+        (
+            lambda m: m.evaluate(jn.outputs.DriverForceOutput("turn")),
             "quantity",
             "prescribes an angle, so that it exerts a torque",
         ),
@@ -190,9 +194,9 @@ def test_a_mechanism_without_masses_and_forces_says_so():
     with pytest.raises(MechanismError, match="forces need masses, and no body has one"):
         jn.driver_force(motion, "turn")
     with pytest.raises(MechanismError, match="forces need masses"):
-        jn.power_balance(motion)
+        jn.energy.power_balance(motion)
     with pytest.raises(MechanismError, match=r"outputs\.T\.driver: forces need masses"):
-        dataclasses.replace(arm(), outputs={"T": jn.DriverTorqueOutput("turn")})
+        dataclasses.replace(arm(), outputs={"T": jn.outputs.DriverTorqueOutput("turn")})
 
 
 def test_a_force_that_is_not_finite_is_named_with_its_time():

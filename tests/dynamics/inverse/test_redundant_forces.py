@@ -84,7 +84,7 @@ def test_elastic_hinges_share_the_weight_by_their_stiffness(share):
 
 @pytest.mark.slow
 def test_stiffnesses_that_decide_nothing_are_refused():
-    with pytest.raises(jn.MechanismError, match="leaves reactions open"):
+    with pytest.raises(jn.errors.MechanismError, match="leaves reactions open"):
         jn.joint_reaction(jn.solve(door(redundant_reactions={"turn": {"torque": 1.0}}), TIMES, order=3), "lower")
 
 
@@ -99,14 +99,14 @@ def test_stiffnesses_that_decide_nothing_are_refused():
     ],
 )
 def test_bad_choices_are_refused(wanted, message):
-    with pytest.raises(jn.MechanismError, match=message):
+    with pytest.raises(jn.errors.MechanismError, match=message):
         door(redundant_reactions=wanted)
 
 
 @pytest.mark.slow
 def test_a_stiffness_must_be_above_zero():
     motion = jn.solve(door(redundant_reactions={"lower": {"force": "0*3"}}), TIMES, order=4)
-    with pytest.raises(jn.MechanismError, match=r"redundant_reactions\.lower\.force: .*stiffness"):
+    with pytest.raises(jn.errors.MechanismError, match=r"redundant_reactions\.lower\.force: .*stiffness"):
         jn.joint_reaction(motion, "lower")
 
 
@@ -160,7 +160,7 @@ def test_a_four_bar_of_hinges_in_space_has_the_forces_of_the_plane(law):
     if law:
         expected, found = (jn.driver_force(motion, "turn").values for motion in (flat, wide))
         np.testing.assert_allclose(found, expected, rtol=1e-10)
-        energies = [jn.kinetic_energy(motion).total.values for motion in (flat, wide)]
+        energies = [jn.energy.kinetic_energy(motion).total.values for motion in (flat, wide)]
         np.testing.assert_allclose(*energies, rtol=1e-11)
     else:
         assert "1 degree of freedom" in wide.mobility
@@ -179,7 +179,7 @@ def test_initial_conditions_that_say_the_same_twice_must_agree_in_their_rates(ra
         np.testing.assert_allclose(state.attitude[:, 0, 0], half, rtol=1e-12, atol=1e-15)
         np.testing.assert_allclose(state.spin[:, 0, 0], [0, 0, 0.2], rtol=1e-12, atol=1e-15)
     else:
-        with pytest.raises(jn.AssemblyError, match=r"contradict .*rates .*initial\.two"):
+        with pytest.raises(jn.errors.AssemblyError, match=r"contradict .*rates .*initial\.two"):
             jn.simulate(begun, [0.0])
 
 

@@ -173,7 +173,7 @@ def test_a_peak_between_coarse_samples_is_found():
     t = np.linspace(0.0, 2.0, 12)
     samples = np.sin(4 * t)
     trajectory = JointTrajectory.from_samples(t, samples[:, None], ["pin"])
-    with pytest.warns(jn.SampleWarning, match="samples of 'pin' do not support"):
+    with pytest.warns(jn.errors.SampleWarning, match="samples of 'pin' do not support"):
         report = check_limits(pendulum(velocity=5.0), trajectory)
     spline = make_interp_spline(t, samples, k=5)
     row = rows_of(report)["pin", "velocity"]
@@ -268,7 +268,7 @@ def test_samples_that_support_the_jerk_raise_no_warning():
     ],
 )
 def test_what_a_trajectory_cannot_be(laws, message):
-    with pytest.raises(jn.TrajectoryError) as raised:
+    with pytest.raises(jn.errors.TrajectoryError) as raised:
         check_limits(pendulum(velocity=1.0), JointTrajectory(laws, start=0.0, stop=1.0))
     assert message in str(raised.value)
 
@@ -278,21 +278,21 @@ def test_joints_that_follow_or_are_fixed_are_no_part_of_a_trajectory():
     links = [jn.Link(name, body) for name in "abcd"]
     joints = [
         jn.Joint("one", "a", "b"),
-        jn.Joint("two", "b", "c", mimic=jn.Mimic("one")),
+        jn.Joint("two", "b", "c", mimic=jn.robot.Mimic("one")),
         jn.Joint("three", "c", "d", "fixed"),
     ]
     robot = jn.Robot("fingers", links, joints)
     for name, message in [("two", "this joint follows one"), ("three", "this joint is fixed")]:
-        with pytest.raises(jn.TrajectoryError, match=message):
+        with pytest.raises(jn.errors.TrajectoryError, match=message):
             check_limits(robot, JointTrajectory({"one": "t", name: "t"}, start=0.0, stop=1.0))
-        with pytest.raises(jn.RobotError, match=message):
+        with pytest.raises(jn.errors.RobotError, match=message):
             check_limits(robot, JointTrajectory({"one": "t"}, start=0.0, stop=1.0), {name: jn.Limits(velocity=1.0)})
 
 
 def gripper(**limits):
     """Return a jaw, and a tip that slides back three times as fast from half a metre, with limits of its own."""
     body, lead = jn.Inertia(1.0), jn.Limits(lower=0.0, upper=1.0, velocity=1.0, deceleration=4.0, effort=9.0)
-    tip = jn.Joint("tip", "jaw", "tip", "prismatic", mimic=jn.Mimic("jaw", -3.0, 0.5), limits=jn.Limits(**limits))
+    tip = jn.Joint("tip", "jaw", "tip", "prismatic", mimic=jn.robot.Mimic("jaw", -3.0, 0.5), limits=jn.Limits(**limits))
     joints = [jn.Joint("jaw", "base", "jaw", "prismatic", limits=lead), tip]
     return jn.Robot("gripper", [jn.Link("base"), jn.Link("jaw", body), jn.Link("tip", body)], joints)
 
@@ -305,14 +305,14 @@ def test_limits_of_joints_that_follow_bind_the_joint_that_they_follow():
     broken = {row.quantity: (row.value, row.limit) for row in report.broken}
     assert (broken["position"], broken["velocity"]) == (pytest.approx((0.6, 0.5)), pytest.approx((0.4, 0.2)))
     assert gripper().limits["jaw"] == robot.joints["jaw"].limits
-    with pytest.raises(jn.RobotError, match="jaw: no coordinate keeps the range"):
+    with pytest.raises(jn.errors.RobotError, match="jaw: no coordinate keeps the range"):
         check_limits(gripper(lower=1.0), JointTrajectory({"jaw": "t"}, start=0.0, stop=1.0))
 
 
 def chain_of_followers():
     """Return a robot whose joint c follows b, which follows a: q_b = -2 q_a, q_c = 3 q_b + 0.3 = 0.3 - 6 q_a."""
     body = jn.Inertia(1.0, [0.1, 0, 0], [0.1, 0.1, 0.1])
-    follows = leaders({"b": jn.Mimic("a", -2.0), "c": jn.Mimic("b", 3.0, 0.3)})
+    follows = leaders({"b": jn.robot.Mimic("a", -2.0), "c": jn.robot.Mimic("b", 3.0, 0.3)})
     own = {"a": {}, "b": {"velocity": 1.0}, "c": {"lower": -0.9, "upper": 1.5, "jerk": 12.0}}
     joints = [jn.Joint(x, "base", x, mimic=follows.get(x), limits=jn.Limits(**own[x])) for x in "abc"]
     return jn.Robot("chain", [jn.Link("base"), *(jn.Link(x, body) for x in "abc")], joints)
@@ -334,7 +334,7 @@ def test_limits_that_are_given_leave_those_of_joints_that_follow():
         "jerk": 2.4 / 2.0,
     }
     assert ratios == pytest.approx(expected, rel=1e-10)
-    with pytest.raises(jn.RobotError, match="a: no coordinate keeps the range"):
+    with pytest.raises(jn.errors.RobotError, match="a: no coordinate keeps the range"):
         check_limits(robot, trajectory, {"a": jn.Limits(lower=0.5)})
 
 
@@ -349,11 +349,11 @@ def test_a_joint_held_still_stands_where_those_that_follow_it_may_be():
 
 def test_limits_and_times_are_checked():
     trajectory = JointTrajectory({"pin": "t"}, start=0.0, stop=1.0)
-    with pytest.raises(jn.RobotError, match=r"no moving joint of .* has this name, got 'pim'"):
+    with pytest.raises(jn.errors.RobotError, match=r"no moving joint of .* has this name, got 'pim'"):
         check_limits(pendulum(), trajectory, {"pim": jn.Limits()})
     for times in ([], [0.0, 0.0], [[0.0]], ["x"], [np.nan]):
-        with pytest.raises(jn.TrajectoryError, match="times: must be"):
+        with pytest.raises(jn.errors.TrajectoryError, match="times: must be"):
             check_limits(pendulum(), trajectory, times=times)
     rigid = jn.Robot("block", [jn.Link("base", jn.Inertia(1.0))], [])
-    with pytest.raises(jn.RobotError, match="no moving joint"):
+    with pytest.raises(jn.errors.RobotError, match="no moving joint"):
         check_limits(rigid, trajectory)

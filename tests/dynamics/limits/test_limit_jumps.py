@@ -12,12 +12,14 @@ NOTHING = set()
 RATES = {"jerk", "torque rate"}
 FORCES = RATES | {"acceleration", "torque"}
 HARMONIC, CYCLOIDAL = (
-    jn.SegmentedMotion([jn.Segment("dwell", 0.5), jn.Segment(name, 2.0, by=0.5), jn.Segment("dwell", 0.5)])
+    jn.laws.SegmentedMotion(
+        [jn.laws.Segment("dwell", 0.5), jn.laws.Segment(name, 2.0, by=0.5), jn.laws.Segment("dwell", 0.5)]
+    )
     for name in ("harmonic", "cycloidal")
 )
-EVEN = jn.SegmentedMotion([jn.Segment("constant_velocity", 0.5, by=by) for by in (0.5, 1.0)])
-PARABOLAS = jn.PiecewiseMotion(["2*t**2", "t - 0.125", "1 - 2*(1.25 - t)**2"], [0.25, 1.0])
-KNEE = jn.PiecewiseMotion(["t", "2*t - 0.5"], [0.5])
+EVEN = jn.laws.SegmentedMotion([jn.laws.Segment("constant_velocity", 0.5, by=by) for by in (0.5, 1.0)])
+PARABOLAS = jn.laws.PiecewiseMotion(["2*t**2", "t - 0.125", "1 - 2*(1.25 - t)**2"], [0.25, 1.0])
+KNEE = jn.laws.PiecewiseMotion(["t", "2*t - 0.5"], [0.5])
 TIMES = np.linspace(0.0, 1.0, 21)
 
 
@@ -37,25 +39,25 @@ def infinite(robot, laws, start, stop, **options):
     return {(row.joint, row.quantity): row.time for row in rows}
 
 
-@pytest.mark.filterwarnings("ignore::jounce.SampleWarning")
+@pytest.mark.filterwarnings("ignore::jounce.errors.SampleWarning")
 @pytest.mark.parametrize(
     "law, start, stop, quantities, time",
     [
         (PARABOLAS, 0.0, 1.25, RATES, 0.25),
         (KNEE, 0.0, 1.0, FORCES, 0.5),
-        (jn.PiecewiseMotion(["0", "1"], [0.5]), 0.0, 1.0, FORCES | {"velocity"}, 0.5),
+        (jn.laws.PiecewiseMotion(["0", "1"], [0.5]), 0.0, 1.0, FORCES | {"velocity"}, 0.5),
         (EVEN, 0.0, 1.0, FORCES, 0.5),
         (HARMONIC, 0.0, 3.0, RATES, 0.5),
         (CYCLOIDAL, 0.0, 3.0, NOTHING, None),
-        (jn.RestToRestMotion(0.0, 1.0, 1.0, 0.5, rest=1), 0.0, 2.0, RATES, 0.5),
-        (jn.RestToRestMotion(0.0, 1.0, 1.0, 0.5, rest=2), 0.0, 2.0, NOTHING, None),
-        (jn.TrapezoidalMotion(0.0, 1.0, 1.0, 2.0, 10.0, start_time=0.2), 0.0, 2.0, NOTHING, None),
-        (jn.FollowingMotion(HARMONIC, "2*t"), 0.0, 1.5, RATES, 0.25),
-        (jn.FollowingMotion(jn.ExpressionMotion("sin(t)"), KNEE), 0.0, 1.0, FORCES, 0.5),
-        (jn.SplineMotion(TIMES, np.sin(3 * TIMES), 1), 0.0, 1.0, FORCES, 0.05),
-        (jn.SplineMotion(TIMES, np.sin(3 * TIMES), 2), 0.0, 1.0, RATES, 0.075),  # whose knots are between samples
-        (jn.SplineMotion(TIMES, np.sin(3 * TIMES), 3), 0.0, 1.0, NOTHING, None),
-        (jn.SplineMotion(TIMES, np.sin(3 * TIMES), 5, beyond="hold"), 0.0, 2.0, FORCES, 1.0),
+        (jn.laws.RestToRestMotion(0.0, 1.0, 1.0, 0.5, rest=1), 0.0, 2.0, RATES, 0.5),
+        (jn.laws.RestToRestMotion(0.0, 1.0, 1.0, 0.5, rest=2), 0.0, 2.0, NOTHING, None),
+        (jn.laws.TrapezoidalMotion(0.0, 1.0, 1.0, 2.0, 10.0, start_time=0.2), 0.0, 2.0, NOTHING, None),
+        (jn.laws.FollowingMotion(HARMONIC, "2*t"), 0.0, 1.5, RATES, 0.25),
+        (jn.laws.FollowingMotion(jn.laws.ExpressionMotion("sin(t)"), KNEE), 0.0, 1.0, FORCES, 0.5),
+        (jn.laws.SplineMotion(TIMES, np.sin(3 * TIMES), 1), 0.0, 1.0, FORCES, 0.05),
+        (jn.laws.SplineMotion(TIMES, np.sin(3 * TIMES), 2), 0.0, 1.0, RATES, 0.075),  # whose knots are between samples
+        (jn.laws.SplineMotion(TIMES, np.sin(3 * TIMES), 3), 0.0, 1.0, NOTHING, None),
+        (jn.laws.SplineMotion(TIMES, np.sin(3 * TIMES), 5, beyond="hold"), 0.0, 2.0, FORCES, 1.0),
         ("abs(t - 0.98765)", 0.0, 2.0, FORCES, 0.98765),
         ("(t - 0.98765)*abs(t - 0.98765)", 0.0, 2.0, RATES, 0.98765),
         ("(t - 0.98765)**2*abs(t - 0.98765)", 0.0, 2.0, NOTHING, None),
@@ -78,9 +80,9 @@ def test_a_jump_at_an_end_or_at_no_instant_that_is_looked_at_is_none():
 
 def test_a_jump_of_rounding_is_none():
     # the second law meets the first to rounding: sin(1)^2 and half of 1 - cos(2)
-    law = jn.PiecewiseMotion(["sin(t)**2", "0.5 - 0.5*cos(2*t)"], [1.0])
+    law = jn.laws.PiecewiseMotion(["sin(t)**2", "0.5 - 0.5*cos(2*t)"], [1.0])
     assert infinite(arm(), law, 0.0, 2.0) == {}
-    assert infinite(arm(), jn.PiecewiseMotion(["0.1*t*3", "0.3*t"], [1.0]), 0.0, 2.0) == {}
+    assert infinite(arm(), jn.laws.PiecewiseMotion(["0.1*t*3", "0.3*t"], [1.0]), 0.0, 2.0) == {}
 
 
 def test_only_what_is_limited_and_infinite_is_broken():
@@ -98,7 +100,7 @@ def test_only_what_is_limited_and_infinite_is_broken():
     [(["t", "2*t - 0.5"], False), (["-t", "0.5 - 2*t"], False), (["2*t", "t + 0.5"], True), (["t", "1 - t"], True)],
 )
 def test_a_limit_of_deceleration_alone_is_for_what_slows_down(laws, broken):
-    found = infinite(arm(deceleration=5.0), jn.PiecewiseMotion(laws, [0.5]), 0.0, 1.0)
+    found = infinite(arm(deceleration=5.0), jn.laws.PiecewiseMotion(laws, [0.5]), 0.0, 1.0)
     assert set(found) == ({("j", "acceleration")} if broken else set())
 
 
@@ -131,7 +133,7 @@ def test_damping_makes_a_jump_of_velocity_one_of_torque():
 
 def test_two_joints_may_jump_at_instants_of_their_own():
     robot, limits = crossed()
-    laws = {"x": PARABOLAS, "y": jn.PiecewiseMotion(["t", "2*t - 0.4"], [0.4]), "turn": "1"}
+    laws = {"x": PARABOLAS, "y": jn.laws.PiecewiseMotion(["t", "2*t - 0.4"], [0.4]), "turn": "1"}
     found = infinite(robot, laws, 0.0, 1.25, limits=limits)
     assert {key: found[key] for key in found if key[0] == "x"} == {("x", "jerk"): 0.25, ("x", "force rate"): 0.25}
     assert {time for (name, _), time in found.items() if name == "y"} == {0.4}
@@ -139,7 +141,7 @@ def test_two_joints_may_jump_at_instants_of_their_own():
 
 
 def test_a_joint_that_follows_jumps_with_its_leader():
-    follow = jn.Joint("f", "base", "b", mimic=jn.Mimic("j", -2.0), limits=jn.Limits(jerk=1e3))
+    follow = jn.Joint("f", "base", "b", mimic=jn.robot.Mimic("j", -2.0), limits=jn.Limits(jerk=1e3))
     joints = [jn.Joint("j", "base", "a"), follow]
     robot = jn.Robot("pair", [jn.Link("base"), jn.Link("a", ROD), jn.Link("b", ROD)], joints)
     assert infinite(robot, PARABOLAS, 0.0, 1.25) == {("j", "jerk"): 0.25}

@@ -22,8 +22,8 @@ def motion(law, stop=1.0):
     return jn.JointTrajectory({"a": law, "b": 0.0}, 0.0, stop)
 
 
-LINE = jn.HermiteMotion([0.0, 1.0], [[0.0], [1.57]])
-RISE = jn.HermiteMotion([0.0, 1.0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+LINE = jn.laws.HermiteMotion([0.0, 1.0], [[0.0], [1.57]])
+RISE = jn.laws.HermiteMotion([0.0, 1.0], [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 @pytest.mark.parametrize(
@@ -87,8 +87,11 @@ def test_only_limits_there_are_can_be_broken():
 
 
 def test_limits_of_other_kinds_are_broken_too():
-    limits = jn.MotionLimits(
-        points=(jn.PointLimits("upper", acceleration=99.0, point=(0.3, 0.0, 0.0)), jn.PointLimits("base", speed=1.0)),
+    limits = jn.planning.MotionLimits(
+        points=(
+            jn.planning.PointLimits("upper", acceleration=99.0, point=(0.3, 0.0, 0.0)),
+            jn.planning.PointLimits("base", speed=1.0),
+        ),
         jounce={"a": 1e6},
         varying={"a": {"jerk": lambda q: 1e6 + 0 * q}},
     )
@@ -119,7 +122,7 @@ def test_what_is_retimed_rests_unless_rates_are_given():
 
 def test_a_trajectory_that_starts_in_motion_is_repaired_only_if_it_is_handed_over():
     robot = arm(velocity=2.0, acceleration=5.0)
-    with pytest.raises(jn.TrajectoryError, match=r"does not rest at its start.*acceleration of a is infinite"):
+    with pytest.raises(jn.errors.TrajectoryError, match=r"does not rest at its start.*acceleration of a is infinite"):
         jn.retime(robot, motion("1.9*t"), repair=True)
     assert jn.retime(robot, motion("1.9*t"), repair=True, hand_over=True).report.kept
 
@@ -128,6 +131,6 @@ def test_doubts_about_degrees_are_told_once():
     swing = jn.JointTrajectory.from_samples(
         np.linspace(0, 1, 50), 45 * np.sin(3 * np.linspace(0, 1, 50))[:, None], ["a"]
     )
-    with pytest.warns(jn.UnitWarning) as told:
-        check_motion(arm(), swing, jn.MotionLimits(jounce={"a": 1e9}))
+    with pytest.warns(jn.errors.UnitWarning) as told:
+        check_motion(arm(), swing, jn.planning.MotionLimits(jounce={"a": 1e9}))
     assert len(told) == 1

@@ -30,11 +30,11 @@ def slow(*values):
 @pytest.mark.slow
 @pytest.mark.parametrize("size, turn", [slow(1.0, 0.0), (1e-3, 0.7), slow(1e3, -1.1)])
 def test_sprung_four_bar_swings_as_its_lagrange_equation_in_mpmath(size, turn):
-    small = jn.linearise(sprung_four_bar(size, turn))
+    small = jn.linearize(sprung_four_bar(size, turn))
     angle = small.equilibrium.poses["crank"]["angle"] - turn
     _, square = SprungFourBar().rest(angle)
-    assert isinstance(small, jn.Linearisation)
-    assert isinstance(small.modes, jn.Modes)
+    assert isinstance(small, jn.Linearization)
+    assert isinstance(small.modes, jn.dynamics.Modes)
     assert small.modes.angular_frequencies[0] ** 2 == pytest.approx(square, rel=1e-12)
     assert small.modes.frequencies[0] == pytest.approx(np.sqrt(square) / (2 * np.pi), rel=1e-12)
     assert small.modes.damping_ratios.tolist() == [0.0]
@@ -43,7 +43,7 @@ def test_sprung_four_bar_swings_as_its_lagrange_equation_in_mpmath(size, turn):
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 6])
 def test_hanging_chain_has_the_frequencies_of_its_closed_form(count):
-    small = jn.linearise(hanging_chain(count))
+    small = jn.linearize(hanging_chain(count))
     mass, length, gravity = 0.7, 0.3, 9.81
     left = np.arange(count, 0, -1) * mass
     matrix = length**2 * np.array([[left[max(i, j)] for j in range(count)] for i in range(count)])
@@ -56,7 +56,7 @@ def test_hanging_chain_has_the_frequencies_of_its_closed_form(count):
 @pytest.mark.slow
 def test_chain_of_masses_has_its_matrices_and_complex_modes():
     masses, springs, dampers = [1.0, 2.0, 3.0], [5.0, 7.0, 9.0, 4.0], [0.1, 0.4, 0.0, 0.3]
-    small = jn.linearise(chain(masses, springs, dampers, right_wall=True))
+    small = jn.linearize(chain(masses, springs, dampers, right_wall=True))
 
     def tridiagonal(values):
         a, b, c, d = values
@@ -89,7 +89,7 @@ def test_chain_of_masses_has_its_matrices_and_complex_modes():
 @pytest.mark.slow
 def test_free_chain_keeps_its_rigid_motion_at_zero_with_and_without_damping():
     for dampers in ([0.0] * 3, [0.0, 0.5, 0.2]):
-        small = jn.linearise(chain([1.0, 2.0, 3.0], [0.0, 9.0, 4.0], dampers))
+        small = jn.linearize(chain([1.0, 2.0, 3.0], [0.0, 9.0, 4.0], dampers))
         assert small.modes.kinds == ("rigid", "oscillation", "oscillation")
         assert small.modes.frequencies[0] == 0.0
         assert np.allclose(small.modes.shapes[:, 0], 1 / np.sqrt(6.0))
@@ -98,15 +98,15 @@ def test_free_chain_keeps_its_rigid_motion_at_zero_with_and_without_damping():
 
 @pytest.mark.slow
 def test_overdamped_and_toppling_motions_are_told():
-    slow = jn.linearise(chain([2.0], [3.0], [50.0]))
+    slow = jn.linearize(chain([2.0], [3.0], [50.0]))
     roots = np.roots([2.0, 50.0, 3.0])
     assert np.allclose(np.sort(slow.modes.eigenvalues.real), np.sort(roots), rtol=1e-12)
     assert slow.modes.kinds == ("creeping", "creeping")
     assert slow.modes.damping_ratios.tolist() == [1.0, 1.0]
-    top = jn.linearise(jn.equilibrium(hanging_chain(1), method="newton").mechanism)
+    top = jn.linearize(jn.equilibrium(hanging_chain(1), method="newton").mechanism)
     assert top.modes.kinds == ("oscillation",)
     upright = dataclasses.replace(hanging_chain(1), gravity=[0, 9.81])
-    toppling = jn.linearise(jn.equilibrium(upright, method="newton"))
+    toppling = jn.linearize(jn.equilibrium(upright, method="newton"))
     assert toppling.modes.kinds == ("growing",)
     assert toppling.modes.eigenvalues[0] == pytest.approx(np.sqrt(9.81 / 0.3), rel=1e-12)
 
@@ -116,7 +116,7 @@ def test_overdamped_and_toppling_motions_are_told():
 def test_spherical_pendulum_swings_alike_both_ways_in_any_frame(seed):
     axes = np.eye(3) if seed is None else np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
     axes = axes * np.sign(np.linalg.det(axes))
-    small = jn.linearise(spherical_pendulum(axes))
+    small = jn.linearize(spherical_pendulum(axes))
     expected = np.sqrt(1.3 * 9.81 * 0.8 / (1.3 * 0.8**2 + 0.05))
     assert small.modes.kinds == ("rigid", "oscillation", "oscillation")
     assert np.allclose(small.modes.angular_frequencies[1:], expected, rtol=1e-11)
@@ -126,7 +126,7 @@ def test_spherical_pendulum_swings_alike_both_ways_in_any_frame(seed):
 @pytest.mark.slow
 def test_small_oscillation_of_a_simulation_has_the_frequency_and_shape_of_the_mode():
     mechanism = sprung_four_bar()
-    small = jn.linearise(mechanism)
+    small = jn.linearize(mechanism)
     period = 1 / small.modes.frequencies[0]
     rest = small.equilibrium.poses["crank"]["angle"]
     start = {"q": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", f"{float(rest + 1e-5)!r}")}
@@ -147,7 +147,7 @@ def test_a_steady_cone_precesses_as_its_closed_form_wherever_it_is():
     sine, cosine = np.sin(0.6), np.cos(0.6)
     motion = jn.simulate(mechanism, [0.0, 0.5], order=2)
     for instant, names in ((0.0, None), (0.31, ["turn", "fall"])):
-        small = jn.linearise(motion, instant, coordinates=names)
+        small = jn.linearize(motion, instant, coordinates=names)
         assert small.modes.kinds == ("rigid", "oscillation")
         expected = rate * np.sqrt(sine**2 + (2 * cosine * sine) ** 2 / (sine**2 + 1e-9 / (1.3 * 0.8**2)))
         assert small.modes.angular_frequencies[1] == pytest.approx(expected, rel=1e-9)
@@ -161,7 +161,7 @@ FOUR_BAR = {"crank": lambda law: jn.drivers.CoordinateDriver(("ground", "crank")
 def accelerations(mechanism, makers, place, rates):
     """Second derivatives of outputs at a state that is prescribed by them, and the simulation."""
     initial = {  # values apart from the law, so that all states are compiled once
-        f"start_{name}": make(jn.ExpressionMotion("place + rate*t", {"place": float(y), "rate": float(v)}))
+        f"start_{name}": make(jn.laws.ExpressionMotion("place + rate*t", {"place": float(y), "rate": float(v)}))
         for (name, make), y, v in zip(makers.items(), place, rates, strict=True)
     }
     motion = jn.simulate(dataclasses.replace(mechanism, initial=initial), [0.0], order=2)
@@ -170,10 +170,10 @@ def accelerations(mechanism, makers, place, rates):
 
 @pytest.mark.slow
 def test_derivatives_of_the_acceleration_are_those_of_differences_of_forward_dynamics():
-    mechanism = dataclasses.replace(sprung_four_bar(), outputs={"crank": jn.AngleOutput("crank")})
+    mechanism = dataclasses.replace(sprung_four_bar(), outputs={"crank": jn.outputs.AngleOutput("crank")})
     makers, place, rates, step = FOUR_BAR, np.array([2.1]), np.array([3.3]), 1e-5
     _, motion = accelerations(mechanism, makers, place, rates)
-    small = jn.linearise(motion, 0.0, coordinates=list(makers))
+    small = jn.linearize(motion, 0.0, coordinates=list(makers))
     count = len(place)
     for part, found in ((0, small.A[count:, :count]), (1, small.A[count:, count:])):
         for k in range(count):
@@ -187,7 +187,7 @@ def test_derivatives_of_the_acceleration_are_those_of_differences_of_forward_dyn
 @pytest.mark.slow
 def test_other_coordinates_give_the_same_motions():
     mechanism = sprung_four_bar()
-    chosen = [jn.linearise(mechanism, coordinates=[name]) for name in ("crank.angle", "psi", "C_x", "coupler.y")]
+    chosen = [jn.linearize(mechanism, coordinates=[name]) for name in ("crank.angle", "psi", "C_x", "coupler.y")]
     assert [small.units for small in chosen] == [("rad",), ("rad",), ("m",), ("m",)]
     assert np.ptp([small.modes.frequencies[0] for small in chosen]) < 1e-12
     crank, rocker = chosen[:2]
@@ -200,7 +200,7 @@ def test_released_driver_is_a_coordinate_and_its_torque_an_input():
     driven = sprung_four_bar(driven=True)
     held = jn.equilibrium(driven)
     assert held.degrees_of_freedom == 0
-    small = jn.linearise(held, release="drive")
+    small = jn.linearize(held, release="drive")
     assert (small.coordinates, small.inputs, small.held) == (("drive",), ("drive", "spring", "turn"), ())
     step = 1e-4
 
@@ -213,7 +213,7 @@ def test_released_driver_is_a_coordinate_and_its_torque_an_input():
     assert small.stiffness[0, 0] == pytest.approx(slope, rel=1e-6)
     assert small.input_matrix[0, 0] == 1.0
     motion = jn.solve(driven, [0.0], order=2)
-    assert jn.linearise(motion, release=["drive"]).mass[0, 0] == pytest.approx(small.mass[0, 0], rel=1e-13)
+    assert jn.linearize(motion, release=["drive"]).mass[0, 0] == pytest.approx(small.mass[0, 0], rel=1e-13)
 
 
 @pytest.mark.slow
@@ -227,9 +227,9 @@ def test_a_shaken_support_passes_on_what_the_closed_form_says():
         joints={name: planar.Prismatic(("ground", name), *rail) for name in ("table", "load")},
         drivers={"shake": jn.drivers.SlideDriver(("ground", "table"), [0, 0], [0, 0], [1, 0], "0.1*sin(t)")},
         forces={"mount": forces.SlideSpring(("table", "load"), [0, 0], [0, 0], [1, 0], k, 1.0, c)},
-        outputs={"x": jn.PointOutput("load", [0, 0])},
+        outputs={"x": jn.outputs.PointOutput("load", [0, 0])},
     )
-    small = jn.linearise(shaker)
+    small = jn.linearize(shaker)
     space = small.state_space(inputs=["shake"], outputs=["x_x"])
     assert space.states == ("load.x", "shake", "load.x_d1", "shake_d1")
     system = scipy.signal.StateSpace(*space[:4])
@@ -244,13 +244,14 @@ def test_a_shaken_support_passes_on_what_the_closed_form_says():
 @pytest.mark.slow
 def test_forces_are_inputs_by_component_and_rates_of_outputs_feed_through():
     shoved = dataclasses.replace(
-        column(1.0), outputs={"w": jn.AngularVelocityOutput("upper"), "tip": jn.PointOutput("upper", [0.5, 0])}
+        column(1.0),
+        outputs={"w": jn.outputs.AngularVelocityOutput("upper"), "tip": jn.outputs.PointOutput("upper", [0.5, 0])},
     )
-    small = jn.linearise(shoved)
+    small = jn.linearize(shoved)
     space = small.state_space(inputs=["push_y", "b"])
     assert small.inputs == ("a", "b", "push_x", "push_y")
     assert space.outputs == ("w", "w_d1", "tip_x", "tip_x_d1", "tip_y", "tip_y_d1")
-    assert isinstance(space, jn.StateSpace)
+    assert isinstance(space, jn.dynamics.StateSpace)
     reach = small.input_matrix[:, small.inputs.index("push_y")]
     assert np.allclose(reach, [0.5, 0.5])
     assert np.allclose(space.D[1], np.linalg.solve(small.mass, np.array([reach, [-1.0, 1.0]]).T)[1])
@@ -266,23 +267,23 @@ def test_bad_input_is_named():
     four_bar = sprung_four_bar(driven=True)
     motion = jn.solve(four_bar, [0.0, 0.1], order=2)
     for call, kind, place in (
-        (lambda: jn.linearise(3), MechanismError, "subject"),
-        (lambda: jn.linearise(pendulum, coordinates=["a"]), MechanismError, "coordinates"),
-        (lambda: jn.linearise(pendulum, coordinates=["a", "lowre.angle"]), MechanismError, "coordinates"),
-        (lambda: jn.linearise(pendulum, coordinates=["a", "upper.angle"]), MechanismError, "coordinates"),
-        (lambda: jn.linearise(pendulum, coordinates=["a", "tip_y"]), MechanismError, "coordinates"),
-        (lambda: jn.linearise(pendulum, release=["a"]), MechanismError, "release"),
-        (lambda: jn.linearise(motion), MechanismError, "time"),
-        (lambda: jn.linearise(motion, 0.05, release="drive"), MechanismError, "time"),
-        (lambda: jn.linearise(jn.equilibrium(pendulum), 1.0), MechanismError, "time"),
-        (lambda: jn.linearise(pendulum).state_space(inputs=["a"]), MechanismError, "inputs"),
-        (lambda: jn.linearise(pendulum).state_space(outputs=["c"]), MechanismError, "outputs"),
+        (lambda: jn.linearize(3), MechanismError, "subject"),
+        (lambda: jn.linearize(pendulum, coordinates=["a"]), MechanismError, "coordinates"),
+        (lambda: jn.linearize(pendulum, coordinates=["a", "lowre.angle"]), MechanismError, "coordinates"),
+        (lambda: jn.linearize(pendulum, coordinates=["a", "upper.angle"]), MechanismError, "coordinates"),
+        (lambda: jn.linearize(pendulum, coordinates=["a", "tip_y"]), MechanismError, "coordinates"),
+        (lambda: jn.linearize(pendulum, release=["a"]), MechanismError, "release"),
+        (lambda: jn.linearize(motion), MechanismError, "time"),
+        (lambda: jn.linearize(motion, 0.05, release="drive"), MechanismError, "time"),
+        (lambda: jn.linearize(jn.equilibrium(pendulum), 1.0), MechanismError, "time"),
+        (lambda: jn.linearize(pendulum).state_space(inputs=["a"]), MechanismError, "inputs"),
+        (lambda: jn.linearize(pendulum).state_space(outputs=["c"]), MechanismError, "outputs"),
     ):
         with pytest.raises(kind) as caught:
             call()
         assert place in caught.value.name
     with pytest.raises(MobilityError, match=r"nothing can move; .*release"):
-        jn.linearise(motion, 0.1)
+        jn.linearize(motion, 0.1)
 
 
 @pytest.mark.slow
@@ -295,11 +296,11 @@ def test_massless_bodies_are_named():
     bodies = {"a": jn.Body([0, 0], mass=1.0, inertia=0.2), "b": jn.Body([1, 0])}
     mechanism = jn.Mechanism(space="planar", bodies=bodies, joints=pins, forces=springs)
     with pytest.raises(MechanismError, match="b can move without moving a mass") as caught:
-        jn.linearise(mechanism)
+        jn.linearize(mechanism)
     assert caught.value.name == "bodies.b.mass"
     bare = dataclasses.replace(mechanism, bodies={"a": jn.Body([0, 0]), "b": jn.Body([1, 0])})
     with pytest.raises(MechanismError, match="no body has a mass; small motions need some"):
-        jn.linearise(bare)
+        jn.linearize(bare)
     assert jn.equilibrium(bare).stability == "indifferent"
 
 
@@ -308,13 +309,13 @@ def test_massless_bodies_are_named():
 def test_stiffness_and_mass_of_a_linkage_are_the_slopes_of_its_energies_along_its_driver(name):
     mechanism = massed_example(name)
     rest = jn.equilibrium(mechanism, without=list(mechanism.drivers))
-    small = jn.linearise(rest, coordinates=["crank.angle"])
+    small = jn.linearize(rest, coordinates=["crank.angle"])
     angle = float(rest.poses["crank"]["angle"])
     drive = jn.drivers.CoordinateDriver(("ground", "crank"), "angle", f"{angle!r} + t")
     driven = dataclasses.replace(rest.placed, drivers={"drive": drive}, outputs={}, time=None)
     motion = jn.solve(driven, [0.0], order=4)
-    potential = jn.potential_energy(motion).values.ravel()
-    kinetic = float(jn.kinetic_energy(motion).total[0, 0])
+    potential = jn.energy.potential_energy(motion).values.ravel()
+    kinetic = float(jn.energy.kinetic_energy(motion).total[0, 0])
     assert abs(potential[1]) < 1e-12 * abs(potential[2])
     assert small.stiffness[0, 0] == pytest.approx(potential[2], rel=1e-11)
     assert small.mass[0, 0] == pytest.approx(2 * kinetic, rel=1e-12)

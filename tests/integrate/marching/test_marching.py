@@ -37,7 +37,7 @@ def test_series_of_the_lowest_orders_find_the_way_too(order):
         bodies={"mass": jn.Body([1, 0], mass=2.0, inertia=1.0)},
         joints={"rail": jn.planar.Prismatic(("ground", "mass"), [0, 0], [0, 0], [1, 0], [1, 0])},
         forces={"spring": jn.forces.Spring(("ground", "mass"), [-1, 0], [0, 0], 8.0, 1.5)},
-        outputs={"x": jn.PointOutput("mass", [0, 0])},
+        outputs={"x": jn.outputs.PointOutput("mass", [0, 0])},
     )
     found = jn.simulate(spring, [0.0, 0.7], order=2, method=jn.Taylor(order), tolerance=1e-10)
     expected = 0.5 + 0.5 * np.cos(2.0 * 0.7)  # x'' = -4 (x - 0.5) from rest at 1

@@ -26,7 +26,7 @@ def sled(**values):
         joints={"rail": planar.Prismatic(("ground", "sled"), *RAIL, [1, 0])},
         forces={"push": forces.SlideForce(("ground", "sled"), *RAIL, LAW)},
         initial={"go": drivers.SlideDriver(("ground", "sled"), *RAIL, "-x0 + v0*t")},
-        outputs={"x": jn.PointOutput("sled", [0, 0])},
+        outputs={"x": jn.outputs.PointOutput("sled", [0, 0])},
     )
 
 
@@ -71,7 +71,7 @@ def test_a_jump_is_refused():
     def place(x0):
         return jn.simulate(sled(J=5.0).with_parameters(x0=x0), [0.0, END], order=1).outputs["x"][-1, 0, 0]
 
-    with pytest.raises(jn.UnsupportedError, match=r"forces\.push.*jumps at t = 0\.2"):
+    with pytest.raises(jn.errors.UnsupportedError, match=r"forces\.push.*jumps at t = 0\.2"):
         jax.grad(place)(0.2)
 
 

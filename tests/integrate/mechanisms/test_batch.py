@@ -33,7 +33,7 @@ def pendulum(**changes):
             "rise": jn.drivers.CoordinateDriver(("ground", "upper"), "angle", motion="rise + rate*t"),
             "hang": jn.drivers.CoordinateDriver(("ground", "lower"), "angle", motion="0.1"),
         },
-        outputs={"tip": jn.PointOutput("lower", ["length", 0]), "angle": jn.AngleOutput("upper")},
+        outputs={"tip": jn.outputs.PointOutput("lower", ["length", 0]), "angle": jn.outputs.AngleOutput("upper")},
     )
 
 
@@ -98,7 +98,7 @@ def test_runs_in_several_chunks():
     ],
 )
 def test_bad_parameters(values, words):
-    with pytest.raises(jn.MechanismError, match=words):
+    with pytest.raises(jn.errors.MechanismError, match=words):
         jn.simulate_batch(pendulum(), values, TIME)
 
 
@@ -118,7 +118,7 @@ def test_a_run_whose_initial_conditions_cannot_be_met_says_so():
             "B": jn.planar.Revolute(("upper", "lower"), [1, 0], [0, 0]),
         },
         initial={"reach": reach},
-        outputs={"away": jn.DistanceOutput(("ground", "lower"), [0, 0], [0.8, 0])},
+        outputs={"away": jn.outputs.DistanceOutput(("ground", "lower"), [0, 0], [0.8, 0])},
     )
     found = jn.simulate_batch(rods, {"r": [1.5, 2.5, 1.8, 1.799999]}, [0.0, 1e-6], order=1)
     assert found.status[:, 0].tolist() == [0, jn.Status.NOT_ASSEMBLED, jn.Status.SINGULAR, 0]

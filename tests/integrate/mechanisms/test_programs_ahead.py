@@ -73,7 +73,7 @@ def test_a_start_that_is_refused_is_told_and_no_further_program_is_begun(made, m
     monkeypatch.setenv("JOUNCE_THREADS", "2")
     pendulum = simple_pendulum(0.3, 1.0)
     other = jn.drivers.CoordinateDriver(("ground", "bob"), "angle", "angle + 1")
-    with pytest.raises(jn.AssemblyError, match="contradict each other"):
+    with pytest.raises(jn.errors.AssemblyError, match="contradict each other"):
         swing(dataclasses.replace(pendulum, initial=pendulum.initial | {"other": other}), 1e-9)
     for thread in threading.enumerate():
         if thread.name == NAME:

@@ -80,14 +80,14 @@ def test_backward_from_the_end_returns_to_the_start(swing):
 
 def test_the_reaction_of_the_pivot_in_closed_form(swing):
     angle, rate = swing.outputs["angle"][:, 0], swing.outputs["angle"][:, 1]
-    force = swing.evaluate(jn.JointForceOutput("pivot", "bob")).values[:, 0]
-    along = -(rate**2) + GRAVITY * np.sin(angle)  # N, on 1 kg at 1 m: towards the pivot less weight
+    force = swing.evaluate(jn.outputs.JointForceOutput("pivot", "bob")).values[:, 0]
+    along = -(rate**2) + GRAVITY * np.sin(angle)  # N, on 1 kg at 1 m: toward the pivot less weight
     wanted = along[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     assert np.allclose(force, wanted, rtol=0, atol=1e-12)
 
 
 def test_power_balances(swing):
-    balance = jn.power_balance(swing)
+    balance = jn.energy.power_balance(swing)
     assert (abs(balance["residual"]) <= 1e-11 * balance["scale"].max()).all()
 
 
@@ -125,7 +125,7 @@ def test_an_even_spin_in_space_keeps_its_turns():
         bodies={"top": jn.Body([0, 0, 0], mass=1.0, inertia=[1.0, 1.0, 2.0])},
         joints={"pin": spatial.Spherical(("ground", "top"), [0, 0, 0], [0, 0, 0])},
         initial={"spin": drivers.RotationDriver(("ground", "top"), [0, 0, 1], "20*t", [1, 0, 0], [1, 0, 0])},
-        outputs={"tip": jn.PointOutput("top", [1, 0, 0])},
+        outputs={"tip": jn.outputs.PointOutput("top", [1, 0, 0])},
     )
     time = np.linspace(0, 10, 6)
     tip = jn.simulate(top, time, 1).outputs["tip"]
@@ -142,7 +142,7 @@ def block(law):
         joints={"guide": planar.Prismatic(("ground", "block"), [0, 0], [0, 0], x, x)},
         forces={"pull": forces.SlideForce(("ground", "block"), [0, 0], [0, 0], x, law)},
         initial={"rest": drivers.CoordinateDriver(("ground", "block"), "x", 1.0)},
-        outputs={"x": jn.PointOutput("block", [0, 0])},
+        outputs={"x": jn.outputs.PointOutput("block", [0, 0])},
     )
 
 
@@ -155,12 +155,12 @@ def test_what_was_computed_before_a_singularity_is_kept():
     assert motion.faults == {3: "forces.pull at t = 1 s"}
     assert motion.ended_at == pytest.approx(1.0, abs=1e-9)
     assert np.allclose(motion.outputs["x"][:3, 0, 0], [1.0, 0.8, 0.6], rtol=0, atol=1e-13)
-    with pytest.raises(jn.SolveError, match=r"t = 1\.5 s, forces.pull at t = 1 s: collapsed.*3 of 5") as e:
+    with pytest.raises(jn.errors.SolveError, match=r"t = 1\.5 s, forces.pull at t = 1 s: collapsed.*3 of 5") as e:
         jn.simulate(block("-x**-3"), time, 1)
     assert e.value.motion.ended_at == motion.ended_at
 
 
 @pytest.mark.slow
 def test_a_force_that_is_not_finite_at_the_start_is_named():
-    with pytest.raises(jn.SolveError, match=r"t = 0 s, forces.pull: the force is not finite"):
+    with pytest.raises(jn.errors.SolveError, match=r"t = 0 s, forces.pull: the force is not finite"):
         jn.simulate(block("1/t"), [0.0, 1.0])

@@ -21,7 +21,7 @@ def stone(height=0.0, speed=5.0):
         bodies={"stone": jn.Body([0, "height"], mass=2.0, inertia=0.1)},
         joints={},
         initial={"up": drivers.CoordinateDriver(("ground", "stone"), "y", "height + speed*t")},
-        outputs={"place": jn.PointOutput("stone", [0, 0])},
+        outputs={"place": jn.outputs.PointOutput("stone", [0, 0])},
     )
 
 
@@ -31,7 +31,7 @@ def happened(*events, time=(0.0, 2.0), mechanism=None, **keywords):
 
 
 def height(value=0.0, **keywords):
-    return jn.Event(jn.PointOutput("stone", [0, 0]), value, component=1, **keywords)
+    return jn.Event(jn.outputs.PointOutput("stone", [0, 0]), value, component=1, **keywords)
 
 
 @pytest.mark.slow
@@ -80,7 +80,7 @@ def test_a_terminal_event_ends_the_run_and_what_follows_is_not_reached():
     assert motion.at([end]).outputs["place"][0, 0, 1] == pytest.approx(-6.0, abs=1e-13)
 
 
-class Sine(jn.AbstractOutput):
+class Sine(jn.outputs.AbstractOutput):
     """Sine of the angle of a body."""
 
     unit = "1"
@@ -104,7 +104,7 @@ def test_an_output_of_ones_own_and_many_crossings_in_one_step():
 @pytest.mark.slow
 def test_turns_of_an_angle_in_space_count():
     z, x, origin, bodies = [0, 0, 1], [1, 0, 0], [0, 0, 0], ("ground", "rotor")
-    angle = jn.RelativeAngleOutput(bodies, z, x, x)
+    angle = jn.outputs.RelativeAngleOutput(bodies, z, x, x)
     rotor = jn.Mechanism(
         space="spatial",
         bodies={"rotor": jn.Body(origin, mass=1.0, inertia=[1.0, 1.0, 2.0])},
@@ -182,8 +182,8 @@ def test_the_beginning_of_a_run_is_no_crossing():
     ],
 )
 def test_an_event_that_is_none(keywords, words):
-    with pytest.raises(jn.MechanismError, match=words):
-        jn.Event(jn.AngleOutput("stone"), **keywords)
+    with pytest.raises(jn.errors.MechanismError, match=words):
+        jn.Event(jn.outputs.AngleOutput("stone"), **keywords)
 
 
 @pytest.mark.parametrize(
@@ -191,18 +191,18 @@ def test_an_event_that_is_none(keywords, words):
     [
         (height(), "must be a list of jn.Event"),
         (["landing"], "must be a jn.Event"),
-        ([jn.Event(jn.AngleOutput("stone"), component=1)], "has 1 component, counted from 0, got 1"),
-        ([jn.Event(jn.AngleOutput("ston"))], "did you mean 'stone'"),
-        ([jn.Event(jn.RelativeAngleOutput(("ground", "stone"), [0, 0, 1]))], "is spatial"),
+        ([jn.Event(jn.outputs.AngleOutput("stone"), component=1)], "has 1 component, counted from 0, got 1"),
+        ([jn.Event(jn.outputs.AngleOutput("ston"))], "did you mean 'stone'"),
+        ([jn.Event(jn.outputs.RelativeAngleOutput(("ground", "stone"), [0, 0, 1]))], "is spatial"),
     ],
 )
 def test_events_that_do_not_fit_are_refused(events, words):
-    with pytest.raises(jn.MechanismError, match=words):
+    with pytest.raises(jn.errors.MechanismError, match=words):
         jn.simulate(stone(), [0.0, 1.0], events=events)
 
 
 def test_an_event_needs_an_output_of_poses():
-    with pytest.raises(jn.MechanismError, match="an event watches an output of the poses"):
+    with pytest.raises(jn.errors.MechanismError, match="an event watches an output of the poses"):
         jn.Event("angle")
 
 
@@ -218,7 +218,7 @@ def test_points_that_pass_each_other_in_a_small_part_of_a_step(miss):
         joints={},
         initial={"along": along, "beside": beside},
     )
-    distance = jn.DistanceOutput(("ground", "point"), [0, 0], [0, 0])
+    distance = jn.outputs.DistanceOutput(("ground", "point"), [0, 0], [0, 0])
     values = [1.001 * miss, 2 * miss, 3.0]
     found = jn.simulate(flight, [0.0, 5.0], 1, events=[jn.Event(distance, value) for value in values])
     for times, value in zip(found.events, values, strict=True):
@@ -236,7 +236,7 @@ def test_an_angle_about_an_axis_that_its_vector_passes(miss):
         joints={"pin": jn.spatial.Spherical(("ground", "ball"), [0, 0, 0], [0, 0, 0])},
         initial={"spin": jn.drivers.RotationDriver(("ground", "ball"), [0, "cos(miss)", "sin(miss)"], "3*t")},
     )
-    angle = jn.RelativeAngleOutput(("ground", "ball"), [0, 0, 1], [1, 0, 0], [1, 0, 0])
+    angle = jn.outputs.RelativeAngleOutput(("ground", "ball"), [0, 0, 1], [1, 0, 0], [1, 0, 0])
     values = [1.0, 2.5, 4.0, 7.0]
     found = jn.simulate(ball, [0.0, 3.0], 1, events=[jn.Event(angle, value) for value in values])
     for times, value in zip(found.events, values, strict=True):

@@ -39,7 +39,7 @@ def sled(**values):
         joints={"rail": planar.Prismatic(("ground", "sled"), [0, 0], [0, 0], [1, 0], [1, 0])},
         forces={"push": forces.SlideForce(("ground", "sled"), [0, 0], [0, 0], [1, 0], LAW)},
         initial={"go": drivers.SlideDriver(("ground", "sled"), [0, 0], [0, 0], [1, 0], "at + rate*t")},
-        outputs={"x": jn.PointOutput("sled", [0, 0])},
+        outputs={"x": jn.outputs.PointOutput("sled", [0, 0])},
     )
 
 
@@ -65,7 +65,7 @@ def test_a_pulse_in_time_backward_and_before_an_event():
     mechanism = sled(A=STRENGTH, at=there[0] - 0.4 * there[1], rate=there[1])
     back = jn.simulate(mechanism, [0.4, 0.0], 1).outputs["x"][-1, :, 0]
     np.testing.assert_allclose(back, [1.0, 0.0], atol=1e-9)
-    away = jn.Event(jn.PointOutput("sled", [0, 0]), value=1.5, terminal=True)
+    away = jn.Event(jn.outputs.PointOutput("sled", [0, 0]), value=1.5, terminal=True)
     run = jn.simulate(sled(A=STRENGTH), [0.0, 4.0], 1, events=[away])
     assert run.ended_at == pytest.approx(0.2 + 0.5 / gained(4.0, 0.2, 1e-3), rel=1e-9)
 
@@ -105,7 +105,7 @@ def test_a_force_that_ends_is_named_with_the_time():
 
 @pytest.mark.slow
 def test_a_rate_that_is_not_finite_at_the_start_is_named():
-    with pytest.raises(jn.SolveError, match=r"forces\.push at t = 0 s: inadmissible"):
+    with pytest.raises(jn.errors.SolveError, match=r"forces\.push at t = 0 s: inadmissible"):
         jn.simulate(sled(N=1.0, end=0.0), [0.0, -1.0], 1)
 
 
@@ -153,7 +153,7 @@ def test_a_pulse_of_a_driver():
         joints={name: planar.Prismatic(("ground", name), *rail) for name in ("trolley", "load")},
         drivers={"s": drivers.CoordinateDriver(("ground", "trolley"), "x", law)},
         forces={"oil": forces.SlideForce(("trolley", "load"), [0, 0], [0, 0], [1, 0], "-2*v")},
-        outputs={"x": jn.PointOutput("load", [0, 0])},
+        outputs={"x": jn.outputs.PointOutput("load", [0, 0])},
     )
     for t0, w in ((0.05, 1e-3), (0.2, 1e-4), (0.3137, 1e-3), (0.3, 1e-2)):
         motion = jn.simulate(mechanism.with_parameters(t0=t0, w=w), [0.0, 0.4], 1)

@@ -15,8 +15,8 @@ BODIES, Z, ORIGIN = ("ground", "rotor"), [0, 0, 1], [0, 0, 0]
 STIFFNESS = INERTIA = 2.0  # a vibration with a period of 2 pi
 WOUND = 6 * np.pi
 TIME = np.linspace(0.0, 7.0, 8)
-ANGLE = jn.RelativeAngleOutput(BODIES, Z)
-VECTORS = jn.RelativeAngleOutput(BODIES, Z, [1, 0, 0], [1, 0, 0])
+ANGLE = jn.outputs.RelativeAngleOutput(BODIES, Z)
+VECTORS = jn.outputs.RelativeAngleOutput(BODIES, Z, [1, 0, 0], [1, 0, 0])
 
 
 def rotor(kind="spring", wound=WOUND):
@@ -52,7 +52,7 @@ def closed_form(time, orders=3, wound=WOUND):
 def test_a_spring_wound_up_by_three_turns_swings_three_turns_to_either_side(kind):
     found = released(kind)
     np.testing.assert_allclose(found.outputs["angle"], closed_form(TIME), rtol=0, atol=1e-12)
-    torque = jn.applied_force(found, kind).values
+    torque = jn.dynamics.applied_force(found, kind).values
     np.testing.assert_allclose(torque, -STIFFNESS * closed_form(TIME, 2), rtol=0, atol=1e-11)
     if kind == "spring":
         assert np.ptp(found.energy) < 1e-13 * found.energy[0]
@@ -70,7 +70,7 @@ def test_in_the_plane_where_nothing_but_the_angle_moves():
         joints={},
         forces={"twist": forces.TorsionalSpring(BODIES, STIFFNESS)},
         initial={"start": drivers.CoordinateDriver(BODIES, "angle", WOUND)},
-        outputs={"angle": jn.AngleOutput("rotor")},
+        outputs={"angle": jn.outputs.AngleOutput("rotor")},
     )
     found = jn.simulate(mechanism, TIME, order=2)
     np.testing.assert_allclose(found.outputs["angle"], closed_form(TIME), rtol=0, atol=1e-12)
@@ -78,7 +78,7 @@ def test_in_the_plane_where_nothing_but_the_angle_moves():
 
 @pytest.mark.slow
 def test_its_power_balance_closes():
-    balance = jn.power_balance(released())
+    balance = jn.energy.power_balance(released())
     assert float((abs(balance["residual"]) / balance["scale"]).max()) < 1e-13
 
 
@@ -105,7 +105,7 @@ def test_an_event_after_turns_ends_the_motion_with_its_turns():
     when = np.arccos(-2 / 3)
     assert found.events[0] == [pytest.approx(when, abs=1e-12)]
     last = found.at([when])
-    assert jn.applied_force(last, "spring").values[0, 0] == pytest.approx(STIFFNESS * 4 * np.pi, abs=1e-10)
+    assert jn.dynamics.applied_force(last, "spring").values[0, 0] == pytest.approx(STIFFNESS * 4 * np.pi, abs=1e-10)
 
 
 @pytest.mark.slow
@@ -125,7 +125,7 @@ def test_runs_side_by_side_have_turns_of_their_own():
 @pytest.mark.slow
 def test_the_solvers_of_diffrax_carry_the_turns_along():
     diffrax = importlib.import_module("diffrax")
-    equation = jn.ode_term(rotor())
+    equation = jn.integrate.ode_term(rotor())
     solution = diffrax.diffeqsolve(
         equation.term,
         diffrax.Dopri8(),
@@ -138,7 +138,7 @@ def test_the_solvers_of_diffrax_carry_the_turns_along():
         stepsize_controller=diffrax.PIDController(rtol=1e-11, atol=1e-11),
     )
     motion = equation.motion(solution.ts, solution.ys, order=2)
-    torque = jn.applied_force(motion, "spring").values[:, 0]
+    torque = jn.dynamics.applied_force(motion, "spring").values[:, 0]
     np.testing.assert_allclose(torque, -STIFFNESS * closed_form(TIME, 1)[:, 0], rtol=0, atol=1e-7)
 
 

@@ -104,7 +104,7 @@ def test_a_file_of_comments_only_is_empty(tmp_path):
         load(path)
 
 
-def test_a_misspelt_key_is_named_rather_than_the_key_that_misses(tmp_path):
+def test_a_misspelled_key_is_named_rather_than_the_key_that_misses(tmp_path):
     path = tmp_path / "two.yaml"
     path.write_text("space: planar\nbodies:\n  a: {}\njoints:\n  A:\n    type: double_revolute\n    lenght: 1\n")
     with pytest.raises(MechanismFileError, match=r"line 7, joints.A.lenght: unknown key 'lenght'"):

@@ -85,8 +85,8 @@ def test_closed_forms(motion):
 def test_units_and_names_of_peaks(motion):
     assert motion.dataset["T"].attrs["units"] == "J"
     assert motion.dataset["E2"].attrs["units"] == "J/s^4"
-    assert jn.kinetic_energy(motion).total.attrs["units"] == "J"
-    assert jn.acceleration_energy(motion, order=1).total.attrs["units"] == "J/s^2"
+    assert jn.energy.kinetic_energy(motion).total.attrs["units"] == "J"
+    assert jn.energy.acceleration_energy(motion, order=1).total.attrs["units"] == "J/s^2"
     told = {(p.output, p.derivative): p.unit for p in peaks(motion)}
     assert told["T", "energy"] == "J"
     assert told["E1", "first rate"] == "J/s^3"

@@ -292,7 +292,7 @@ def test_orientations_in_python_have_the_forms_of_files(tmp_path):
         ({"axis": [0, 0, 1], "angel": 1.0}, "unknown key 'angel'; did you mean 'angle'"),
         ({"axis": [0, 0, 1]}, "is missing"),
         ({"axis": [0, 0, "tilt - 0.1"], "angle": 1.0}, "zero length"),
-        ({"euler": "xyy", "angles": [0, 0, 1]}, "neighbours"),
+        ({"euler": "xyy", "angles": [0, 0, 1]}, "neighbors"),
         ([1, 0, 0], "4 numbers"),
         ("1000", "4 numbers"),
     ],
@@ -300,7 +300,7 @@ def test_orientations_in_python_have_the_forms_of_files(tmp_path):
 def test_orientations_that_are_none_are_refused(form, words):
     body = jn.Body([0, 0, 0], orientation=form)
     made = jn.Mechanism(space="spatial", bodies={"top": body}, joints={}, parameters={"tilt": 0.1})
-    with pytest.raises(jn.MechanismError, match=words) as error:
+    with pytest.raises(jn.errors.MechanismError, match=words) as error:
         starting_guess(made, made.parameter_values, 3)
     assert error.value.name.startswith("bodies.top.orientation")
 

@@ -55,7 +55,7 @@ def test_outputs_are_what_the_functions_return(motion):
         "R": jn.joint_reaction(longer, "pin", frame="body").force,
         "F": jn.joint_reaction(longer, "pin", "ground").force,
         "M": jn.joint_reaction(longer, "pin", point=[0.2, 0.0]).torque,
-        "S": jn.applied_force(longer, "spring"),
+        "S": jn.dynamics.applied_force(longer, "spring"),
     }
     for name, expected in pairs.items():
         np.testing.assert_allclose(motion.dataset[name], expected[:, :3], rtol=1e-12, atol=1e-11)

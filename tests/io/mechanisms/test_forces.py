@@ -89,7 +89,7 @@ def test_values_are_in_si_units_and_laws_may_be_numbers_with_units(tmp_path):
     forces = written(tmp_path, "planar", entry + " law: [2 kN, {expression: 3*t}]}}").forces
     assert forces["T"].law == 2.5
     assert forces["F"].point == (0.001, 0.0)
-    assert forces["F"].law == (2000.0, jn.Expression("3*t"))
+    assert forces["F"].law == (2000.0, jn.laws.Expression("3*t"))
 
 
 def test_law_of_time_through_samples(tmp_path):
@@ -98,12 +98,12 @@ def test_law_of_time_through_samples(tmp_path):
     (tmp_path / "pull.csv").write_text(f"time,force\n{table}\n")
     entry = "{F: {type: slide_force, bodies: [ground, a], points: [[0, 0], [0, 0]], vector: [1, 0],"
     force = written(tmp_path, "planar", entry + " law: {samples: pull.csv, degree: 3}}}").forces["F"]
-    assert isinstance(force.law, jn.SplineMotion)
+    assert isinstance(force.law, jn.laws.SplineMotion)
     entry = "{F: {type: point_force, body: a, point: [0, 0], law: [{samples: pull.csv}, 0]}}"
     first, second = written(tmp_path, "planar", entry).forces["F"].law
-    assert isinstance(first, jn.SplineMotion)
+    assert isinstance(first, jn.laws.SplineMotion)
     assert second == 0.0
-    with pytest.raises(jn.MechanismFileError, match=r"line 4, forces\.F\.law\[0\].*none\.csv"):
+    with pytest.raises(jn.errors.MechanismFileError, match=r"line 4, forces\.F\.law\[0\].*none\.csv"):
         written(tmp_path, "planar", entry.replace("pull", "none"))
 
 
@@ -179,7 +179,7 @@ def test_solids_have_the_moments_of_the_same_in_python(tmp_path, space, form, so
 
 @pytest.mark.parametrize("form", ["solid: disc, radius: L", "solid: rod, length: 20 cm"])
 def test_solids_without_a_volume_have_no_density(tmp_path, form):
-    with pytest.raises(jn.MechanismFileError, match=r"bodies\.a\.inertia\.density: unknown key"):
+    with pytest.raises(jn.errors.MechanismFileError, match=r"bodies\.a\.inertia\.density: unknown key"):
         written(tmp_path, "planar", "{}", bodies=f"{{a: {{inertia: {{{form}, density: 7 g/cm^3}}}}}}")
 
 
@@ -216,11 +216,11 @@ def test_a_whole_matrix_of_inertia_may_have_negative_products(tmp_path):
 
 
 def test_a_force_of_ones_own_in_a_file(tmp_path):
-    class Wind(jn.AbstractForce, type="wind", space="planar"):
+    class Wind(jn.forces.AbstractForce, type="wind", space="planar"):
         """Push on the origin of a body."""
 
-        strength: jn.Scalar
-        law: jn.Law
+        strength: jn.joints.Scalar
+        law: jn.forces.Law
 
         body_count = 1
         dimensions = {"strength": "force"}
@@ -233,7 +233,7 @@ def test_a_force_of_ones_own_in_a_file(tmp_path):
 
     force = written(tmp_path, "planar", "{F: {type: wind, body: a, strength: 3 N, law: 1 - v**2}}").forces["F"]
     assert isinstance(force, Wind)
-    with pytest.raises(jn.MechanismFileError, match=r"line 4, forces\.F\.strength: .*such as 10 N"):
+    with pytest.raises(jn.errors.MechanismFileError, match=r"line 4, forces\.F\.strength: .*such as 10 N"):
         written(tmp_path, "planar", "{F: {type: wind, body: a, strength: 3 m, law: 1 - v**2}}")
 
 
@@ -290,7 +290,7 @@ def test_any_value_anywhere_loads_or_ends_in_one_message_with_its_line(tmp_path,
             path.write_text(json.dumps(data))
             try:
                 assert load(path).bodies
-            except jn.MechanismFileError as error:
+            except jn.errors.MechanismFileError as error:
                 refused.append(error)
     assert len(refused) > 500
     assert all(error.line is not None and str(error).isprintable() for error in refused)

@@ -129,12 +129,14 @@ def test_what_is_written_reads_the_same(tmp_path, motion):
     ],
 )
 def test_what_cannot_be_is_named_with_its_place(tmp_path, motion, words):
-    with pytest.raises(jn.MechanismFileError, match=words) as error:
+    with pytest.raises(jn.errors.MechanismFileError, match=words) as error:
         load(tmp_path, motion)
     assert "laws.yaml, line 13, drivers.wheel.motion" in str(error.value)
 
 
 def test_a_law_that_does_not_go_as_far_as_its_leader_is_named_before_any_computing(tmp_path):
     mechanism = load(tmp_path, "{piecewise: [{until: 90 deg, expression: t}], of: crank}")
-    with pytest.raises(jn.MechanismError, match=r"drivers.wheel.motion: its leader goes from -3.14159265 to -1.14"):
+    with pytest.raises(
+        jn.errors.MechanismError, match=r"drivers.wheel.motion: its leader goes from -3.14159265 to -1.14"
+    ):
         jn.solve(mechanism, [0.0, 1.0])

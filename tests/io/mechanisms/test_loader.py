@@ -221,18 +221,22 @@ def test_masses_are_kept(tmp_path):
 @pytest.mark.parametrize(
     "space, entry, kind",
     [
-        ("planar", "{body: a, point: [0, 0]}", jn.PointOutput),
-        ("planar", "{body: a, quantity: angle}", jn.AngleOutput),
-        ("planar", "{bodies: [a, b], quantity: angle}", jn.PlanarRelativeAngleOutput),
-        ("planar", "{body: a, quantity: angular_velocity}", jn.AngularVelocityOutput),
-        ("planar", "{bodies: [a, b], points: [[0, 0], [1, 0]], quantity: distance}", jn.DistanceOutput),
-        ("spatial", "{body: a, point: [0, 0, 0]}", jn.PointOutput),
-        ("spatial", "{body: a, quantity: angular_velocity, frame: body}", jn.AngularVelocityOutput),
-        ("spatial", "{bodies: [ground, b], points: [[0, 0, 0], [1, 0, 0]], quantity: distance}", jn.DistanceOutput),
+        ("planar", "{body: a, point: [0, 0]}", jn.outputs.PointOutput),
+        ("planar", "{body: a, quantity: angle}", jn.outputs.AngleOutput),
+        ("planar", "{bodies: [a, b], quantity: angle}", jn.outputs.PlanarRelativeAngleOutput),
+        ("planar", "{body: a, quantity: angular_velocity}", jn.outputs.AngularVelocityOutput),
+        ("planar", "{bodies: [a, b], points: [[0, 0], [1, 0]], quantity: distance}", jn.outputs.DistanceOutput),
+        ("spatial", "{body: a, point: [0, 0, 0]}", jn.outputs.PointOutput),
+        ("spatial", "{body: a, quantity: angular_velocity, frame: body}", jn.outputs.AngularVelocityOutput),
+        (
+            "spatial",
+            "{bodies: [ground, b], points: [[0, 0, 0], [1, 0, 0]], quantity: distance}",
+            jn.outputs.DistanceOutput,
+        ),
         (
             "spatial",
             "{bodies: [a, b], quantity: angle, axis: [0, 0, 1], vectors: [[1, 0, 0], [0, 1, 0]]}",
-            jn.RelativeAngleOutput,
+            jn.outputs.RelativeAngleOutput,
         ),
     ],
 )

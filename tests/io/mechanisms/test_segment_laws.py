@@ -114,7 +114,7 @@ def test_samples_may_be_those_of_a_cam(tmp_path):
 )
 def test_what_is_wrong_is_named_with_its_line(tmp_path, old, new, name, words):
     assert old in FILE
-    with pytest.raises(jn.MechanismFileError, match=words) as caught:
+    with pytest.raises(jn.errors.MechanismFileError, match=words) as caught:
         loaded(tmp_path, FILE.replace(old, new))
     assert caught.value.line is not None
     assert caught.value.name.startswith(name)
@@ -123,7 +123,7 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path, old, new, name, words):
 def test_a_driver_that_has_the_law_of_an_output_is_not_followed(tmp_path):
     text = FILE.replace("motion: speed*t", "motion: {output: y, law: 0.1*t}")
     assert text != FILE
-    with pytest.raises(jn.MechanismFileError, match=r"output y, .*none of its own, got .shaft_angle.") as e:
+    with pytest.raises(jn.errors.MechanismFileError, match=r"output y, .*none of its own, got .shaft_angle.") as e:
         loaded(tmp_path, text)
     assert e.value.line is not None
     assert e.value.name == "drivers.cam.motion.of"
@@ -139,8 +139,8 @@ def test_the_law_of_an_output_is_read_and_written(tmp_path):
     found = [values(law.law, press.parameter_values, instants) for law in (before, after)]
     np.testing.assert_array_equal(*found)
     assert found[0][1, 2] == pytest.approx(-0.06)  # while it forms
-    law = jn.HermiteMotion([0.0, 1.0], [[0.0], [1.0]])
-    with pytest.raises(jn.MechanismError, match="through derivatives has no form in a file"):
+    law = jn.laws.HermiteMotion([0.0, 1.0], [[0.0], [1.0]])
+    with pytest.raises(jn.errors.MechanismError, match="through derivatives has no form in a file"):
         write_mechanism(jn.load("examples/four_bar.yaml").__class__(
             space="planar", bodies={"a": jn.Body([0, 0])}, joints={},
             drivers={"d": jn.drivers.CoordinateDriver(("ground", "a"), "angle", law)},
@@ -161,7 +161,7 @@ def test_what_is_wrong_with_the_law_of_an_output_is_named(tmp_path, old, new, na
     text = pathlib.Path("examples/servo_press.yaml").read_text()
     assert old in text
     (tmp_path / "press.yaml").write_text(text.replace(old, new, 1))
-    with pytest.raises(jn.MechanismFileError, match=words) as caught:
+    with pytest.raises(jn.errors.MechanismFileError, match=words) as caught:
         jn.load(tmp_path / "press.yaml")
     assert caught.value.line is not None
     assert caught.value.name == name

@@ -44,7 +44,7 @@ def load(folder, **changes):
     ],
 )
 def test_what_may_be_meant_is_said(tmp_path, changes, words):
-    with pytest.warns(jn.UnitWarning, match=words):
+    with pytest.warns(jn.errors.UnitWarning, match=words):
         load(tmp_path, **changes)
 
 
@@ -94,7 +94,7 @@ PROFILE = "{{profile: [{{profile: cycloidal, duration: 1, to: {}}}]}}"
 def test_laws_that_take_degrees_over_the_run_are_told(tmp_path, motion, words):
     rows = "".join(f"{k / 100},{30 + 60 * math.sin(math.pi * k / 100)}\n" for k in range(201))
     (tmp_path / "swing.csv").write_text(f"time,angle\n{rows}")
-    with pytest.warns(jn.UnitWarning, match=words):
+    with pytest.warns(jn.errors.UnitWarning, match=words):
         load(tmp_path, motion=motion, time="{start: 0, stop: 2, step: 0.01}")
 
 
@@ -140,12 +140,12 @@ drivers:
   theta: {{type: coordinate, bodies: [ground, crank], coordinate: angle, motion: {motion}}}
 time: {{start: 0, stop: 2, step: 0.01}}
 """
-MILLIMETRES = {"AD": "132.1", "AB": "40", "BC": "142.3", "CD": "203.1", "motion": "30*deg + 2*pi*t", "crank": ""}
+MILLIMETERS = {"AD": "132.1", "AB": "40", "BC": "142.3", "CD": "203.1", "motion": "30*deg + 2*pi*t", "crank": ""}
 
 
 def bare(folder, **changes):
     path = folder / "bare.yaml"
-    path.write_text(BARE.format(**{**MILLIMETRES, **changes}))
+    path.write_text(BARE.format(**{**MILLIMETERS, **changes}))
     return jn.load(path)
 
 
@@ -153,13 +153,13 @@ def bare(folder, **changes):
     "changes, words",
     [
         ({}, r"line 3, parameters.CD: the lengths of this file go up to 203.1 m, which would move at .* m/s: millim"),
-        ({"motion": "30*deg + 60*deg*sin(pi*t)"}, "millimetres"),
-        ({"motion": "30*deg", "crank": ", mass: 0.2, inertia: 0.0001"}, "of masses up to 0.2 kg: millimetres"),
-        ({"motion": "30*deg", "crank": ", mass: 30, inertia: 0.02"}, "an inertia of 0.02 kg m.2: millimetres"),
+        ({"motion": "30*deg + 60*deg*sin(pi*t)"}, "millimeters"),
+        ({"motion": "30*deg", "crank": ", mass: 0.2, inertia: 0.0001"}, "of masses up to 0.2 kg: millimeters"),
+        ({"motion": "30*deg", "crank": ", mass: 30, inertia: 0.02"}, "an inertia of 0.02 kg m.2: millimeters"),
     ],
 )
-def test_a_file_in_bare_millimetres_is_told(tmp_path, changes, words):
-    with pytest.warns(jn.UnitWarning, match=words):
+def test_a_file_in_bare_millimeters_is_told(tmp_path, changes, words):
+    with pytest.warns(jn.errors.UnitWarning, match=words):
         bare(tmp_path, **changes)
 
 
@@ -197,7 +197,7 @@ def test_a_value_set_without_its_unit_is_told(tmp_path, given, words):
     mechanism = jn.load(tmp_path / "set.yaml")
     if given.startswith("swing"):
         mechanism = dataclasses.replace(mechanism, dimensions={"AB": mechanism.dimensions["AB"]})
-    with pytest.warns(jn.UnitWarning, match=words):
+    with pytest.warns(jn.errors.UnitWarning, match=words):
         override(mechanism, [given])
 
 
@@ -210,7 +210,7 @@ def test_values_that_are_set_as_they_are_meant_are_not_doubted():
 def test_a_cam_law_over_degrees_without_a_unit_is_told(tmp_path):
     path = tmp_path / "cam.yaml"
     path.write_text(CAM)
-    with pytest.warns(jn.UnitWarning, match=r"goes on over 360 rad of its leader, 57 turns: degrees\?"):
+    with pytest.warns(jn.errors.UnitWarning, match=r"goes on over 360 rad of its leader, 57 turns: degrees\?"):
         jn.load(path)
 
 
@@ -246,5 +246,5 @@ def test_files_say_what_is_beyond_samples(tmp_path):
         assert loaded.drivers["theta"].motion.beyond == way
         jn.write_mechanism(loaded, tmp_path / "copy.yaml")
         assert jn.load(tmp_path / "copy.yaml") == loaded
-    with pytest.raises(jn.MechanismFileError, match=r"drivers.theta.motion.beyond: .*did you mean 'hold'"):
+    with pytest.raises(jn.errors.MechanismFileError, match=r"drivers.theta.motion.beyond: .*did you mean 'hold'"):
         load(tmp_path, motion="{samples: angle.csv, beyond: hld}")

@@ -21,7 +21,7 @@ PIN = {"A": jn.planar.Revolute(("ground", "bar"), point_i=[0, 0], point_j=[0, 0]
 
 def bar(motion, **parts):
     drivers = {"turn": jn.drivers.CoordinateDriver(("ground", "bar"), "angle", motion=motion)}
-    outputs = {"angle": jn.AngleOutput("bar")}
+    outputs = {"angle": jn.outputs.AngleOutput("bar")}
     settings = {"bodies": {"bar": jn.Body([0, 0])}, "joints": PIN, "drivers": drivers, "outputs": outputs}
     return jn.Mechanism(space="planar", **{**settings, **parts})
 
@@ -50,7 +50,7 @@ def test_results_are_the_same_to_the_last_digit(name, tmp_path):
 def test_a_spline_goes_to_a_file_of_samples(count, tmp_path):
     t = np.linspace(0.0, 2.0, count)
     t[1:-1] += np.random.default_rng(count).uniform(-0.2, 0.2, count - 2) * t[1]
-    law = jn.SplineMotion(t, np.sin(3 * t), degree=5)
+    law = jn.laws.SplineMotion(t, np.sin(3 * t), degree=5)
     jn.write_mechanism(bar(law), tmp_path / "bar.yaml")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bar.yaml", "bar_drivers_turn_motion.csv"]
     again = jn.load(tmp_path / "bar.yaml").drivers["turn"].motion
@@ -61,7 +61,7 @@ def test_a_spline_goes_to_a_file_of_samples(count, tmp_path):
 
 
 def test_values_of_a_law_of_its_own_take_the_place_of_their_names(tmp_path):
-    mechanism = bar(jn.ExpressionMotion("a*t + a2*sin(t)", {"a": 2.0, "a2": -0.5}))
+    mechanism = bar(jn.laws.ExpressionMotion("a*t + a2*sin(t)", {"a": 2.0, "a2": -0.5}))
     jn.write_mechanism(mechanism, tmp_path / "bar.json")
     law = jn.load(tmp_path / "bar.json").drivers["turn"].motion
     assert law.text == "(2.0)*t + (-0.5)*sin(t)"
@@ -100,7 +100,7 @@ class Unnamed(AbstractConstraint, space="planar"):
     "mechanism, words",
     [
         (lambda: bar(lambda t: jnp.sin(t)), "drivers.turn.motion: a function has no form in a file"),
-        (lambda: bar(jn.SplineMotion([0, 1, 2, 3, 4], [0, 1, 0, 1, 0], degree=2)), "even degree"),
+        (lambda: bar(jn.laws.SplineMotion([0, 1, 2, 3, 4], [0, 1, 0, 1, 0], degree=2)), "even degree"),
         (lambda: bar("t", joints=PIN | {"B": Unnamed(("ground", "bar"), [0, 0])}), "joints.B: the class Unnamed"),
         (lambda: bar("t", time=[0.0, 0.1, 0.5]), "not evenly spaced"),
     ],

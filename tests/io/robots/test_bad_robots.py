@@ -183,7 +183,7 @@ def test_no_name():
 def test_a_sequence_of_turns_that_is_none(tmp_path):
     path = tmp_path / "file.urdf"
     path.write_text(URDF)
-    with pytest.raises(RobotError, match=r"sequence: .*neighbours differ, got 'XXY'"):
+    with pytest.raises(RobotError, match=r"sequence: .*neighbors differ, got 'XXY'"):
         load_robot(path, floating_base="XXY")
 
 
@@ -211,7 +211,7 @@ def message_of(path):
     """Return what is wrong with a file, None where nothing is."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", jn.RobotWarning)
+            warnings.simplefilter("ignore", jn.errors.RobotWarning)
             load_robot(path)
     except JounceError as error:
         return str(error)

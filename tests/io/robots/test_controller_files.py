@@ -23,7 +23,7 @@ def rest_to_rest(names, duration, start=0.5):
 def test_what_is_written_is_read_back(tmp_path, name, file, joints):
     robot, motion = robot_named(name), rest_to_rest(joints, 0.2)
     path = tmp_path / ("motion.yaml" if file == "ros" else "motion.csv")
-    times = jn.export_trajectory(robot, motion, path, file, torques=True)
+    times = jn.io.export_trajectory(robot, motion, path, file, torques=True)
     again = jn.load_trajectory(path, joints=joints)
     assert again.names == joints
     since = 0.5 if file == "ros" else 0.0  # a message counts from its own start
@@ -61,15 +61,15 @@ def test_what_is_written_is_read_back(tmp_path, name, file, joints):
 def test_a_period_that_does_not_divide_the_duration(tmp_path):
     robot, path = robot_named("ur5"), tmp_path / "motion.csv"
     motion = rest_to_rest(UR5, 0.2031)
-    times = jn.export_trajectory(robot, motion, path, "ur", 125.0)
+    times = jn.io.export_trajectory(robot, motion, path, "ur", 125.0)
     assert times[-2] < motion.stop < times[-1]
     table = np.loadtxt(path, delimiter=",", skiprows=1)
     assert np.array_equal(table[-1, 1:7], motion.derivatives([motion.stop], 0)[0, 0])
     assert np.allclose(table[-1, 7:], 0.0, atol=1e-9)
     moving = jn.JointTrajectory(dict.fromkeys(UR5, "t"), 0.0, 0.2031)
     with pytest.raises(jn.errors.TrajectoryError, match="does not divide the duration"):
-        jn.export_trajectory(robot, moving, path, "ur")
-    times = jn.export_trajectory(robot, moving, tmp_path / "motion.yaml", "ros", 100.0)
+        jn.io.export_trajectory(robot, moving, path, "ur")
+    times = jn.io.export_trajectory(robot, moving, tmp_path / "motion.yaml", "ros", 100.0)
     assert times[-1] == 0.2031
     assert len(times) == 22
     assert jn.load_trajectory(tmp_path / "motion.yaml").names == UR5
@@ -79,12 +79,12 @@ def test_order_and_names_of_joints(tmp_path):
     robot, path = robot_named("ur5"), tmp_path / "motion.csv"
     laws = {name: float(k) for k, name in enumerate(UR5)}
     motion = jn.JointTrajectory(dict(reversed(laws.items())), 0.0, 0.1)
-    jn.export_trajectory(robot, motion, path, "ur", header_units=True)
+    jn.io.export_trajectory(robot, motion, path, "ur", header_units=True)
     assert path.read_text().startswith("timestamp [s],target_q_0 [rad],target_q_1 [rad]")
     found = jn.load_trajectory(path)
     assert found.names == tuple(f"joint_{k}" for k in range(6))
     assert found.derivatives([0.0], 0)[0, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
-    jn.export_trajectory(robot, motion, path, "ur", joints=UR5[::-1])
+    jn.io.export_trajectory(robot, motion, path, "ur", joints=UR5[::-1])
     assert jn.load_trajectory(path, joints=UR5[::-1]).derivatives([0.0], 0, UR5)[0, 0].tolist() == list(range(6))
 
 
@@ -105,7 +105,7 @@ def test_what_does_not_fit_is_told(tmp_path, settings, words):
     settings = {"format": "ur", "path": "x.csv", **settings}
     path = tmp_path / settings.pop("path")
     with pytest.raises(jn.errors.JounceError, match=words):
-        jn.export_trajectory(robot_named("ur5"), rest_to_rest(UR5, 0.1), path, **settings)
+        jn.io.export_trajectory(robot_named("ur5"), rest_to_rest(UR5, 0.1), path, **settings)
     assert not path.exists()
 
 

@@ -15,7 +15,7 @@ def crane():
     joints = [
         jn.Joint("slide", "base", "carriage", "prismatic"),
         jn.Joint("pin", "carriage", "rod"),
-        jn.Joint("finger", "rod", "finger", mimic=jn.Mimic("pin")),
+        jn.Joint("finger", "rod", "finger", mimic=jn.robot.Mimic("pin")),
         jn.Joint("plate", "rod", "plate", "fixed"),
     ]
     return jn.Robot("crane", links, joints)
@@ -26,7 +26,7 @@ def read(crane, tmp_path):
     def call(text, system=crane):
         path = tmp_path / "drives.yaml"
         path.write_text(text, encoding="utf-8")
-        return jn.load_drives(path, system)
+        return jn.io.load_drives(path, system)
 
     return call
 
@@ -80,7 +80,7 @@ def test_defaults_are_for_the_kind_that_their_units_say(read):
     ],
 )
 def test_mistakes_are_told_with_place_and_advice(read, text, words):
-    with pytest.raises(jn.RobotError) as raised:
+    with pytest.raises(jn.errors.RobotError) as raised:
         read(text)
     message = str(raised.value)
     assert "drives.yaml" in message
@@ -89,8 +89,8 @@ def test_mistakes_are_told_with_place_and_advice(read, text, words):
 
 def test_drives_of_a_mechanism_are_by_its_drivers(read):
     platform = jn.load("examples/sea_platform.yaml")
-    drives = jn.load_drives("examples/drives/sea_platform.yaml", platform)
+    drives = jn.io.load_drives("examples/drives/sea_platform.yaml", platform)
     assert list(drives) == [f"leg{k}" for k in range(1, 7)]
     assert (drives["leg1"].stiffness, drives["leg2"].stiffness, drives["leg2"].lead) == (55e3, 50e3, 0.005)
-    with pytest.raises(jn.RobotError, match="'drivers'"):
+    with pytest.raises(jn.errors.RobotError, match="'drivers'"):
         read("joints: {leg1: {stiffness: 1}}", platform)

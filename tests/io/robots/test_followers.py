@@ -109,7 +109,7 @@ def test_ranges_that_leave_no_room_are_told_of_and_do_not_count(write, case):
     leader, followers, expected, bad = FAULTS[case]
     path = write(leader, followers)
     with pytest.warns(
-        jn.RobotWarning, match="ranges of joints that leave the joint that they follow no room"
+        jn.errors.RobotWarning, match="ranges of joints that leave the joint that they follow no room"
     ) as caught:
         robot = load_robot(path)
     assert len(caught) == 1
@@ -126,16 +126,16 @@ def test_ranges_that_leave_no_room_are_told_of_and_do_not_count(write, case):
 def test_a_robot_built_with_such_ranges_is_refused_where_limits_are_asked_for():
     ranges = [jn.Limits(lower=0.0, upper=0.8), jn.Limits(lower=0.0, upper=0.9)]
     joints = [jn.Joint("lead", "base", "a", "prismatic", limits=ranges[0])]
-    joints.append(jn.Joint("f0", "base", "b", "prismatic", limits=ranges[1], mimic=jn.Mimic("lead", -1.0)))
+    joints.append(jn.Joint("f0", "base", "b", "prismatic", limits=ranges[1], mimic=jn.robot.Mimic("lead", -1.0)))
     robot = jn.Robot("gripper", [jn.Link("base"), *(jn.Link(name, jn.Inertia(1.0)) for name in "ab")], joints)
-    with pytest.raises(jn.RobotError, match=r"lead: one coordinate alone keeps the range .* \(f0\)"):
+    with pytest.raises(jn.errors.RobotError, match=r"lead: one coordinate alone keeps the range .* \(f0\)"):
         _ = robot.limits
 
 
 def test_a_leader_that_is_held_in_one_place_by_its_own_range():
     joints = [jn.Joint("lead", "base", "a", "prismatic", limits=jn.Limits(lower=0.4, upper=0.4))]
     limits = jn.Limits(lower=0.0, upper=0.8)
-    joints.append(jn.Joint("f0", "base", "b", "prismatic", limits=limits, mimic=jn.Mimic("lead")))
+    joints.append(jn.Joint("f0", "base", "b", "prismatic", limits=limits, mimic=jn.robot.Mimic("lead")))
     robot = jn.Robot("gripper", [jn.Link("base"), *(jn.Link(name, jn.Inertia(1.0)) for name in "ab")], joints)
     assert (robot.limits["lead"].lower, robot.limits["lead"].upper) == (0.4, 0.4)
 
@@ -147,10 +147,10 @@ def test_ranges_are_compared_in_proportion_to_the_joints(monkeypatch, against):
     left_out = []
     for count in (50, 200):
         rest = [
-            jn.Joint(f"f{k}", "b", f"l{k}", limits=jn.Limits(lower=0.2, upper=1.0), mimic=jn.Mimic("lead"))
+            jn.Joint(f"f{k}", "b", f"l{k}", limits=jn.Limits(lower=0.2, upper=1.0), mimic=jn.robot.Mimic("lead"))
             for k in range(count)
         ]
-        turned = jn.Joint("turned", "b", "t", limits=jn.Limits(lower=-1.0, upper=-0.2), mimic=jn.Mimic("lead"))
+        turned = jn.Joint("turned", "b", "t", limits=jn.Limits(lower=-1.0, upper=-0.2), mimic=jn.robot.Mimic("lead"))
         alone = [jn.Joint(f"a{k}", "b", f"c{k}") for k in range(count)]
         lead = jn.Joint("lead", "b", "l", limits=jn.Limits(lower=-1.0, upper=1.0))
         seen.clear()

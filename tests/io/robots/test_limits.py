@@ -23,7 +23,7 @@ def robot():
     joints = [
         jn.Joint("slide", "base", "carriage", "prismatic", limits=jn.Limits(lower=-1.0, upper=1.0, velocity=2.0)),
         jn.Joint("pin", "carriage", "rod", limits=jn.Limits(velocity=3.0, effort=5.0)),
-        jn.Joint("finger", "rod", "finger", mimic=jn.Mimic("pin")),
+        jn.Joint("finger", "rod", "finger", mimic=jn.robot.Mimic("pin")),
         jn.Joint("plate", "rod", "plate", "fixed"),
     ]
     return jn.Robot("crane", links, joints)
@@ -42,7 +42,7 @@ def read(robot, tmp_path):
 @pytest.fixture
 def refused(read):
     def call(text):
-        with pytest.raises(jn.RobotError) as raised:
+        with pytest.raises(jn.errors.RobotError) as raised:
             read(text)
         return str(raised.value).partition("limits.yaml, ")[2]
 
@@ -52,13 +52,13 @@ def refused(read):
 def test_joints_that_follow_keep_their_limits_beside_those_of_the_file(tmp_path):
     lead = jn.Joint("lead", "base", "a", limits=jn.Limits(lower=-3.0, upper=3.0, velocity=5.0))
     own = jn.Limits(lower=-1.0, upper=1.0, velocity=1.0, deceleration=3.0)
-    follow = jn.Joint("follow", "base", "b", limits=own, mimic=jn.Mimic("lead", -2.0))
+    follow = jn.Joint("follow", "base", "b", limits=own, mimic=jn.robot.Mimic("lead", -2.0))
     pair = jn.Robot("pair", [jn.Link("base"), jn.Link("a"), jn.Link("b")], [lead, follow], strict=False)
     path = tmp_path / "limits.yaml"
     path.write_text("joints: {lead: {velocity: 4, lower: -0.2, upper: null, acceleration: 9}}", encoding="utf-8")
     assert load_limits(path, pair)["lead"] == jn.Limits(-0.2, 0.5, 0.5, 9.0, deceleration=1.5)
     path.write_text("title: far\njoints:\n  lead: {lower: 0.6}", encoding="utf-8")
-    with pytest.raises(jn.RobotError, match=r"line 3, joints\.lead: no coordinate"):
+    with pytest.raises(jn.errors.RobotError, match=r"line 3, joints\.lead: no coordinate"):
         load_limits(path, pair)
 
 
@@ -158,9 +158,9 @@ def test_messages_name_line_entry_and_value(text, message, refused):
 
 
 def test_a_file_that_is_none(robot, tmp_path):
-    with pytest.raises(jn.RobotError, match="file not found"):
+    with pytest.raises(jn.errors.RobotError, match="file not found"):
         load_limits(tmp_path / "none.yaml", robot)
-    with pytest.raises(jn.RobotError, match=r"limits file .*extension; valid: \.yaml"):
+    with pytest.raises(jn.errors.RobotError, match=r"limits file .*extension; valid: \.yaml"):
         load_limits(tmp_path / "limits.txt", robot)
 
 
@@ -182,7 +182,7 @@ def test_payloads_are_point_masses_at_links(robot):
     ],
 )
 def test_what_a_payload_cannot_be(robot, text, message):
-    with pytest.raises(jn.RobotError) as raised:
+    with pytest.raises(jn.errors.RobotError) as raised:
         with_payloads(robot, [text])
     assert message in str(raised.value)
 
@@ -200,7 +200,7 @@ def test_a_limit_of_any_further_kind_is_not_left_out(tmp_path, text):
     path.write_text(text)
     robot = load_robot("examples/robots/panda.urdf")
     load_motion_limits(path, robot)
-    with pytest.raises(jn.RobotError, match="load_motion_limits"):
+    with pytest.raises(jn.errors.RobotError, match="load_motion_limits"):
         load_limits(path, robot)
 
 

@@ -123,7 +123,7 @@ def test_poses_of_all_bodies(pair):
             np.testing.assert_allclose(pose[:3, :3], data.xmat[k].reshape(3, 3), rtol=0, atol=1e-14)
 
 
-def test_mass_centre_and_inertia_of_bodies(pair):
+def test_mass_center_and_inertia_of_bodies(pair):
     robot, model = pair
     values, data = coordinates(robot, seed=8), mujoco.MjData(model)
     data.qpos[:] = positions(model, values)
@@ -326,7 +326,7 @@ def test_an_equality_of_tendons_along_joints_ties_these(tmp_path):
 
 
 def test_parts_that_are_only_seen_need_no_material(tmp_path):
-    """Published hands and arms colour their sites; materials go, because their textures need not be there."""
+    """Published hands and arms color their sites; materials go, because their textures need not be there."""
     path = tmp_path / "seen.xml"
     path.write_text(
         "<mujoco><asset><texture name='t' type='2d' file='no.png'/><material name='m' texture='t'/></asset><default>"
@@ -468,7 +468,7 @@ def test_moments_without_mass_count_as_in_mujoco_and_are_warned_of(tmp_path):
     path.write_text(
         f'<mujoco><worldbody><body name="arm"><joint axis="0 0 1"/>{INERTIAL}{rotor}</body></worldbody></mujoco>'
     )
-    with pytest.warns(jn.RobotWarning, match=r"no mass beside them: rotor \(line 1\)"):
+    with pytest.warns(jn.errors.RobotWarning, match=r"no mass beside them: rotor \(line 1\)"):
         robot = load_robot(path)
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
@@ -489,7 +489,7 @@ def test_a_joint_may_follow_one_that_follows_another(tmp_path):
     path.write_text(f"<mujoco><worldbody>{bodies}</worldbody><equality>{ties}</equality></mujoco>")
     robot = load_robot(path)
     assert robot.joint_names == ("j0",)
-    assert robot.joints["j2"].mimic == jn.Mimic("j0", -6.0, -0.5)
+    assert robot.joints["j2"].mimic == jn.robot.Mimic("j0", -6.0, -0.5)
 
 
 def test_closures_stay_where_the_base_is_set_free(tmp_path):

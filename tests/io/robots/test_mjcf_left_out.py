@@ -101,7 +101,7 @@ def test_it_is_told_of_where_mujoco_computes_other_forces(tmp_path, case):
     if says is None:
         robot = load_robot(path, strict=True)
     else:
-        with pytest.warns(jn.RobotWarning, match=says) as caught:
+        with pytest.warns(jn.errors.RobotWarning, match=says) as caught:
             robot = load_robot(path)
         assert len(caught) == 1
         assert str(caught[0].message).startswith(f"{path}: what follows is left out, and motions and forces are")
@@ -139,7 +139,7 @@ def test_one_warning_names_the_first_six_of_each_kind_and_the_faults(tmp_path):
     rotor = '<body name="rotor"><inertial pos="0 0 0" mass="0" diaginertia="0.2 0.3 0.4"/></body>'
     path = tmp_path / "chain.xml"
     path.write_text(f"<mujoco><worldbody>{joints}{rotor}{'</body>' * 8}</worldbody></mujoco>")
-    with pytest.warns(jn.RobotWarning) as caught:
+    with pytest.warns(jn.errors.RobotWarning) as caught:
         load_robot(path)
     (warning,) = caught
     springs = ", ".join(f"j{k} (line 1)" for k in range(6))

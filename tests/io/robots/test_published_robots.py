@@ -71,7 +71,7 @@ def test_strict_refuses_those_that_have_a_warning(pairs):
     for name, pair in pairs.items():
         if not pair.warnings:
             continue
-        with pytest.raises(jn.RobotError) as caught:
+        with pytest.raises(jn.errors.RobotError) as caught:
             jn.load_robot(files()[name], strict=True)
         assert caught.value.line
         assert any(caught.value.name.split(".", 1)[1].startswith(name) for name in pair.named)
@@ -106,7 +106,7 @@ def test_torques_on_a_floating_base_are_those_of_pinocchio():
 def test_a_base_can_be_set_free_in_all_files_of_robots_that_stand_on_none():
     for name, path in files().items():
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", jn.RobotWarning)
+            warnings.simplefilter("ignore", jn.errors.RobotWarning)
             robot = jn.load_robot(path, floating_base=True)
         assert robot.joint_names[0] == "base_x", name
 

@@ -107,7 +107,7 @@ def test_the_world_holds_a_model(tmp_path):
 
 
 def pendulum(inside=""):
-    """Return a link of 2 kg on a horizontal hinge, its centre 0.5 m beside it."""
+    """Return a link of 2 kg on a horizontal hinge, its center 0.5 m beside it."""
     body = SOME.replace("<inertial>", "<inertial><pose>0.5 0 0 0 0 0</pose>") + inside
     hinge = joint("j", "a", "b", inside="<axis><xyz>0 1 0</xyz></axis>")
     return link("a", body=body) + link("b", body=body) + hinge
@@ -494,7 +494,7 @@ def cassie():
 
 
 def test_cassie_has_the_bodies_of_its_file(cassie):
-    """Masses, their centres, and the ends of its rods, from the file by a plain reading of SDF 1.6."""
+    """Masses, their centers, and the ends of its rods, from the file by a plain reading of SDF 1.6."""
     robot = cassie
     here = poses(robot, dict.fromkeys(robot.joints, 0.0))
     root = ElementTree.parse(CASSIE).getroot().find("model")

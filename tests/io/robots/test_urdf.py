@@ -16,7 +16,7 @@ FEATURES = """\
 <?xml version="1.0"?>
 <!-- a robot with one of everything -->
 <robot name="features" xmlns:drake="http://drake.mit.edu">
-  <material name="grey"><color rgba="1 1 1 1"/></material>
+  <material name="gray"><color rgba="1 1 1 1"/></material>
   <link name="base"/>
   <link name="one">
     <visual><geometry><mesh filename="package://nowhere/one.dae"/></geometry></visual>
@@ -115,7 +115,7 @@ def test_moving_joints_are_those_of_the_file(pair):
     assert {joint.name for joint in robot.joints.values() if joint.moving} == set(model.names) - {"universe"}
 
 
-def test_mass_centre_and_inertia_of_bodies_with_what_is_fixed_to_them(pair):
+def test_mass_center_and_inertia_of_bodies_with_what_is_fixed_to_them(pair):
     robot, model = pair
     moving = [joint for joint in robot.joints.values() if joint.moving]
     for k, joint in enumerate(moving):
@@ -227,7 +227,7 @@ def test_damping_and_friction_of_joints_of_several_coordinates_are_told_of(tmp_p
     zero = small(tmp_path, f'type="{kind}"><dynamics damping="0" friction="0"/>')
     load_robot(zero, strict=True)
     path = small(tmp_path, f'type="{kind}"><dynamics {key}="0.5"/>')
-    with pytest.warns(jn.RobotWarning, match=rf"{key} of planar and floating joints: j \(line 1\); make"):
+    with pytest.warns(jn.errors.RobotWarning, match=rf"{key} of planar and floating joints: j \(line 1\); make"):
         robot = load_robot(path)
     assert not any(joint.damping or joint.friction for joint in robot.joints.values())
     with pytest.raises(RobotFileError, match=rf"line 1, joints\.j\.dynamics\.{key}: .* without {key} of .*, got 0\.5"):
@@ -247,7 +247,7 @@ def test_a_massless_link_between_joints_is_warned_of_unless_it_is_meant(tmp_path
         '<joint name="a" type="continuous"><parent link="base"/><child link="ring"/></joint>\n'
         '<joint name="b" type="continuous"><parent link="ring"/><child link="rotor"/></joint></robot>'
     )
-    with pytest.warns(jn.RobotWarning, match=r"have no mass: ring \(line 1\)"):
+    with pytest.warns(jn.errors.RobotWarning, match=r"have no mass: ring \(line 1\)"):
         robot = load_robot(path)
     np.testing.assert_array_equal(robot.tree.mass, [0.0, 1.0])
     assert load_robot(path, massless=True).joint_names == robot.joint_names
@@ -256,7 +256,7 @@ def test_a_massless_link_between_joints_is_warned_of_unless_it_is_meant(tmp_path
 
 
 def test_a_robot_without_any_mass_needs_no_torque_and_moves(tmp_path):
-    with pytest.warns(jn.RobotWarning, match=r"neither have nor carry mass.*: arm \(line 1\)"):
+    with pytest.warns(jn.errors.RobotWarning, match=r"neither have nor carry mass.*: arm \(line 1\)"):
         robot = load_robot(small(tmp_path, 'type="continuous">', child=""))
     assert robot.massless_joints == ("j",)
     np.testing.assert_array_equal(jn.inverse_dynamics(robot, np.ones((4, 1))), np.zeros((2, 1)))
@@ -283,14 +283,14 @@ def test_rods_and_plates_of_six_digits_have_no_warning(tmp_path, seed):
 
 def test_impossible_moments_are_used_as_they_are_with_a_warning(tmp_path):
     path = small(tmp_path, 'type="continuous"><axis xyz="0 0 1"/>', inertial(np.diag([1.0, 1.0, 3.0])))
-    with pytest.warns(jn.RobotWarning, match=r"exceeds the sum of the others: arm \(line 1\)"):
+    with pytest.warns(jn.errors.RobotWarning, match=r"exceeds the sum of the others: arm \(line 1\)"):
         robot = load_robot(path)
     assert jn.inverse_dynamics(robot, [[0.0], [0.0], [2.0]]).tolist() == [[6.0]]
     assert robot.links["arm"].inertia.fault
     path = small(tmp_path, 'type="continuous"><axis xyz="0 0 1"/>', inertial(np.diag([1.0, 1.0, -2.0])))
-    with pytest.warns(jn.RobotWarning, match=r"negative: arm \(line 1\)"):
+    with pytest.warns(jn.errors.RobotWarning, match=r"negative: arm \(line 1\)"):
         robot = load_robot(path)
-    with pytest.raises(jn.MechanismError, match=r"bodies\.arm\.inertia: .*kinetic energy is negative"):
+    with pytest.raises(jn.errors.MechanismError, match=r"bodies\.arm\.inertia: .*kinetic energy is negative"):
         jn.simulate(robot.mechanism(), [0.0, 0.1])
 
 
@@ -348,7 +348,7 @@ def chain(tmp_path, *mimics):
 
 def test_what_a_joint_does_not_say_is_said_by_the_format(tmp_path):
     robot = load_robot(chain(tmp_path, "<axis/>", '<mimic joint="ja"/>'))
-    assert robot.joints["jb"].mimic == jn.Mimic("ja", 1.0, 0.0)
+    assert robot.joints["jb"].mimic == jn.robot.Mimic("ja", 1.0, 0.0)
     np.testing.assert_array_equal(robot.joints["ja"].axis, [1.0, 0.0, 0.0])
 
 
@@ -356,13 +356,13 @@ def test_a_joint_may_follow_one_that_follows_another(tmp_path):
     second = '<mimic joint="ja" multiplier="2" offset="0.5"/>'
     robot = load_robot(chain(tmp_path, "", second, '<mimic joint="jb" multiplier="-3" offset="1"/>'))
     assert robot.joint_names == ("ja",)
-    assert robot.joints["jc"].mimic == jn.Mimic("ja", -6.0, -0.5)
+    assert robot.joints["jc"].mimic == jn.robot.Mimic("ja", -6.0, -0.5)
 
 
 def test_joints_that_follow_in_a_circle_or_one_that_is_not_there(tmp_path):
     with pytest.raises(RobotFileError, match=r"joints\.ja\.mimic: must follow a moving joint"):
         load_robot(chain(tmp_path, '<mimic joint="jb"/>', '<mimic joint="ja"/>'))
-    with pytest.warns(jn.RobotWarning, match=r"taken as free: jb \(line 1\)"):
+    with pytest.warns(jn.errors.RobotWarning, match=r"taken as free: jb \(line 1\)"):
         robot = load_robot(chain(tmp_path, "", '<mimic joint="jx"/>'))
     assert robot.joint_names == ("ja", "jb")
 
@@ -414,11 +414,11 @@ def test_no_floating_base_where_a_link_is_named_world_already(tmp_path):
 )
 def test_limits_that_say_little_are_read(tmp_path, limit, expected, told):
     moving = f'type="revolute"><limit {limit}/>'
-    with pytest.warns(jn.RobotWarning, match=told) if told else contextlib.nullcontext():
+    with pytest.warns(jn.errors.RobotWarning, match=told) if told else contextlib.nullcontext():
         limits = load_robot(small(tmp_path, moving)).joints["j"].limits
     assert (limits.lower, limits.upper, limits.velocity) == expected
 
 
 def test_a_range_with_both_ends_the_wrong_way_round_is_refused(tmp_path):
-    with pytest.raises(jn.RobotFileError, match="lower limit must not exceed"):
+    with pytest.raises(jn.errors.RobotFileError, match="lower limit must not exceed"):
         load_robot(small(tmp_path, 'type="revolute"><limit lower="0.3" upper="0" effort="9" velocity="2"/>'))

@@ -64,7 +64,7 @@ def write(tmp_path, more="", version="", kind="revolute", dynamics="", turn=""):
 
 def told(path, says):
     """Check that one warning says something, that it is an error if the file is read strictly, and return the robot."""
-    with pytest.warns(jn.RobotWarning, match=says) as caught:
+    with pytest.warns(jn.errors.RobotWarning, match=says) as caught:
         robot = load_robot(path)
     assert len(caught) == 1
     with pytest.raises(RobotFileError) as refused:

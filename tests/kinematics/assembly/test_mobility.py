@@ -124,7 +124,7 @@ def test_a_third_crank_closes_one_of_two_branches():
     assert [repeated.equations for repeated in found.repetitions] == [1]
     turn = jn.drivers.CoordinateDriver(("ground", "crank1"), "angle", "t")
     driven = dataclasses.replace(flat_parallelogram(cranks=3), drivers={"turn": turn})
-    with pytest.raises(jn.MobilityError, match=r"13 equations, 12 .* 1 equation .*singular"):
+    with pytest.raises(jn.errors.MobilityError, match=r"13 equations, 12 .* 1 equation .*singular"):
         jn.solve(driven, [0.0])
 
 
@@ -200,10 +200,10 @@ def test_a_mechanism_is_looked_at_where_its_drivers_and_initial_conditions_hold_
 
 @pytest.mark.parametrize("order", [1, 21])
 def test_an_order_out_of_bounds_is_refused(order):
-    with pytest.raises(jn.MechanismError, match="order: must be a whole number from 2 to 20"):
+    with pytest.raises(jn.errors.MechanismError, match="order: must be a whole number from 2 to 20"):
         jn.mobility(hinges_in_line(), order=order)
 
 
 def test_what_cannot_be_put_together_is_refused():
-    with pytest.raises(jn.AssemblyError):
+    with pytest.raises(jn.errors.AssemblyError):
         jn.mobility(jn.load("examples/four_bar.yaml").with_parameters(BC=0.9))

@@ -99,7 +99,7 @@ def test_random_bennett_linkages_from_bad_guesses_in_any_unit():
 def test_what_is_nearly_a_bennett_linkage_is_refused_and_what_is_one_to_rounding_is_not(size):
     joints = "joints.R3, joints.R1, joints.R4, joints.R2 stay open, by .* mm and .* deg"
     wanted = rf"{joints}.*; 3 equations more than coordinates .* contradict each other by that much"
-    with pytest.raises(jn.AssemblyError, match=wanted):
+    with pytest.raises(jn.errors.AssemblyError, match=wanted):
         jn.solve(overconstrained.bennett(off=1e-3, size=size).mechanism, TIMES)
     moves_as_told(overconstrained.bennett(off=1e-12, size=size), order=6, tolerance=1e-10)
 
@@ -107,7 +107,7 @@ def test_what_is_nearly_a_bennett_linkage_is_refused_and_what_is_one_to_rounding
 @pytest.mark.slow
 def test_a_tolerance_admits_numbers_of_few_digits():
     case = overconstrained.bennett(off=1e-6)
-    with pytest.raises(jn.AssemblyError):
+    with pytest.raises(jn.errors.AssemblyError):
         jn.solve(case.mechanism, TIMES, order=6)
     motion = jn.solve(case.mechanism, TIMES, order=6, tolerance=1e-8)
     np.testing.assert_allclose(motion.outputs["out"][:, 0], exact(case.motion, TIMES, 0)[:, 0], atol=1e-5)
@@ -121,7 +121,7 @@ def turned(first, second):
         bodies={"crank": jn.Body([0, 0])},
         joints={"O": jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])},
         drivers={name: jn.drivers.CoordinateDriver(("ground", "crank"), "angle", law) for name, law in laws.items()},
-        outputs={"angle": jn.AngleOutput("crank")},
+        outputs={"angle": jn.outputs.AngleOutput("crank")},
     )
 
 
@@ -129,9 +129,9 @@ def turned(first, second):
 def test_drivers_that_agree_are_solved_and_others_refused():
     motion = jn.solve(turned("t", "t"), [0.0, 1.0], order=2)
     np.testing.assert_allclose(motion.outputs["angle"], [[0, 1, 0], [1, 1, 0]], atol=1e-15)
-    with pytest.raises(jn.AssemblyError, match=r"drivers\.one, drivers\.two stay open, by .* deg"):
+    with pytest.raises(jn.errors.AssemblyError, match=r"drivers\.one, drivers\.two stay open, by .* deg"):
         jn.solve(turned("t", "t + 0.1"), [0.0])
-    with pytest.raises(jn.SolveError, match=r"drivers\.two, drivers\.one .*: inconsistent"):
+    with pytest.raises(jn.errors.SolveError, match=r"drivers\.two, drivers\.one .*: inconsistent"):
         jn.solve(turned("t", "2*t"), [0.0])
 
 
@@ -148,10 +148,10 @@ def test_a_structure_that_is_locked_can_rest_and_not_move():
     random = np.random.default_rng(3)
     axes = random.normal(size=(3, 3))
     hinges = [(np.zeros(3), np.array(Z)), *zip(random.normal(size=(3, 3)), axes, strict=True)]
-    driven = [overconstrained.hinged_loop(hinges, jn.ExpressionMotion("rate*t", {"rate": x})) for x in (0.0, 0.1)]
+    driven = [overconstrained.hinged_loop(hinges, jn.laws.ExpressionMotion("rate*t", {"rate": x})) for x in (0.0, 0.1)]
     resting = jn.solve(driven[0], [0.0, 1.0], order=1)
     assert (resting.status == Status.OK).all()
-    with pytest.raises(jn.SolveError, match=r"in their rates\): inconsistent"):
+    with pytest.raises(jn.errors.SolveError, match=r"in their rates\): inconsistent"):
         jn.solve(driven[1], [0.0, 1.0], order=1)
 
 
@@ -178,7 +178,7 @@ def test_a_dead_point_is_no_redundancy():
     law = jn.drivers.RotationDriver(("ground", "rocker"), Z, f"{angle!r} - t")
     dead = dataclasses.replace(linkage, bodies=bodies, drivers={"turn": law})
     told = "18 of them independent; joint D repeats 3 equations of A, B, C, .* a singular position"
-    with pytest.raises(jn.MobilityError, match=told):
+    with pytest.raises(jn.errors.MobilityError, match=told):
         jn.solve(dead, [0.0], order=1)
 
 
@@ -221,7 +221,7 @@ def test_a_large_linkage_is_solved_front_by_front():
         bodies=bodies,
         joints=joints,
         drivers={"turn": jn.drivers.CoordinateDriver(("ground", "crank00"), "angle", "0.7 + 0.3*t")},
-        outputs={"last": jn.PointOutput(f"beam{count - 1}", [0, 0])},
+        outputs={"last": jn.outputs.PointOutput(f"beam{count - 1}", [0, 0])},
     )
     motion = jn.solve(linkage, [0.0, 0.5, 1.0])
     assert motion.model.system.fronts is not None

@@ -17,7 +17,7 @@ CRANK = jn.Mechanism(
     drivers={
         "motor": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion="rise*abs(t - begin)"),
     },
-    outputs={"tip": jn.PointOutput("rod", ["length", 0])},
+    outputs={"tip": jn.outputs.PointOutput("rod", ["length", 0])},
 )
 
 

@@ -47,7 +47,7 @@ def test_no_array_takes_the_name_of_another():
     np.testing.assert_array_equal(family["time"], [0.0])
     for name in ("status", "design"):
         other = dataclasses.replace(FOUR_BAR, outputs={name: FOUR_BAR.outputs["psi"]})
-        with pytest.raises(jn.MechanismError, match=f"name '{name}' is that of an array of a family"):
+        with pytest.raises(jn.errors.MechanismError, match=f"name '{name}' is that of an array of a family"):
             jn.solve_batch(other, {"BC": [0.14, 0.15]}, [0.0], order=0)
 
 
@@ -66,13 +66,13 @@ def test_one_that_locks_or_cannot_be_assembled_stops_no_other():
 
 @pytest.mark.slow
 def test_bad_designs_are_told():
-    with pytest.raises(jn.MechanismError, match=r"greater than zero.*design 1: BC = -0\.14"):
+    with pytest.raises(jn.errors.MechanismError, match=r"greater than zero.*design 1: BC = -0\.14"):
         jn.solve_batch(FOUR_BAR, {"BC": [0.14, -0.14]}, TIME, order=2)
-    with pytest.raises(jn.MechanismError, match="one for each design"):
+    with pytest.raises(jn.errors.MechanismError, match="one for each design"):
         jn.solve_batch(FOUR_BAR, {"BC": [0.14, np.nan]}, TIME)
-    with pytest.raises(jn.MechanismError, match="no parameter has this name"):
+    with pytest.raises(jn.errors.MechanismError, match="no parameter has this name"):
         jn.solve_batch(FOUR_BAR, {"BCD": [0.14]}, TIME)
-    with pytest.raises(jn.MechanismError, match="one value for each design, 2 as"):
+    with pytest.raises(jn.errors.MechanismError, match="one value for each design, 2 as"):
         jn.solve_batch(FOUR_BAR, {"BC": [0.14, 0.15], "AB": [0.04]}, TIME)
 
 
@@ -138,7 +138,7 @@ def test_forces_and_energies_are_those_of_designs_alone():
         bodies={"arm": jn.Body([0, 0], mass="m", center_of_mass=["c", 0])},
         joints={"O": jn.planar.Revolute(("ground", "arm"), [0, 0], [0, 0])},
         drivers={"turn": jn.drivers.CoordinateDriver(("ground", "arm"), "angle", motion="3*t")},
-        outputs={"torque": jn.DriverTorqueOutput("turn"), "angle": jn.AngleOutput("arm")},
+        outputs={"torque": jn.outputs.DriverTorqueOutput("turn"), "angle": jn.outputs.AngleOutput("arm")},
     )
     family = jn.solve_batch(arm, {"m": [1.0, 2.0, 3.0], "c": [0.1, 0.2, 0.3]}, [0.0, 0.2], order=1)
     m, c = family["m"].values[:, None], family["c"].values[:, None]

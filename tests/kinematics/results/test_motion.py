@@ -15,11 +15,11 @@ TIME = np.linspace(0.0, 1.0, 4)
 @pytest.fixture(scope="module")
 def planar():
     outputs = {
-        "psi": jn.AngleOutput("rocker"),
-        "C": jn.PointOutput("rocker", ["CD", 0]),
-        "rate": jn.AngularVelocityOutput("rocker"),
-        "rod": jn.DistanceOutput(("crank", "rocker"), ["AB", 0], ["CD", 0]),
-        "between": jn.PlanarRelativeAngleOutput(("crank", "rocker")),
+        "psi": jn.outputs.AngleOutput("rocker"),
+        "C": jn.outputs.PointOutput("rocker", ["CD", 0]),
+        "rate": jn.outputs.AngularVelocityOutput("rocker"),
+        "rod": jn.outputs.DistanceOutput(("crank", "rocker"), ["AB", 0], ["CD", 0]),
+        "between": jn.outputs.PlanarRelativeAngleOutput(("crank", "rocker")),
     }
     return jn.solve(dataclasses.replace(four_bar(), outputs=outputs), TIME)
 
@@ -93,7 +93,7 @@ def test_spatial_angular_velocity_in_both_frames(spatial):
 
 @pytest.mark.slow
 def test_relative_angle_asked_for_later(spatial):
-    asked = spatial.evaluate(jn.RelativeAngleOutput(("ground", "spindle"), [1.0, 2.0, 2.0]))
+    asked = spatial.evaluate(jn.outputs.RelativeAngleOutput(("ground", "spindle"), [1.0, 2.0, 2.0]))
     np.testing.assert_allclose(asked.values, spatial.outputs["angle"], atol=1e-12)
 
 
@@ -129,15 +129,15 @@ def test_order_zero_has_positions_only():
         (lambda m: m.point("rocker", [0.0, np.nan]), "finite"),
         (lambda m: m.angle("nobody"), "no body has this name"),
         (lambda m: m.angular_velocity("rocker", "globe"), "unknown frame"),
-        (lambda m: m.evaluate(jn.RelativeAngleOutput(("crank", "rocker"), [0, 0, 1])), "spatial"),
+        (lambda m: m.evaluate(jn.outputs.RelativeAngleOutput(("crank", "rocker"), [0, 0, 1])), "spatial"),
     ],
 )
 def test_what_cannot_be_asked_for(planar, ask, message):
-    with pytest.raises(jn.MechanismError, match=message):
+    with pytest.raises(jn.errors.MechanismError, match=message):
         ask(planar)
 
 
 @pytest.mark.slow
 def test_planar_angle_of_a_spatial_body(spatial):
-    with pytest.raises(jn.MechanismError, match="planar"):
+    with pytest.raises(jn.errors.MechanismError, match="planar"):
         spatial.angle("spindle")

@@ -9,14 +9,14 @@ import jounce as jn
 
 
 def test_inertia_and_time_constant_are_those_at_the_joint():
-    drive = jn.Drive(stiffness=2e4, damping=10.0, rotor_inertia=5e-5, gear_ratio=-100)
+    drive = jn.planning.Drive(stiffness=2e4, damping=10.0, rotor_inertia=5e-5, gear_ratio=-100)
     assert drive.reflected_inertia == pytest.approx(0.5, rel=1e-15)
     assert drive.time_constant == 5e-4
     assert drive.elastic
-    spindle = jn.Drive(stiffness=1.0, rotor_inertia=1.0, lead=0.005)
+    spindle = jn.planning.Drive(stiffness=1.0, rotor_inertia=1.0, lead=0.005)
     assert spindle.ratio == 2 * math.pi / 0.005
-    assert not jn.Drive(rotor_inertia=1.0).elastic
-    assert jn.Drive().reflected_inertia is None
+    assert not jn.planning.Drive(rotor_inertia=1.0).elastic
+    assert jn.planning.Drive().reflected_inertia is None
 
 
 @pytest.mark.parametrize(
@@ -35,21 +35,21 @@ def test_inertia_and_time_constant_are_those_at_the_joint():
     ],
 )
 def test_wrong_values_are_told_by_their_names(values, field):
-    with pytest.raises(jn.RobotError) as raised:
-        jn.Drive(**values)
+    with pytest.raises(jn.errors.RobotError) as raised:
+        jn.planning.Drive(**values)
     assert raised.value.name == field
 
 
 @pytest.mark.parametrize(
     "drives, words",
     [
-        ({"shoulde": jn.Drive()}, "shoulder"),
-        ({"elbow": 3.0}, "must be a jn.Drive"),
-        ({"elbow": jn.Drive(lead=0.01)}, "gear_ratio"),
+        ({"shoulde": jn.planning.Drive()}, "shoulder"),
+        ({"elbow": 3.0}, "must be a jn.planning.Drive"),
+        ({"elbow": jn.planning.Drive(lead=0.01)}, "gear_ratio"),
         ([1.0], "mapping"),
         (None, "mapping"),
     ],
 )
 def test_drives_that_do_not_fit_are_refused(arm, swing, drives, words):
-    with pytest.raises(jn.RobotError, match=words):
-        jn.feedforward(arm, swing, drives)
+    with pytest.raises(jn.errors.RobotError, match=words):
+        jn.planning.feedforward(arm, swing, drives)

@@ -13,8 +13,8 @@ from tests.problems.robots import random_robot
 TIMES = np.array([0.1, 0.77, 1.3])
 MASS, ARM, MOMENT, WEIGHT = 2.0, 0.4, 0.05, 9.81
 DRIVES = {
-    "shoulder": jn.Drive(stiffness=500.0, rotor_inertia=1e-4, gear_ratio=50),
-    "elbow": jn.Drive(stiffness=300.0, rotor_inertia=5e-5, gear_ratio=-80),
+    "shoulder": jn.planning.Drive(stiffness=500.0, rotor_inertia=1e-4, gear_ratio=50),
+    "elbow": jn.planning.Drive(stiffness=300.0, rotor_inertia=5e-5, gear_ratio=-80),
 }
 
 
@@ -42,8 +42,8 @@ LAW = jn.JointTrajectory({"pin": "0.7*sin(2*t) + 0.2*t**3"}, 0.0, 1.5)
 
 
 def test_a_pendulum_to_the_third_rate_of_the_torque():
-    drive = jn.Drive(stiffness=90.0, rotor_inertia=2e-4, gear_ratio=60)
-    found = jn.feedforward(pendulum(), LAW, {"pin": drive}, rates=3, times=TIMES)
+    drive = jn.planning.Drive(stiffness=90.0, rotor_inertia=2e-4, gear_ratio=60)
+    found = jn.planning.feedforward(pendulum(), LAW, {"pin": drive}, rates=3, times=TIMES)
     inertia = mpmath.mpf(60) ** 2 * mpmath.mpf(2e-4)
     with mp.workdps(50):
         for row, t in enumerate(map(mpmath.mpf, TIMES)):
@@ -62,8 +62,8 @@ def test_a_pendulum_to_the_third_rate_of_the_torque():
 @pytest.mark.slow
 def test_a_damped_pendulum_is_solved_along_the_trajectory():
     """Against quadrature of 30 digits from the same start, and its own equation."""
-    drive = jn.Drive(stiffness=90.0, damping=9.0, rotor_inertia=2e-4, gear_ratio=60)
-    found = jn.feedforward(pendulum(), LAW, {"pin": drive}, times=TIMES)
+    drive = jn.planning.Drive(stiffness=90.0, damping=9.0, rotor_inertia=2e-4, gear_ratio=60)
+    found = jn.planning.feedforward(pendulum(), LAW, {"pin": drive}, times=TIMES)
     start = found.at([0.0]).deflection[0, 0, 0]
     with mp.workdps(30):
         for row, t in enumerate(map(mpmath.mpf, TIMES)):
@@ -71,15 +71,17 @@ def test_a_damped_pendulum_is_solved_along_the_trajectory():
             assert abs(found.deflection[row, 0, 0] - start * mp.exp(-10 * t) - past) < 1e-14
     force = 90.0 * found.deflection[:, :2] + 9.0 * found.deflection[:, 1:]
     np.testing.assert_allclose(force, found.spring_torque[:, :2], rtol=0, atol=1e-12)
-    first = jn.feedforward(pendulum(), LAW, {"pin": dataclasses.replace(drive, damping=0.0)}, times=[0.0], rates=1)
+    first = jn.planning.feedforward(
+        pendulum(), LAW, {"pin": dataclasses.replace(drive, damping=0.0)}, times=[0.0], rates=1
+    )
     tau = first.spring_torque[0, :3, 0]
     assert start == pytest.approx((tau[0] - 0.1 * tau[1] + 0.01 * tau[2]) / 90, rel=1e-13)
 
 
 def test_without_damping_is_the_limit_of_little_damping(arm, swing):
-    hard = jn.feedforward(arm, swing, DRIVES, times=TIMES)
+    hard = jn.planning.feedforward(arm, swing, DRIVES, times=TIMES)
     little = {name: dataclasses.replace(drive, damping=1e-9) for name, drive in DRIVES.items()}
-    soft = jn.feedforward(arm, swing, little, times=TIMES)
+    soft = jn.planning.feedforward(arm, swing, little, times=TIMES)
     for field in ("position", "torque", "deflection"):
         np.testing.assert_allclose(getattr(soft, field), getattr(hard, field), rtol=1e-9, atol=1e-11)
 
@@ -87,23 +89,23 @@ def test_without_damping_is_the_limit_of_little_damping(arm, swing):
 def test_a_stiff_spring_is_a_rigid_joint(arm, swing):
     rigid = {name: dataclasses.replace(drive, stiffness=None) for name, drive in DRIVES.items()}
     stiff = {name: dataclasses.replace(drive, stiffness=1e13) for name, drive in DRIVES.items()}
-    expected, found = (jn.feedforward(arm, swing, drives, times=TIMES) for drives in (rigid, stiff))
+    expected, found = (jn.planning.feedforward(arm, swing, drives, times=TIMES) for drives in (rigid, stiff))
     assert not expected.deflection.any()
     np.testing.assert_allclose(found.torque, expected.torque, rtol=1e-9)
     q = swing.derivatives(TIMES, 4)
-    armature = [jn.Drive(rotor_inertia=d.reflected_inertia) for d in DRIVES.values()]
+    armature = [jn.planning.Drive(rotor_inertia=d.reflected_inertia) for d in DRIVES.values()]
     joints = [
         dataclasses.replace(j, armature=d.rotor_inertia) for j, d in zip(arm.moving_joints, armature, strict=True)
     ]
     geared = jn.Robot("arm", list(arm.links.values()), joints)
     np.testing.assert_allclose(expected.torque[:, :1], jn.inverse_dynamics(geared, q, drives=True)[:, :1], rtol=1e-13)
-    own = jn.feedforward(geared, swing, {}, times=TIMES)  # the armature of the file is that of the rotor
+    own = jn.planning.feedforward(geared, swing, {}, times=TIMES)  # the armature of the file is that of the rotor
     np.testing.assert_allclose(own.torque, expected.torque, rtol=1e-13)
 
 
 def test_a_gear_changes_what_the_motor_does_and_not_the_joint(arm, swing):
     plain = {n: dataclasses.replace(d, gear_ratio=1.0, rotor_inertia=d.reflected_inertia) for n, d in DRIVES.items()}
-    geared, direct = (jn.feedforward(arm, swing, drives, times=TIMES) for drives in (DRIVES, plain))
+    geared, direct = (jn.planning.feedforward(arm, swing, drives, times=TIMES) for drives in (DRIVES, plain))
     np.testing.assert_allclose(geared.torque, direct.torque, rtol=1e-14)
     np.testing.assert_allclose(geared.motor_torque * [50, -80], direct.motor_torque, rtol=1e-14)
     np.testing.assert_allclose(geared.motor_position / [50, -80], direct.motor_position, rtol=1e-14)
@@ -113,9 +115,9 @@ def test_a_gear_changes_what_the_motor_does_and_not_the_joint(arm, swing):
 
 @pytest.mark.slow
 def test_derivatives_alone_give_the_same(arm, swing):
-    along = jn.feedforward(arm, swing, DRIVES, rates=2, times=TIMES)
-    found = jn.feedforward(arm, swing.derivatives(TIMES, 6), DRIVES, rates=2)
-    assert isinstance(found, jn.MotorMotion)
+    along = jn.planning.feedforward(arm, swing, DRIVES, rates=2, times=TIMES)
+    found = jn.planning.feedforward(arm, swing.derivatives(TIMES, 6), DRIVES, rates=2)
+    assert isinstance(found, jn.planning.MotorMotion)
     for field in ("position", "torque", "deflection", "motor_torque"):
         np.testing.assert_allclose(getattr(found, field), getattr(along, field), rtol=1e-12, atol=1e-13)
 
@@ -123,23 +125,23 @@ def test_derivatives_alone_give_the_same(arm, swing):
 @pytest.mark.slow
 def test_the_expansion_alone_is_refused_until_it_is_good_enough(arm, swing):
     damped = {name: dataclasses.replace(drive, damping=0.5) for name, drive in DRIVES.items()}
-    with pytest.raises(jn.RobotError, match="more derivatives"):
-        jn.feedforward(arm, swing.derivatives(TIMES, 4), damped)
-    with pytest.raises(jn.RobotError, match="derivative 2 of the deflection"):  # of which there is one term
-        jn.feedforward(arm, swing.derivatives(TIMES, 4), damped, tolerance=0.1)
-    found = jn.feedforward(arm, swing.derivatives(TIMES, 9), damped)
-    along = jn.feedforward(arm, swing, damped, times=TIMES)
+    with pytest.raises(jn.errors.RobotError, match="more derivatives"):
+        jn.planning.feedforward(arm, swing.derivatives(TIMES, 4), damped)
+    with pytest.raises(jn.errors.RobotError, match="derivative 2 of the deflection"):  # of which there is one term
+        jn.planning.feedforward(arm, swing.derivatives(TIMES, 4), damped, tolerance=0.1)
+    found = jn.planning.feedforward(arm, swing.derivatives(TIMES, 9), damped)
+    along = jn.planning.feedforward(arm, swing, damped, times=TIMES)
     for level in range(3):
         size = np.abs(along.deflection[:, level]).max()
         np.testing.assert_allclose(found.deflection[:, level], along.deflection[:, level], rtol=0, atol=1e-6 * size)
 
 
 def test_instants_outside_are_refused(arm, swing):
-    found = jn.feedforward(arm, swing, DRIVES)
+    found = jn.planning.feedforward(arm, swing, DRIVES)
     for times in ([-0.1], [2.1], [np.nan], [[0.1]]):
-        with pytest.raises(jn.TrajectoryError, match="from 0 to 2 s"):
+        with pytest.raises(jn.errors.TrajectoryError, match="from 0 to 2 s"):
             found.at(times)
-    with pytest.raises(jn.TrajectoryError, match="times: must be real numbers"):
+    with pytest.raises(jn.errors.TrajectoryError, match="times: must be real numbers"):
         found.at(np.array([0.1j]))
 
 
@@ -148,9 +150,9 @@ def test_springs_obey_their_law_on_robots_of_chance(seed):
     robot = random_robot(seed, 5)
     names = robot.joint_names
     rng = np.random.default_rng(seed)
-    drives = {name: jn.Drive(stiffness=rng.uniform(50, 900), rotor_inertia=0.01) for name in names[::2]}
+    drives = {name: jn.planning.Drive(stiffness=rng.uniform(50, 900), rotor_inertia=0.01) for name in names[::2]}
     q = rng.uniform(-1, 1, (6, 7, len(names)))
-    found = jn.feedforward(robot, q, drives, rates=2, losses=False)
+    found = jn.planning.feedforward(robot, q, drives, rates=2, losses=False)
     tau = np.asarray(jn.inverse_dynamics(robot, q, drives=False))
     stiffness = np.array([drives[n].stiffness if n in drives else np.inf for n in names])
     inertia = np.array([0.01 if n in drives else a for n, a in zip(names, robot.tree.armature, strict=True)])
@@ -165,8 +167,10 @@ def test_limits_are_told_with_joint_and_instant():
     rod = jn.Inertia(1.0, tensor=[0.16, 0.16, 0.32])
     robot = jn.Robot("fan", [jn.Link("base"), jn.Link("rod", rod)], [jn.Joint("pin", "base", "rod")])
     law = jn.JointTrajectory({"pin": "-10*cos(t)"}, 0.5, 3.5, times=[0.5, 2.0, 3.5])
-    drive = jn.Drive(stiffness=100.0, rotor_inertia=1e-9, gear_ratio=10, deflection_limit=0.03, velocity_limit=200.0)
-    report = jn.feedforward(robot, law, {"pin": drive}).report
+    drive = jn.planning.Drive(
+        stiffness=100.0, rotor_inertia=1e-9, gear_ratio=10, deflection_limit=0.03, velocity_limit=200.0
+    )
+    report = jn.planning.feedforward(robot, law, {"pin": drive}).report
     (row,) = report.broken
     assert (row.joint, row.quantity, row.unit, row.limit) == ("pin", "deflection", "rad", -0.03)
     assert row.time == pytest.approx(np.pi, abs=1e-5)
@@ -178,8 +182,8 @@ def test_limits_are_told_with_joint_and_instant():
 
 
 def test_friction_acts_on_the_motor_and_damping_on_the_link():
-    robot, drive = pendulum(damping=0.3, friction=0.7), jn.Drive(stiffness=90.0, rotor_inertia=1e-3)
-    with_, without = (jn.feedforward(robot, LAW, {"pin": drive}, times=TIMES, losses=x) for x in (True, False))
+    robot, drive = pendulum(damping=0.3, friction=0.7), jn.planning.Drive(stiffness=90.0, rotor_inertia=1e-3)
+    with_, without = (jn.planning.feedforward(robot, LAW, {"pin": drive}, times=TIMES, losses=x) for x in (True, False))
     q = LAW.derivatives(TIMES, 4)
     np.testing.assert_allclose(with_.spring_torque - without.spring_torque, 0.3 * q[:, 1:4], rtol=0, atol=1e-12)
     expected = 0.3 * q[:, 1] + 1e-3 * 0.3 * q[:, 3] / 90.0 + 0.7 * np.sign(with_.position[:, 1])
@@ -189,33 +193,33 @@ def test_friction_acts_on_the_motor_and_damping_on_the_link():
 def test_a_trajectory_whose_jerk_jumps_is_refused(arm):
     times = np.linspace(0, 2, 9)
     cubic = jn.JointTrajectory.from_samples(times, np.stack([np.sin(times), np.cos(times)], axis=1), arm.joint_names, 3)
-    with pytest.raises(jn.TrajectoryError, match="continuous to jerk"):
-        jn.feedforward(arm, cubic, DRIVES)
-    with pytest.warns(jn.SampleWarning):  # the rates that the table tells
-        rigid = jn.feedforward(arm, cubic, {})
+    with pytest.raises(jn.errors.TrajectoryError, match="continuous to jerk"):
+        jn.planning.feedforward(arm, cubic, DRIVES)
+    with pytest.warns(jn.errors.SampleWarning):  # the rates that the table tells
+        rigid = jn.planning.feedforward(arm, cubic, {})
     assert np.isfinite(rigid.torque).all()
 
 
 def test_loops_followers_and_shapes_are_refused(arm):
     five_bar = jn.load_robot("examples/robots/five_bar.xml")
-    with pytest.raises(jn.RobotError, match="mechanism"):
-        jn.feedforward(five_bar, np.zeros((5, len(five_bar.joint_names))), {})
+    with pytest.raises(jn.errors.RobotError, match="mechanism"):
+        jn.planning.feedforward(five_bar, np.zeros((5, len(five_bar.joint_names))), {})
     panda = jn.load_robot("examples/robots/panda.urdf")
-    with pytest.raises(jn.RobotError, match="follows panda_finger_joint1"):
-        jn.feedforward(panda, np.zeros((5, 8)), {"panda_finger_joint2": jn.Drive(stiffness=1.0)})
-    with pytest.raises(jn.RobotError):
-        jn.feedforward(arm, np.zeros((4, 2)), DRIVES)
+    with pytest.raises(jn.errors.RobotError, match="follows panda_finger_joint1"):
+        jn.planning.feedforward(panda, np.zeros((5, 8)), {"panda_finger_joint2": jn.planning.Drive(stiffness=1.0)})
+    with pytest.raises(jn.errors.RobotError):
+        jn.planning.feedforward(arm, np.zeros((4, 2)), DRIVES)
     with pytest.raises(jn.JounceError, match="at most"):
-        jn.feedforward(arm, np.zeros((5, 2)), DRIVES, rates=25)
-    with pytest.raises(jn.TrajectoryError, match="times: must be real numbers"):
-        jn.feedforward(arm, jn.JointTrajectory({"elbow": "t"}, 0.0, 1.0), DRIVES, times=np.array([0.5j]))
-    with pytest.raises(jn.TrajectoryError, match="within"):
-        jn.feedforward(arm, jn.JointTrajectory({"elbow": "t"}, 0.0, 1.0), DRIVES, times=[0.5, 1.5])
+        jn.planning.feedforward(arm, np.zeros((5, 2)), DRIVES, rates=25)
+    with pytest.raises(jn.errors.TrajectoryError, match="times: must be real numbers"):
+        jn.planning.feedforward(arm, jn.JointTrajectory({"elbow": "t"}, 0.0, 1.0), DRIVES, times=np.array([0.5j]))
+    with pytest.raises(jn.errors.TrajectoryError, match="within"):
+        jn.planning.feedforward(arm, jn.JointTrajectory({"elbow": "t"}, 0.0, 1.0), DRIVES, times=[0.5, 1.5])
 
 
 @pytest.mark.slow
 def test_the_table_has_what_both_sides_of_the_gear_do(arm, swing):
-    found = jn.feedforward(arm, swing, DRIVES, rates=1)
+    found = jn.planning.feedforward(arm, swing, DRIVES, rates=1)
     table = found.dataset
     assert table.sizes == {"time": 201, "derivative": 2}
     np.testing.assert_array_equal(table["elbow_motor_velocity"].values, found.motor_position[:, 1:3, 1])

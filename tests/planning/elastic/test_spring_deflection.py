@@ -107,7 +107,7 @@ def test_a_jump_of_the_torque_is_refused_with_its_instant():
         values = np.stack([np.where(late, times - 0.7312, 0.0), np.where(late, 1.0, 0.0), np.zeros_like(times)], axis=1)
         return values[..., None]
 
-    with pytest.raises(jn.TrajectoryError, match=r"rate 1 .* 0\.7312") as raised:
+    with pytest.raises(jn.errors.TrajectoryError, match=r"rate 1 .* 0\.7312") as raised:
         SpringDeflection(kinked, np.ones(1), np.zeros(1), np.linspace(0, 2, 21), ("pin",))
     assert raised.value.name == "pin"
 
@@ -117,7 +117,7 @@ def test_a_jump_at_a_node_is_refused_too():
         late = times >= 1.0
         return np.stack([np.where(late, 2.0, 0.0), np.zeros_like(times), np.zeros_like(times)], axis=1)[..., None]
 
-    with pytest.raises(jn.TrajectoryError, match="torque of the spring jumps by 2 near t = 1 s"):
+    with pytest.raises(jn.errors.TrajectoryError, match="torque of the spring jumps by 2 near t = 1 s"):
         SpringDeflection(stepped, np.ones(1), np.ones(1), np.linspace(0, 2, 21), ("pin",))
 
 

@@ -26,7 +26,7 @@ def test_as_many_cells_as_straight_lines_need_to_follow_a_wave(waves, cells):
 def test_lines_splines_and_jumps_of_higher_derivatives_need_no_more():
     assert cells_needed(path_of({"x": "2*s"}), 2) == 160
     assert cells_needed(path_of({"x": [0.0, 0.4, 1.0, 1.2]}), 2) == 160
-    assert cells_needed(path_of({"x": jn.PiecewiseMotion(["t", "t + (t - 0.5)**3"], until=[0.5])}), 2) == 160
+    assert cells_needed(path_of({"x": jn.laws.PiecewiseMotion(["t", "t + (t - 0.5)**3"], until=[0.5])}), 2) == 160
 
 
 @pytest.mark.parametrize(

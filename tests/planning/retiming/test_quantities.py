@@ -10,7 +10,7 @@ from jounce.planning.retiming.paths import path_of
 from jounce.planning.retiming.quantities import Curves
 from jounce.planning.retiming.rate_law import RateLaw
 from jounce.planning.retiming.rate_motion import RateMotion
-from jounce.planning.retiming.rate_spline import Parametrisation, RateBasis
+from jounce.planning.retiming.rate_spline import Parametrization, RateBasis
 from jounce.planning.retiming.robot_quantities import RobotQuantities
 
 
@@ -26,7 +26,7 @@ def test_curves_are_the_torques_rates_and_jounces_of_the_motion():
     )
     source = RobotQuantities(robot, path, limits)
     share = np.linspace(0, 1, 51)
-    parameter = Parametrisation(share, share**2 * (3 - 2 * share), (3, 3))
+    parameter = Parametrization(share, share**2 * (3 - 2 * share), (3, 3))
     basis = RateBasis(30, 4)
     law = RateLaw(parameter, basis, rng.uniform(0.2, 0.5, basis.count))
     motion = RateMotion(np.linspace(0, 1, 31), basis.pieces(law.coefficients))
@@ -34,8 +34,10 @@ def test_curves_are_the_torques_rates_and_jounces_of_the_motion():
     u = np.asarray(motion(jn.Jet.variable(jnp.asarray(times), 0)).derivatives())[0]
     shape = parameter.derivatives(u, 4)
     first, second, rates, points, jounce = Curves(source(shape[0]), shape).values(law.at(u))
-    progress = jn.FollowingMotion(parameter, motion)
-    moved = jn.JointTrajectory({n: jn.FollowingMotion(x, progress) for n, x in path.laws.items()}, 0.0, motion.duration)
+    progress = jn.laws.FollowingMotion(parameter, motion)
+    moved = jn.JointTrajectory(
+        {n: jn.laws.FollowingMotion(x, progress) for n, x in path.laws.items()}, 0.0, motion.duration
+    )
     q = np.concatenate([moved.derivatives(times, 4), np.zeros((len(times), 5, 1))], axis=2)
     torques = jn.inverse_dynamics(robot, q[:, :4], drives=True)
     hand = jn.forward_kinematics(robot, q[:, :3], "panda_hand").position

@@ -27,7 +27,7 @@ def pendulum(**limits):
 def led_cart(multiplier, **limits):
     """Return a cart without limits, and one that follows it with its own."""
     follower = jn.Joint(
-        "follow", "base", "led", "prismatic", mimic=jn.Mimic("slide", multiplier), limits=jn.Limits(**limits)
+        "follow", "base", "led", "prismatic", mimic=jn.robot.Mimic("slide", multiplier), limits=jn.Limits(**limits)
     )
     joints = [jn.Joint("slide", "base", "cart", "prismatic"), follower]
     return jn.Robot(
@@ -58,7 +58,7 @@ def test_a_limit_that_depends_on_the_position_leaves_those_of_joints_that_follow
     robot = led_cart(2.0, velocity=1.0, acceleration=3.0, deceleration=1.0)
     laws = {"slide": {"velocity": lambda q: 0.25 + q, "acceleration": lambda q: 1 + 0 * q}}
     own = {"slide": jn.Limits(velocity=0.1, jerk=7.0)}
-    found = limits_of(robot, limits_of(robot, jn.MotionLimits(own, varying=laws)))
+    found = limits_of(robot, limits_of(robot, jn.planning.MotionLimits(own, varying=laws)))
     q = np.array([0.0, 0.125, 2.0])
     varying = {field: law(q).tolist() for field, law in found.varying["slide"].items()}
     assert varying == {"velocity": [0.25, 0.375, 0.5], "acceleration": [1.0] * 3, "deceleration": [0.5] * 3}
@@ -74,21 +74,21 @@ def test_a_limit_that_depends_on_the_position_leaves_those_of_joints_that_follow
 def test_what_arrives_has_slowed_down_also_where_the_limits_depend_on_the_position():
     limits = {"acceleration": lambda q: 1.0 + 0 * q, "deceleration": lambda q: 4.0 + 0 * q}
     trajectory = jn.JointTrajectory({"slide": "1 - (1 - t)**2"}, start=0.0, stop=1.0)
-    report = check_motion(cart(), trajectory, jn.MotionLimits(varying={"slide": limits}))
+    report = check_motion(cart(), trajectory, jn.planning.MotionLimits(varying={"slide": limits}))
     assert report.worst.ratio == pytest.approx(0.5, rel=1e-12)
 
 
 @pytest.mark.parametrize(
     "law, jumps",
     [
-        (jn.PiecewiseMotion(["t", "2*t - 1"], [1.0]), {"jerk", "jounce", "acceleration of the point"}),
-        (jn.PiecewiseMotion(["t**3", "3*t**2 - 3*t + 1"], [1.0]), {"jounce"}),  # of which only jerk jumps
-        (jn.PiecewiseMotion(["t**4", "4*t**3 - 6*t**2 + 4*t - 1"], [1.0]), set()),
+        (jn.laws.PiecewiseMotion(["t", "2*t - 1"], [1.0]), {"jerk", "jounce", "acceleration of the point"}),
+        (jn.laws.PiecewiseMotion(["t**3", "3*t**2 - 3*t + 1"], [1.0]), {"jounce"}),  # of which only jerk jumps
+        (jn.laws.PiecewiseMotion(["t**4", "4*t**3 - 6*t**2 + 4*t - 1"], [1.0]), set()),
     ],
 )
 def test_limits_of_all_kinds_are_broken_where_something_below_jumps(law, jumps):
-    limits = jn.MotionLimits(
-        points=(jn.PointLimits("cart", speed=99.0, acceleration=999.0),),
+    limits = jn.planning.MotionLimits(
+        points=(jn.planning.PointLimits("cart", speed=99.0, acceleration=999.0),),
         jounce={"slide": 999.0},
         varying={"slide": {"jerk": lambda q: 999.0 + 0 * q}},
     )
@@ -121,7 +121,7 @@ def test_durations_are_those_of_closed_forms(limits, duration):
 @pytest.mark.slow
 def test_a_limit_of_jounce_rounds_the_jerk():
     robot = cart(velocity=SPEED, acceleration=ACCELERATION, jerk=JERK)
-    found = jn.retime(robot, LINE, jn.MotionLimits(jounce={"slide": JOUNCE}))
+    found = jn.retime(robot, LINE, jn.planning.MotionLimits(jounce={"slide": JOUNCE}))
     duration = TRAPEZOID + ACCELERATION / JERK + JERK / JOUNCE
     assert duration * (1 - 1e-9) < found.stop < duration * 1.003
     assert np.abs(found.derivatives(np.linspace(0, found.stop, 4001), 4)[:, 4]).max() <= JOUNCE * (1 + 1e-6)
@@ -131,9 +131,11 @@ def test_a_limit_of_jounce_rounds_the_jerk():
 @pytest.mark.slow
 def test_the_speed_of_a_point_and_a_speed_that_depends_on_the_position():
     robot = cart(velocity=SPEED, acceleration=ACCELERATION)
-    point = jn.retime(robot, LINE, jn.MotionLimits(points=(jn.PointLimits("cart", speed=0.7, acceleration=1.5),)))
+    point = jn.retime(
+        robot, LINE, jn.planning.MotionLimits(points=(jn.planning.PointLimits("cart", speed=0.7, acceleration=1.5),))
+    )
     assert point.stop == pytest.approx(LENGTH / 0.7 + 0.7 / 1.5, rel=2e-3)
-    varying = jn.MotionLimits(varying={"slide": {"velocity": lambda q: 0.3 + 0.2 * (q - 1) ** 2}})
+    varying = jn.planning.MotionLimits(varying={"slide": {"velocity": lambda q: 0.3 + 0.2 * (q - 1) ** 2}})
     found = jn.retime(robot, LINE, varying)
     q, v = found.derivatives(np.linspace(0, found.stop, 3001), 1)[:, :, 0].T
     assert (v / (0.3 + 0.2 * (q - 1) ** 2)).max() == pytest.approx(1.0, abs=1e-3)
@@ -233,7 +235,7 @@ def test_bad_paths_are_told(path, message):
 
 @pytest.mark.slow
 def test_a_jump_of_curvature_is_refused_only_where_rates_are_limited():
-    bent = {"slide": jn.PiecewiseMotion(["t", "t + (t - 0.5)**2"], until=[0.5])}
+    bent = {"slide": jn.laws.PiecewiseMotion(["t", "t + (t - 0.5)**2"], until=[0.5])}
     assert jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION), bent).report.kept
     with pytest.raises(TrajectoryError, match=r"curvature at s = 0\.5"):
         jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION, jerk=JERK), bent)
@@ -250,7 +252,9 @@ def test_limits_that_allow_anything_or_nothing_are_told():
     with pytest.raises(SolveError, match="rates at the ends"):
         jn.retime(cart(velocity=SPEED, acceleration=ACCELERATION), LINE, rates=(1.0, 0.0))
     with pytest.raises(RobotError, match="greater than zero"):
-        jn.retime(cart(velocity=SPEED), LINE, jn.MotionLimits(varying={"slide": {"velocity": lambda q: 1 - q}}))
+        jn.retime(
+            cart(velocity=SPEED), LINE, jn.planning.MotionLimits(varying={"slide": {"velocity": lambda q: 1 - q}})
+        )
     with pytest.raises(TrajectoryError, match="order"):
         jn.retime(cart(velocity=SPEED, jerk=JERK), LINE, order=1)
 
@@ -292,7 +296,7 @@ def test_the_drivers_of_a_mechanism_keep_force_yank_and_the_speed_of_an_output()
         bodies={"wheel": jn.Body([0, 0], mass=2.0, inertia=0.5)},
         joints={"O": jn.planar.Revolute(("ground", "wheel"), [0, 0], [0, 0])},
         drivers={"turn": jn.drivers.CoordinateDriver(("ground", "wheel"), "angle", motion="2*t + 0.1*t**2")},
-        outputs={"rim": jn.PointOutput("wheel", [0.5, 0])},
+        outputs={"rim": jn.outputs.PointOutput("wheel", [0.5, 0])},
         time=jn.TimeGrid(0.0, 2.0, 0.01),
     )
     limits = {"turn": jn.Limits(effort=1.0, effort_rate=5.0), "rim": jn.Limits(velocity=1.0)}

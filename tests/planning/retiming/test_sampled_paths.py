@@ -115,7 +115,7 @@ def test_where_times_count_dwells_stay_still_and_each_instant_is_near(kind):
 
 def test_positions_alone_of_a_controller_are_samples():
     corner = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
-    laws = {name: jn.HermiteMotion([0.0, 1.0, 2.0], corner[:, [k]]) for k, name in enumerate("ab")}
+    laws = {name: jn.laws.HermiteMotion([0.0, 1.0, 2.0], corner[:, [k]]) for k, name in enumerate("ab")}
     path = path_of(jn.JointTrajectory(laws, 0.0, 2.0), None, 2, Between(0.01))
     places = path.derivatives(np.linspace(0, 1, 2001), 0)[:, 0]
     assert 0.001 < distances(places, corner).max() <= 0.01

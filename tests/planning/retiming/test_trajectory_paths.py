@@ -8,7 +8,7 @@ from jounce.errors import TrajectoryError
 from jounce.planning.retiming.paths import path_of
 from jounce.planning.retiming.trajectory_paths import Ramps
 
-THERE, BACK = jn.Segment("cycloidal", 1.0, to=0.5), jn.Segment("cycloidal", 1.3, to=0.0)
+THERE, BACK = jn.laws.Segment("cycloidal", 1.0, to=0.5), jn.laws.Segment("cycloidal", 1.3, to=0.0)
 
 
 def places(path, count=20001):
@@ -20,8 +20,8 @@ def places(path, count=20001):
     [
         ("0.5*sin(3*t)**2", np.pi / 3),
         ("0.5*sin(3*t)**2", np.pi),  # back and forth, again and again
-        (jn.SegmentedMotion([THERE, BACK]), 2.3),
-        (jn.SegmentedMotion([THERE, jn.Segment("dwell", 0.4), BACK]), 2.7),
+        (jn.laws.SegmentedMotion([THERE, BACK]), 2.3),
+        (jn.laws.SegmentedMotion([THERE, jn.laws.Segment("dwell", 0.4), BACK]), 2.7),
     ],
     ids=["squared sine", "three turns", "segments", "a stay"],
 )
@@ -47,8 +47,8 @@ def test_joints_that_turn_together_stay_on_their_line():
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_a_corner_at_which_a_trajectory_stands_still_is_kept(order):
-    first = jn.SegmentedMotion([THERE, jn.Segment("dwell", 1.3)])
-    second = jn.SegmentedMotion([jn.Segment("dwell", 1.0), jn.Segment("cycloidal", 1.3, to=0.4)])
+    first = jn.laws.SegmentedMotion([THERE, jn.laws.Segment("dwell", 1.3)])
+    second = jn.laws.SegmentedMotion([jn.laws.Segment("dwell", 1.0), jn.laws.Segment("cycloidal", 1.3, to=0.4)])
     path = path_of(jn.JointTrajectory({"j": first, "k": second}, 0.0, 2.3), order=order)
     j, k = places(path)[:, 0].T
     assert np.minimum(np.abs(k), np.abs(j - 0.5)).max() < 1e-9  # on one side of the corner, or on the other

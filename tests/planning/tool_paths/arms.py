@@ -22,7 +22,7 @@ def planar_chain(lengths, lower=None, upper=None):
 def wrist_arm(seed):
     """Return an arm with a shoulder about z, two joints about y and a spherical wrist, its frames drawn at random.
 
-    With it, the centre of the wrist in the frame of the hand, the shoulder with its axes, and the two lengths.
+    With it, the center of the wrist in the frame of the hand, the shoulder with its axes, and the two lengths.
     """
     generator = np.random.default_rng(seed)
     turns = Rotation.random(7, rng=generator).as_matrix()
@@ -40,7 +40,7 @@ def wrist_arm(seed):
             Joint(f"joint_{k}", names[k], names[k + 1], "revolute", before.T @ arm, before.T @ after, after.T @ axis)
         )
     parts = {
-        "centre": np.zeros(3),
+        "center": np.zeros(3),
         "origin": turns[0].T @ arms[0],
         "axes": turns[0].T,
         "lengths": (upper, lower),

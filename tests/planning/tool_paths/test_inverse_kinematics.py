@@ -46,9 +46,9 @@ def test_wrist_arm_meets_its_closed_form_in_any_frames():
     assert (found.status == Status.OK).all()
     assert found.distance.max() < 1e-9
     assert found.angle.max() < 1e-9
-    # the wrist centre follows from the pose alone; the arm before it has a closed form
-    centre = np.asarray(there.position)[:, 0] + turned.apply(parts["centre"] - np.array(place))
-    x, y, z = ((centre - parts["origin"]) @ parts["axes"]).T
+    # the wrist center follows from the pose alone; the arm before it has a closed form
+    center = np.asarray(there.position)[:, 0] + turned.apply(parts["center"] - np.array(place))
+    x, y, z = ((center - parts["origin"]) @ parts["axes"]).T
     upper, lower = parts["lengths"]
     assert np.allclose(np.sin(found.q[:, 0] - np.arctan2(y, x)), 0.0, rtol=0, atol=1e-9)
     cosine = (x**2 + y**2 + z**2 - upper**2 - lower**2) / (2 * upper * lower)

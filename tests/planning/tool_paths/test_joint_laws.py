@@ -7,8 +7,12 @@ import jounce as jn
 from jounce.errors import TrajectoryError
 
 CORNER = [
-    jn.SegmentedMotion([jn.Segment("polynomial", 1.0, to=0.5, begin=[0.5], end=[0.5]), jn.Segment("dwell", 1.0)]),
-    jn.SegmentedMotion([jn.Segment("dwell", 1.0), jn.Segment("polynomial", 1.0, to=0.5, begin=[0.5], end=[0.5])]),
+    jn.laws.SegmentedMotion(
+        [jn.laws.Segment("polynomial", 1.0, to=0.5, begin=[0.5], end=[0.5]), jn.laws.Segment("dwell", 1.0)]
+    ),
+    jn.laws.SegmentedMotion(
+        [jn.laws.Segment("dwell", 1.0), jn.laws.Segment("polynomial", 1.0, to=0.5, begin=[0.5], end=[0.5])]
+    ),
 ]
 
 
@@ -19,8 +23,8 @@ def along(*laws, order=4):
         for name, parent, child, axis in zip("xyz", "0ab", "abc", np.eye(3).tolist(), strict=True)
     ]
     gantry = jn.Robot("gantry", [jn.Link(name, rod) for name in "0abc"], joints)
-    path = jn.ToolPath(laws, start=0.0, stop=2.0)
-    return gantry, path, jn.follow_tool_path(gantry, "c", path, order=order).trajectory()
+    path = jn.planning.ToolPath(laws, start=0.0, stop=2.0)
+    return gantry, path, jn.planning.follow_tool_path(gantry, "c", path, order=order).trajectory()
 
 
 @pytest.mark.slow
@@ -42,7 +46,7 @@ def test_a_corner_is_kept_and_its_velocities_jump(laws, kink):
     np.testing.assert_allclose(found[:, 0], wanted[:, 0], rtol=0, atol=2e-9)
     np.testing.assert_allclose(found[smooth, 1], wanted[smooth, 1], rtol=0, atol=1e-6)
     law = laws.laws["x"]
-    assert isinstance(law, jn.HermiteMotion)
+    assert isinstance(law, jn.laws.HermiteMotion)
     instants, jumps = law.jumps(1)
     broken = jumps[1] != 0
     assert instants[broken] == pytest.approx([kink], abs=1e-9)

@@ -156,7 +156,7 @@ def test_shapes_of_batches():
     ],
 )
 def test_bad_input(call, words):
-    with pytest.raises(jn.RobotError) as raised:
+    with pytest.raises(jn.errors.RobotError) as raised:
         call(robot_named("scara"))
     assert all(word in str(raised.value) for word in words)
 
@@ -164,9 +164,9 @@ def test_bad_input(call, words):
 def test_loops_are_refused():
     robot = jn.load_robot(FILES / "planar_arm.xml")
     ends = [robot.base, robot.link_names[-1]]
-    closed = robot.with_closures([jn.Closure("pin", ends)])
+    closed = robot.with_closures([jn.robot.Closure("pin", ends)])
     for function in (jn.mass_matrix, jn.bias_forces):
-        with pytest.raises(jn.RobotError, match="loops"):
+        with pytest.raises(jn.errors.RobotError, match="loops"):
             function(closed, np.zeros((2, len(robot.joint_names))))
 
 
@@ -188,5 +188,5 @@ def test_flags_are_true_or_false(name, value):
     robot = robot_named("panda")
     still = np.zeros((2, len(robot.joint_names)))
     for function, q in ((jn.mass_matrix, still[0]), (jn.bias_forces, still)):
-        with pytest.raises((jn.RobotError, TypeError), match=name):  # TypeError by the checker of the tests
+        with pytest.raises((jn.errors.RobotError, TypeError), match=name):  # TypeError by the checker of the tests
             function(robot, q, **{name: value})

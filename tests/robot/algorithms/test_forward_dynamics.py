@@ -46,7 +46,7 @@ def free_motion(levels, seed=1):
     generator = np.random.default_rng(seed)
     quaternion = generator.normal(size=(SAMPLES, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1)[:, None]
-    return jn.BaseMotion(
+    return jn.robot.BaseMotion(
         generator.uniform(-1, 1, (SAMPLES, 3)), quaternion, generator.uniform(-1, 1, (SAMPLES, levels, 6))
     )
 
@@ -119,8 +119,8 @@ def test_hybrid_with_wrenches_and_drives():
     robot = random_robot(2, 5, prismatic=0.4)
     q, generator = motion(robot, 4), np.random.default_rng(3)
     wrenches = [
-        jn.Wrench(robot.moving_links[1], generator.uniform(-1, 1, (SAMPLES, 2, 3)), point=[0.1, 0.2, 0.3]),
-        jn.Wrench(robot.moving_links[-1], torque=[0.3, 0.1, 0.2], point=[0.1, 0, 0], frame="link"),
+        jn.robot.Wrench(robot.moving_links[1], generator.uniform(-1, 1, (SAMPLES, 2, 3)), point=[0.1, 0.2, 0.3]),
+        jn.robot.Wrench(robot.moving_links[-1], torque=[0.3, 0.1, 0.2], point=[0.1, 0, 0], frame="link"),
     ]
     torque = jn.inverse_dynamics(robot, q, wrenches=wrenches, drives=True)
     for driven in ([], [1, 3], [0, 1, 2, 3, 4]):
@@ -139,12 +139,12 @@ def test_free_base_order_by_order(seed, follow):
     levels = 2 if follow else 4  # of torques and their rates
     q, whole = motion(robot, levels + 2), free_motion(levels + 1)
     wrenches = [
-        jn.Wrench(robot.base, [1.0, 2.0, 3.0], point=[0.1, 0.2, 0.3]),
-        jn.Wrench(robot.moving_links[-1], [1, 0, 0]),
+        jn.robot.Wrench(robot.base, [1.0, 2.0, 3.0], point=[0.1, 0.2, 0.3]),
+        jn.robot.Wrench(robot.moving_links[-1], [1, 0, 0]),
     ]
     forces = jn.inverse_dynamics(robot, q, base=whole, wrenches=wrenches)
     assert forces.shape == (SAMPLES, levels, 6 + len(robot.joint_names))
-    start = jn.BaseMotion(whole.position, whole.quaternion, whole.twist[:, :1])
+    start = jn.robot.BaseMotion(whole.position, whole.quaternion, whole.twist[:, :1])
     moved, found = jn.forward_dynamics(robot, q[:, :2], forces, base=start, wrenches=wrenches)
     again = jn.inverse_dynamics(robot, found, base=moved, wrenches=wrenches)
     for level in range(levels):
@@ -168,10 +168,10 @@ def test_free_base_is_that_of_slides_and_turns():
             twist[:, k, :3] += weight * np.einsum("sij,sj->si", back[:, j], link.position[:, k - j + 1])
             twist[:, k, 3:] += weight * np.einsum("sij,sj->si", back[:, j], link.angular_velocity[:, k - j])
     quaternion = np.array([np.roll(pinocchio.Quaternion(r.T).coeffs(), 1) for r in still])
-    forces = jn.inverse_dynamics(robot, q[:, :, 6:], base=jn.BaseMotion(link.position[:, 0], quaternion, twist))
+    forces = jn.inverse_dynamics(robot, q[:, :, 6:], base=jn.robot.BaseMotion(link.position[:, 0], quaternion, twist))
     expected = jn.inverse_dynamics(chain, q)
     assert error(forces[:, :, 6:], expected[:, :, 6:]) <= 1e-12
-    held = jn.joint_wrenches(chain, q)[:, :, chain.moving_links.index(robot.base)]
+    held = jn.robot.joint_wrenches(chain, q)[:, :, chain.moving_links.index(robot.base)]
     assert error(forces[:, :, :6], held) <= 1e-12
 
 
@@ -195,15 +195,17 @@ def test_gradients_of_accelerations_and_their_rates():
 def test_bad_input_is_told():
     robot = random_robot(2, 3)
     state = np.zeros((2, 3))
-    with pytest.raises(jn.RobotError, match=r"tau: must have the shape \(order \+ 1, 3\), as"):
+    with pytest.raises(jn.errors.RobotError, match=r"tau: must have the shape \(order \+ 1, 3\), as"):
         jn.forward_dynamics(robot, state, np.zeros(3))
-    with pytest.raises(jn.RobotError, match="driven: "):
+    with pytest.raises(jn.errors.RobotError, match="driven: "):
         jn.forward_dynamics(robot, state, np.zeros((1, 3)), driven=["elbow"])
-    base = jn.BaseMotion([0, 0, 0], [1, 1, 0, 0], np.zeros((1, 6)))
-    with pytest.raises(jn.RobotError, match=r"base.quaternion: must be of unit length"):
+    base = jn.robot.BaseMotion([0, 0, 0], [1, 1, 0, 0], np.zeros((1, 6)))
+    with pytest.raises(jn.errors.RobotError, match=r"base.quaternion: must be of unit length"):
         jn.forward_dynamics(robot, state, np.zeros((1, 3)), base=base)
-    with pytest.raises(jn.RobotError, match=r"base.twist: must have the shape \(1, 6\)"):
-        jn.forward_dynamics(robot, state, np.zeros((1, 3)), base=jn.BaseMotion([0, 0, 0], [1, 0, 0, 0], np.zeros(6)))
+    with pytest.raises(jn.errors.RobotError, match=r"base.twist: must have the shape \(1, 6\)"):
+        jn.forward_dynamics(
+            robot, state, np.zeros((1, 3)), base=jn.robot.BaseMotion([0, 0, 0], [1, 0, 0, 0], np.zeros(6))
+        )
 
 
 def test_joint_that_nothing_resists_is_named():
@@ -212,7 +214,7 @@ def test_joint_that_nothing_resists_is_named():
     joints = [jn.Joint("swing", "base", "arm", axis=[0, 1, 0]), jn.Joint("roll", "arm", "tip", armature=0.1)]
     robot = jn.Robot("needle", links, joints)
     state, torque = [[0.3, 0.1], [0.2, 0.5]], [[1.0, 0.2]]
-    with pytest.raises(jn.SingularityError, match=r"roll: .*no inertia"):
+    with pytest.raises(jn.errors.SingularityError, match=r"roll: .*no inertia"):
         jn.forward_dynamics(robot, state, torque, drives=False)
     assert np.isnan(jn.forward_dynamics(robot, state, torque, strict=False, drives=False)[2]).all()
     assert np.isfinite(jn.forward_dynamics(robot, state, torque, driven="roll", drives=False)).all()
@@ -221,8 +223,8 @@ def test_joint_that_nothing_resists_is_named():
 
 def test_loops_are_sent_elsewhere():
     robot = robot_named("serial")
-    closed = robot.with_closures([jn.Closure("tip", (robot.base, robot.moving_links[-1]))])
-    with pytest.raises(jn.RobotError, match=r"jn.simulate\(robot.mechanism"):
+    closed = robot.with_closures([jn.robot.Closure("tip", (robot.base, robot.moving_links[-1]))])
+    with pytest.raises(jn.errors.RobotError, match=r"jn.simulate\(robot.mechanism"):
         jn.forward_dynamics(closed, np.zeros((2, 6)), np.zeros((1, 6)))
 
 
@@ -234,8 +236,8 @@ def test_a_lone_body_that_is_fixed_has_no_motion():
 def test_free_base_without_inertia_is_told():
     ball = jn.Inertia(1.0, center_of_mass=[0.1, 0, 0], tensor=[0.1, 0.1, 0.1])
     robot = jn.Robot("ball", [jn.Link("base"), jn.Link("ball", ball)], [jn.Joint("pin", "base", "ball")])
-    base = jn.BaseMotion([0, 0, 0], [1, 0, 0, 0], np.zeros((1, 6)))
-    with pytest.raises(jn.SingularityError, match="some motion of the joints or of the free base"):
+    base = jn.robot.BaseMotion([0, 0, 0], [1, 0, 0, 0], np.zeros((1, 6)))
+    with pytest.raises(jn.errors.SingularityError, match="some motion of the joints or of the free base"):
         jn.forward_dynamics(robot, np.zeros((2, 1)), [[1.0]], base=base)
 
 
@@ -244,7 +246,7 @@ def test_symmetric_top_in_closed_form():
     """Its angular velocity turns about its axis at a constant rate: all rates of the twist of a base are known."""
     across, along, spin = 2.0, 0.5, 3.0
     top = jn.Robot("top", [jn.Link("body", jn.Inertia(1.5, tensor=[across, across, along]))], [], gravity=[0, 0, 0])
-    start = jn.BaseMotion([0, 0, 0], [0.6, 0, 0.8, 0], [[0, 0, 0, 1.0, 0, spin]])
+    start = jn.robot.BaseMotion([0, 0, 0], [0.6, 0, 0.8, 0], [[0, 0, 0, 1.0, 0, spin]])
     moved, _ = jn.forward_dynamics(top, np.zeros((2, 0)), np.zeros((HIGHEST + 1, 0)), base=start)
     rates = (1j * (along - across) / across * spin) ** np.arange(HIGHEST + 2)
     expected = np.stack([rates.real, rates.imag, spin * (np.arange(HIGHEST + 2) == 0)], axis=1)

@@ -71,7 +71,7 @@ def test_at_rest_the_torque_is_the_slope_of_the_potential():
     for k in range(7):  # a rate of one coordinate at a time gives one partial derivative
         moving = still.copy()
         moving[:, 1, k] = 1.0
-        slope[:, k] = -ROBOT.mass * jn.center_of_mass(ROBOT, moving)[:, 1] @ ROBOT.gravity
+        slope[:, k] = -ROBOT.mass * jn.robot.center_of_mass(ROBOT, moving)[:, 1] @ ROBOT.gravity
     near(found, slope)
 
 
@@ -171,10 +171,10 @@ def test_nothing_holds_a_robot_that_falls():
 
 
 def test_forces_on_a_floating_base_are_those_on_its_mass():
-    """The sum of outer forces is the mass times the acceleration of its centre, with rates."""
+    """The sum of outer forces is the mass times the acceleration of its center, with rates."""
     floating = ROBOT.with_floating_base()
     q = np.random.default_rng(3).uniform(-1, 1, (3, ORDER + 1, 13))
-    expected = floating.mass * jn.center_of_mass(floating, q)[:, 2:]
+    expected = floating.mass * jn.robot.center_of_mass(floating, q)[:, 2:]
     expected[:, 0] -= floating.mass * floating.gravity
     near(jn.inverse_dynamics(floating, q)[..., :3], expected)
 
@@ -224,7 +224,7 @@ def test_jit_vmap_and_two_ways_of_differentiation_agree(torque):
 
 @pytest.mark.slow
 def test_slopes_in_masses_and_centers():
-    """Torque is linear in each mass and quadratic in each centre, so that differences of any step are exact."""
+    """Torque is linear in each mass and quadratic in each center, so that differences of any step are exact."""
     tree, q = ROBOT.tree, taylor_coefficients(jnp.asarray(Q[0, :3])[:, :, None])
 
     @jax.jit
@@ -266,7 +266,7 @@ def momentum(robot, q, link):
 @pytest.mark.slow
 def test_wrenches_of_joints_change_the_momentum_of_each_body():
     """Newton's second and third laws for every body, with rates, about the origin of the base."""
-    carried = jn.joint_wrenches(ROBOT, Q, frame="base")
+    carried = jn.robot.joint_wrenches(ROBOT, Q, frame="base")
     levels = ORDER - 1
     force = carried[..., :3]
     about_base = np.zeros_like(force)
@@ -293,7 +293,7 @@ def test_wrenches_of_joints_change_the_momentum_of_each_body():
 
 @pytest.mark.slow
 def test_wrenches_in_axes_of_link_and_base():
-    base, link = (jn.joint_wrenches(ROBOT, Q, frame=frame) for frame in ("base", "link"))
+    base, link = (jn.robot.joint_wrenches(ROBOT, Q, frame=frame) for frame in ("base", "link"))
     for k, name in enumerate(ROBOT.moving_links):
         rotation = jn.forward_kinematics(ROBOT, Q, name).rotation
         for level in range(ORDER - 1):
@@ -307,7 +307,7 @@ def test_wrenches_in_axes_of_link_and_base():
 
 def test_torque_is_the_part_of_the_wrench_along_the_axis():
     torque = jn.inverse_dynamics(ROBOT, Q, drives=False)  # what the bodies need; drives act between motor and joint
-    wrenches = jn.joint_wrenches(ROBOT, Q)
+    wrenches = jn.robot.joint_wrenches(ROBOT, Q)
     for k, (link, name) in enumerate(zip(ROBOT.moving_links, ROBOT.joint_names, strict=True)):
         joint = ROBOT.joints[name]
         assert joint.child == link
@@ -316,6 +316,6 @@ def test_torque_is_the_part_of_the_wrench_along_the_axis():
 
 
 def test_frames_of_reactions_are_checked():
-    with pytest.raises(jn.RobotError) as caught:
-        jn.joint_wrenches(ROBOT, Q, frame="world")
+    with pytest.raises(jn.errors.RobotError) as caught:
+        jn.robot.joint_wrenches(ROBOT, Q, frame="world")
     assert str(caught.value) == "frame: unknown frame, got 'world'; valid: base, link"

@@ -65,7 +65,7 @@ def test_a_joint_that_is_followed_moves_by_all_its_followers():
     rod = jn.Inertia(1.0, [0.5, 0, 0])
     joints = [
         jn.Joint("one", "base", "a"),
-        jn.Joint("two", "a", "b", position=[1, 0, 0], mimic=jn.Mimic("one", -2.0, np.pi)),
+        jn.Joint("two", "a", "b", position=[1, 0, 0], mimic=jn.robot.Mimic("one", -2.0, np.pi)),
     ]
     robot = jn.Robot("scissors", [jn.Link("base"), jn.Link("a", rod), jn.Link("b", rod)], joints)
     angle = 0.7

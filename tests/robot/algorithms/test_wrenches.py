@@ -48,25 +48,28 @@ def expected_change(force, turning, link=LINK, point=POINT):
 
 @pytest.mark.slow
 def test_a_wrench_takes_its_work_off_the_torques(torque):
-    wrench = jn.Wrench(LINK, FORCE, TORQUE, POINT)
+    wrench = jn.robot.Wrench(LINK, FORCE, TORQUE, POINT)
     near(jn.inverse_dynamics(ROBOT, Q, wrenches=[wrench]) - torque, expected_change(FORCE, TORQUE))
 
 
 def test_a_wrench_in_the_axes_of_a_link_turns_with_it(torque):
     rotation = jn.forward_kinematics(ROBOT, Q, LINK).rotation
     parts = [product(rotation, part, "sij,sj->si") for part in (FORCE, TORQUE)]
-    wrench = jn.Wrench(LINK, FORCE, TORQUE, POINT, frame="link")
+    wrench = jn.robot.Wrench(LINK, FORCE, TORQUE, POINT, frame="link")
     near(jn.inverse_dynamics(ROBOT, Q, wrenches=[wrench]) - torque, expected_change(*parts))
 
 
 def test_a_wrench_on_a_link_that_is_fixed_to_a_moving_one(torque):
     part = next(joint.child for joint in ROBOT.joints.values() if not joint.moving)
-    wrench = jn.Wrench(part, FORCE, TORQUE, POINT)
+    wrench = jn.robot.Wrench(part, FORCE, TORQUE, POINT)
     near(jn.inverse_dynamics(ROBOT, Q, wrenches=[wrench]) - torque, expected_change(FORCE, TORQUE, part))
 
 
 def test_wrenches_add_up(torque):
-    one, two = jn.Wrench(LINK, FORCE, point=POINT), jn.Wrench(ROBOT.moving_links[1], torque=TORQUE, frame="link")
+    one, two = (
+        jn.robot.Wrench(LINK, FORCE, point=POINT),
+        jn.robot.Wrench(ROBOT.moving_links[1], torque=TORQUE, frame="link"),
+    )
     changes = [jn.inverse_dynamics(ROBOT, Q, wrenches=[w]) - torque for w in (one, two)]
     near(jn.inverse_dynamics(ROBOT, Q, wrenches=[one, two]) - torque, sum(changes))
 
@@ -75,8 +78,8 @@ def test_constants_have_no_rates(torque):
     force = np.array([1.0, -2.0, 3.0])
     series = np.zeros((3, LEVELS, 3))
     series[:, 0] = force
-    found = jn.inverse_dynamics(ROBOT, Q, wrenches=[jn.Wrench(LINK, [1, -2, 3], point=POINT)])
-    near(found, jn.inverse_dynamics(ROBOT, Q, wrenches=[jn.Wrench(LINK, series, point=POINT)]), 1e-15)
+    found = jn.inverse_dynamics(ROBOT, Q, wrenches=[jn.robot.Wrench(LINK, [1, -2, 3], point=POINT)])
+    near(found, jn.inverse_dynamics(ROBOT, Q, wrenches=[jn.robot.Wrench(LINK, series, point=POINT)]), 1e-15)
 
 
 def test_functions_of_time_have_rates_of_their_own():
@@ -86,9 +89,9 @@ def test_functions_of_time_have_rates_of_their_own():
         series[:, k, 0] = 3 * 2.0**k * np.sin(2 * times + k * np.pi / 2)
         series[:, k, 1] = [4.0, 0.0][k]
         series[:, k, 2] = [times**3, 3 * times**2][k]
-    wrench = jn.Wrench(LINK, lambda t: (3 * jnp.sin(2 * t), 4.0, t**3), point=POINT)
+    wrench = jn.robot.Wrench(LINK, lambda t: (3 * jnp.sin(2 * t), 4.0, t**3), point=POINT)
     found = jn.inverse_dynamics(ROBOT, Q, wrenches=[wrench], time=times)
-    near(found, jn.inverse_dynamics(ROBOT, Q, wrenches=[jn.Wrench(LINK, series, point=POINT)]))
+    near(found, jn.inverse_dynamics(ROBOT, Q, wrenches=[jn.robot.Wrench(LINK, series, point=POINT)]))
     traced = jax.jit(lambda t: jn.inverse_dynamics(ROBOT, Q, wrenches=[wrench], time=t))(times)
     near(traced, found)
 
@@ -97,20 +100,20 @@ def test_slopes_in_the_force_are_columns_of_the_jacobian():
     @jax.jit
     @jax.jacfwd
     def slope(force):
-        return jn.inverse_dynamics(ROBOT, Q[0, :3], wrenches=[jn.Wrench(LINK, force, point=POINT)])[0]
+        return jn.inverse_dynamics(ROBOT, Q[0, :3], wrenches=[jn.robot.Wrench(LINK, force, point=POINT)])[0]
 
     near(slope(jnp.zeros(3)), -jn.jacobian(ROBOT, Q[0, :1], LINK, POINT)[0, :3].T)
 
 
 def test_a_robot_that_hangs_on_its_wrench_needs_no_forces():
-    """A floating robot at rest, held at its centre of mass."""
+    """A floating robot at rest, held at its center of mass."""
     robot = robot_named("planar_arm").with_floating_base()
     q = np.zeros((3, len(robot.joint_names)))
-    center = jn.center_of_mass(robot, q[:1])[0]
+    center = jn.robot.center_of_mass(robot, q[:1])[0]
     link = robot.moving_links[5]
     pose = jn.forward_kinematics(robot, q[:1], link)
     local = pose.rotation[0].T @ (center - pose.position[0])
-    found = jn.inverse_dynamics(robot, q, wrenches=[jn.Wrench(link, -robot.mass * robot.gravity, point=local)])
+    found = jn.inverse_dynamics(robot, q, wrenches=[jn.robot.Wrench(link, -robot.mass * robot.gravity, point=local)])
     near(found[0, :6], np.zeros(6), 1e-13)
 
 
@@ -118,8 +121,8 @@ def test_a_robot_that_hangs_on_its_wrench_needs_no_forces():
 def test_joints_carry_what_pushes_beyond_them():
     at_rest = np.zeros((3, ORDER + 1, 7))
     at_rest[:, 0] = Q[:, 0]
-    wrench = jn.Wrench(LINK, FORCE, TORQUE, POINT)
-    free, pushed = (jn.joint_wrenches(ROBOT, at_rest, wrenches=w, frame="base") for w in ([], [wrench]))
+    wrench = jn.robot.Wrench(LINK, FORCE, TORQUE, POINT)
+    free, pushed = (jn.robot.joint_wrenches(ROBOT, at_rest, wrenches=w, frame="base") for w in ([], [wrench]))
     body = ROBOT.moving_links.index(LINK)
     place = jn.forward_kinematics(ROBOT, at_rest, LINK, POINT).position[:, 0]
     for k, link in enumerate(ROBOT.moving_links):
@@ -139,49 +142,49 @@ FINGER = jn.Robot("one", [jn.Link("base"), jn.Link("rod", jn.Inertia(1.0))], [jn
     "call, message",
     [
         (
-            lambda: jn.Wrench("rod", frame="world"),
+            lambda: jn.robot.Wrench("rod", frame="world"),
             "wrench.frame: unknown frame, got 'world'; valid: base, link",
         ),
-        (lambda: jn.Wrench("rod", point=[0, 0]), "wrench.point: must have the shape (3,), not (2,)"),
+        (lambda: jn.robot.Wrench("rod", point=[0, 0]), "wrench.point: must have the shape (3,), not (2,)"),
         (
-            lambda: check_wrenches(FINGER, jn.Wrench("rod"), free=False),  # tests check the callers' types
-            "wrenches: must be a list of jn.Wrench, got 'Wrench'",
+            lambda: check_wrenches(FINGER, jn.robot.Wrench("rod"), free=False),  # tests check the callers' types
+            "wrenches: must be a list of jn.robot.Wrench, got 'Wrench'",
         ),
         (
             lambda: check_wrenches(FINGER, ["rod"], free=False),
-            "wrenches[0]: must be a jn.Wrench, got 'str'",
+            "wrenches[0]: must be a jn.robot.Wrench, got 'str'",
         ),
         (
-            lambda: jn.inverse_dynamics(FINGER, np.zeros((3, 1)), wrenches=[jn.Wrench("rood")]),
+            lambda: jn.inverse_dynamics(FINGER, np.zeros((3, 1)), wrenches=[jn.robot.Wrench("rood")]),
             "wrenches[0].link: no link has this name, got 'rood'; did you mean 'rod'? valid: base, rod",
         ),
         (
-            lambda: jn.inverse_dynamics(FINGER, np.zeros((3, 1)), wrenches=[jn.Wrench("base")]),
+            lambda: jn.inverse_dynamics(FINGER, np.zeros((3, 1)), wrenches=[jn.robot.Wrench("base")]),
             "wrenches[0].link: this link is fixed to the base: nothing moves it, got 'base'",
         ),
         (
-            lambda: dynamics(jn.Wrench(LINK), jn.Wrench(LINK, force=FORCE[:2])),
+            lambda: dynamics(jn.robot.Wrench(LINK), jn.robot.Wrench(LINK, force=FORCE[:2])),
             "wrenches[1].force: must have the shape (3,) or (3, 2, 3), not (2, 2, 3)",
         ),
         (
-            lambda: dynamics(jn.Wrench(LINK, torque=[[1.0], [1.0, 2.0]])),
+            lambda: dynamics(jn.robot.Wrench(LINK, torque=[[1.0], [1.0, 2.0]])),
             "wrenches[0].torque: must be an array of real numbers, got 'list'",
         ),
         (
-            lambda: dynamics(jn.Wrench(LINK, force=lambda t: (t, t, t))),
+            lambda: dynamics(jn.robot.Wrench(LINK, force=lambda t: (t, t, t))),
             "wrenches[0].force: is a function of time: give the instants of the samples as `time`",
         ),
         (
-            lambda: dynamics(jn.Wrench(LINK, force=lambda t: (t, t, t)), time=[0.0, 1.0]),
+            lambda: dynamics(jn.robot.Wrench(LINK, force=lambda t: (t, t, t)), time=[0.0, 1.0]),
             "time: must have one instant for each sample, the shape (3,), not (2,)",
         ),
         (
-            lambda: dynamics(jn.Wrench(LINK, force=lambda t: (t, t)), time=[0.0, 1.0, 2.0]),
+            lambda: dynamics(jn.robot.Wrench(LINK, force=lambda t: (t, t)), time=[0.0, 1.0, 2.0]),
             "wrenches[0].force: the function must return three components, not the shape (2,)",
         ),
     ],
 )
 def test_refused(call, message):
-    with pytest.raises(jn.RobotError) as caught:
+    with pytest.raises(jn.errors.RobotError) as caught:
         call()
     assert str(caught.value) == message

@@ -65,10 +65,10 @@ def branched(**changes):
     joints = [
         jn.Joint("A", "base", "a", axis=[0, 1, 2], position=[0.1, 0, 0.2], **changes),
         jn.Joint("flange", "a", "plate", "fixed", [0.3, 0.1, 0], tilt),
-        jn.Joint("B", "plate", "b", position=[0, 0.2, 0], axis=[1, 0, 0], mimic=jn.Mimic("A", -1.5, 0.4)),
-        jn.Joint("C", "a", "c", "prismatic", [0.2, 0, 0], axis=[1, 1, 0], mimic=jn.Mimic("A", 0.3, 0.1)),
+        jn.Joint("B", "plate", "b", position=[0, 0.2, 0], axis=[1, 0, 0], mimic=jn.robot.Mimic("A", -1.5, 0.4)),
+        jn.Joint("C", "a", "c", "prismatic", [0.2, 0, 0], axis=[1, 1, 0], mimic=jn.robot.Mimic("A", 0.3, 0.1)),
         jn.Joint("D", "base", "d", "prismatic", rotation=tilt, axis=[0, 0, 1]),
-        jn.Joint("E", "d", "e", axis=[0, 1, 0], mimic=jn.Mimic("D", 2.0, -0.3)),
+        jn.Joint("E", "d", "e", axis=[0, 1, 0], mimic=jn.robot.Mimic("D", 2.0, -0.3)),
     ]
     return jn.Robot("branched", links, joints, gravity=[1.0, 2.0, -9.0])
 
@@ -108,7 +108,7 @@ def test_five_bar_against_its_closed_form(five_bar):
     masses, moments = [0.21, 0.26, 0.21, 0.34], [4.1e-4, 1.12e-3, 4.1e-4, 1.31e-3]
 
     def placed(*angles):
-        """Return centres of mass and angles of the links."""
+        """Return centers of mass and angles of the links."""
         turned, elbows, _ = five_bar_tip(angles)
         starts = [mp.mpc("-0.06"), elbows[0], mp.mpc("0.06"), elbows[1]]
         ends = [s + mp.mpc(x, z) * mp.expj(a) for s, a, (_, _, x, z) in zip(starts, turned, centers, strict=True)]
@@ -215,7 +215,7 @@ def carrier():
     links = [jn.Link("base"), jn.Link("arm", ROD), *map(jn.Link, names), jn.Link("load", load)]
     first = jn.Joint(joints[0].name, "arm", joints[0].child, joints[0].type, [0.3, 0.1, 0.2], axis=joints[0].axis)
     joints = [jn.Joint("hinge", "base", "arm", axis=[0, 1, 0]), first, *joints[1:]]
-    weld = jn.Closure("weld", ("arm", "load"), "weld", [0.4, -0.3, 0.1])
+    weld = jn.robot.Closure("weld", ("arm", "load"), "weld", [0.4, -0.3, 0.1])
     return jn.Robot("carrier", links, joints, closures=[weld]), load, count
 
 
@@ -253,7 +253,7 @@ def bennett(a=0.3, b=0.4, alpha=0.7):
     links = [link for link in chain.links.values() if link.name not in ("axis_4", "link_4")]
     joints = [joint for joint in chain.joints.values() if joint.child not in ("axis_4", "link_4")]
     points = [[0, 0, 0], -fixed.rotation.T @ fixed.position]
-    pin = jn.Closure("D", ("link_3", "base"), "pin", points, axis=[0, 0, 1], rotation=fixed.rotation)
+    pin = jn.robot.Closure("D", ("link_3", "base"), "pin", points, axis=[0, 0, 1], rotation=fixed.rotation)
     ratio = math.sin((beta + alpha) / 2) / math.sin((beta - alpha) / 2)
     return jn.Robot("bennett", links, joints, closures=[pin]), ratio
 
@@ -274,7 +274,7 @@ def test_a_dead_point_does_not_make_equations_redundant():
     links = [jn.Link("base"), *(jn.Link(name, ROD) for name in "abc")]
     joints = [jn.Joint("A", "base", "a"), jn.Joint("B", "a", "b", position=[1, 0, 0])]
     joints.append(jn.Joint("C", "base", "c", position=[1, 0, 0]))
-    tip = jn.Closure("tip", ("b", "c"), points=[[1, 0, 0], [1, 0, 0]])
+    tip = jn.robot.Closure("tip", ("b", "c"), points=[[1, 0, 0], [1, 0, 0]])
     robot = jn.Robot("flat", links, joints, closures=[tip])
     borne, redundant = jn.robot.closure_wrenches(robot)["tip"]
     assert np.abs(borne[:, 2]).max() == 0
@@ -285,7 +285,7 @@ def four_bar(on_crank=None):
     links = [jn.Link("base"), *(jn.Link(name, ROD) for name in ("crank", "rod", "rocker"))]
     joints = [jn.Joint("A", "base", "crank"), jn.Joint("B", "crank", "rod", position=[1, 0, 0], **(on_crank or {}))]
     joints.append(jn.Joint("D", "base", "rocker", position=[1, 1, 0]))
-    tip = jn.Closure("C", ("rod", "rocker"), points=[[1, 0, 0], [1, 0, 0]])
+    tip = jn.robot.Closure("C", ("rod", "rocker"), points=[[1, 0, 0], [1, 0, 0]])
     return jn.Robot("four-bar", links, joints, closures=[tip])
 
 
@@ -309,7 +309,9 @@ def test_closures_are_kept():
 def test_the_second_point_follows_from_coordinates_zero():
     links = [jn.Link("base"), jn.Link("a", ROD), jn.Link("b", ROD)]
     joints = [jn.Joint("A", "base", "a", axis=[0, 1, 0]), jn.Joint("S", "base", "b", "prismatic", [1, 2, 3])]
-    closure = jn.Robot("two", links, joints, closures=[jn.Closure("c", ("a", "b"), points=[0.5, 0, 0])]).closures["c"]
+    closure = jn.Robot("two", links, joints, closures=[jn.robot.Closure("c", ("a", "b"), points=[0.5, 0, 0])]).closures[
+        "c"
+    ]
     assert closure.points.tolist() == [[0.5, 0, 0], [-0.5, -2, -3]]
 
 
@@ -330,8 +332,8 @@ def test_the_second_point_follows_from_coordinates_zero():
     ],
 )
 def test_bad_closures(settings, says):
-    with pytest.raises(jn.RobotError) as caught:
-        four_bar().with_closures([jn.Closure(**{"name": "c", "links": ("rod", "rocker"), **settings})])
+    with pytest.raises(jn.errors.RobotError) as caught:
+        four_bar().with_closures([jn.robot.Closure(**{"name": "c", "links": ("rod", "rocker"), **settings})])
     assert str(caught.value).startswith(says)
 
 
@@ -406,5 +408,5 @@ def test_turns_with_drives_stay_joints_of_their_own():
 
 def test_a_moving_link_named_ground():
     robot = jn.Robot("odd", [jn.Link("base"), jn.Link("ground", ROD)], [jn.Joint("A", "base", "ground")])
-    with pytest.raises(jn.RobotError, match="a link of this name moves"):
+    with pytest.raises(jn.errors.RobotError, match="a link of this name moves"):
         robot.mechanism()

@@ -15,7 +15,7 @@ def joint(**fields):
     return jn.Joint("a", "base", "link", **fields)
 
 
-def test_axes_are_normalised():
+def test_axes_are_normalized():
     assert joint(axis=[0, 3, 4]).axis.tolist() == [0.0, 0.6, 0.8]
     assert joint(axis=[0, 0, -1]).axis.tolist() == [0.0, 0.0, -1.0]
 
@@ -82,13 +82,13 @@ REFUSED = [
     (lambda: joint(armature=-0.1), "joints.a.armature: must be zero or greater, got -0.1"),
     (lambda: joint(damping=np.nan), "joints.a.damping: must be finite, got nan"),
     (lambda: joint(friction=-2.0), "joints.a.friction: must be zero or greater, got -2.0"),
-    (lambda: jn.Mimic("b", multiplier=np.inf), "mimic.multiplier: must be finite, got inf"),
-    (lambda: jn.Mimic("b", offset=np.nan), "mimic.offset: must be finite, got nan"),
+    (lambda: jn.robot.Mimic("b", multiplier=np.inf), "mimic.multiplier: must be finite, got inf"),
+    (lambda: jn.robot.Mimic("b", offset=np.nan), "mimic.offset: must be finite, got nan"),
 ]
 
 
 @pytest.mark.parametrize("make, message", REFUSED)
 def test_refused(make, message):
-    with pytest.raises(jn.RobotError) as caught:
+    with pytest.raises(jn.errors.RobotError) as caught:
         make()
     assert str(caught.value) == message

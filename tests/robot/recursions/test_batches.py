@@ -7,7 +7,7 @@ import pytest
 
 import jounce as jn
 from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
-from jounce.robot.algorithms.inverse_dynamics import _generalised_forces
+from jounce.robot.algorithms.inverse_dynamics import _generalized_forces
 from jounce.robot.recursions.batches import WIDTHS
 from tests.problems.robots import random_robot
 
@@ -44,13 +44,13 @@ def test_shapes_of_batches_are_kept(torque, lead):
     assert motion.rotation.shape == (*lead, 4, 3, 3)
     assert motion.angular_velocity.shape == (*lead, 3, 3)
     assert jn.jacobian(ROBOT, q, LAST).shape == (*lead, 4, 6, 4)
-    assert jn.operational_accelerations(ROBOT, q, LAST).shape == (*lead, 3, 6)
-    assert jn.center_of_mass(ROBOT, q).shape == (*lead, 4, 3)
-    assert jn.joint_wrenches(ROBOT, q).shape == (*lead, 2, 4, 6)
+    assert jn.robot.operational_accelerations(ROBOT, q, LAST).shape == (*lead, 3, 6)
+    assert jn.robot.center_of_mass(ROBOT, q).shape == (*lead, 4, 3)
+    assert jn.robot.joint_wrenches(ROBOT, q).shape == (*lead, 2, 4, 6)
 
 
 def compilations():
-    return _generalised_forces.jitted._cache_size() + len(_generalised_forces.mapped.machine_code)
+    return _generalized_forces.jitted._cache_size() + len(_generalized_forces.mapped.machine_code)
 
 
 def test_values_and_robots_of_one_kind_compile_nothing_again(torque):
@@ -69,7 +69,7 @@ def test_values_and_robots_of_one_kind_compile_nothing_again(torque):
 
 def test_wrenches_of_other_values_compile_nothing_again():
     def call(force, point, link):
-        wrench = jn.Wrench(link, force, point=point)
+        wrench = jn.robot.Wrench(link, force, point=point)
         return jn.inverse_dynamics(ROBOT, Q[:3], wrenches=[wrench])
 
     call([1.0, 2, 3], [0, 0, 1], LAST)
@@ -133,7 +133,7 @@ def test_functions_of_jax_run_through(torque):
     single = jax.jit(lambda q: jn.inverse_dynamics(ROBOT, q))(q.astype(np.float32))
     np.testing.assert_allclose(single, expected, rtol=0, atol=1e-5 * np.abs(torque).max())
     motion = jax.jit(lambda q: jn.forward_kinematics(ROBOT, q, LAST))(q)
-    assert isinstance(motion, jn.FrameMotion)
+    assert isinstance(motion, jn.robot.FrameMotion)
     np.testing.assert_allclose(motion.position, jn.forward_kinematics(ROBOT, q, LAST).position, rtol=0, atol=1e-14)
 
 

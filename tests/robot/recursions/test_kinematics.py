@@ -1,4 +1,4 @@
-"""Frames, points and centre of mass: closed forms to high order, sums over links, and words of refusals."""
+"""Frames, points and center of mass: closed forms to high order, sums over links, and words of refusals."""
 
 import math
 
@@ -47,13 +47,13 @@ def test_the_center_of_mass_is_the_mean_of_those_of_the_links(name):
             expected = (pose @ np.append(inertia.center_of_mass, 1.0))[:3]
             np.testing.assert_allclose(motion.position[0], expected, rtol=0, atol=2e-15)
             moment += inertia.mass * motion.position
-    np.testing.assert_allclose(jn.center_of_mass(robot, q), moment / robot.mass, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(jn.robot.center_of_mass(robot, q), moment / robot.mass, rtol=0, atol=1e-14)
 
 
 def test_the_mass_of_the_base_counts():
     links = [jn.Link("base", jn.Inertia(3.0, [0, 0, 1])), jn.Link("rod", ROD)]
     robot = jn.Robot("one", links, [jn.Joint("pin", "base", "rod")])
-    found = jn.center_of_mass(robot, [[0.0], [2.0], [0.0]])
+    found = jn.robot.center_of_mass(robot, [[0.0], [2.0], [0.0]])
     np.testing.assert_allclose(found, [[0.125, 0, 0.75], [0, 0.25, 0], [-0.5, 0, 0]], rtol=0, atol=1e-15)
 
 
@@ -127,11 +127,11 @@ NOTHING = jn.Robot("frame", [jn.Link("base")], [])
             "q: must hold q, q', q'' along its last axis but one: the shape (..., order + 1, n), not (2, 1)",
         ),
         (
-            lambda: jn.operational_accelerations(PIN, [[0.0]], "rod"),
+            lambda: jn.robot.operational_accelerations(PIN, [[0.0]], "rod"),
             "q: must hold q, q' along its last axis but one: the shape (..., order + 1, n), not (1, 1)",
         ),
         (
-            lambda: jn.center_of_mass(PIN, np.zeros((0, 1))),
+            lambda: jn.robot.center_of_mass(PIN, np.zeros((0, 1))),
             "q: must hold q along its last axis but one: the shape (..., order + 1, n), not (0, 1)",
         ),
         (lambda: jn.inverse_dynamics(PIN, [[0.0], [1.0, 2.0]]), "q: must be an array of real numbers, got 'list'"),
@@ -140,10 +140,10 @@ NOTHING = jn.Robot("frame", [jn.Link("base")], [])
             lambda: jn.inverse_dynamics(PIN, np.zeros((3, 1), complex)),
             "q: must be an array of real numbers, got 'ndarray'",
         ),
-        (lambda: jn.center_of_mass(NOTHING, np.zeros((1, 0))), "robot: no link has a mass, got 'frame'"),
+        (lambda: jn.robot.center_of_mass(NOTHING, np.zeros((1, 0))), "robot: no link has a mass, got 'frame'"),
     ],
 )
 def test_refused(call, message):
-    with pytest.raises(jn.RobotError) as caught:
+    with pytest.raises(jn.errors.RobotError) as caught:
         call()
     assert str(caught.value) == message

@@ -75,7 +75,7 @@ def tree_bodies():
 
 
 def tree():
-    """Write forces, reactions, energies, Jacobian and centre of mass of the tree."""
+    """Write forces, reactions, energies, Jacobian and center of mass of the tree."""
     bodies, gravity = tree_bodies(), [0.3, -1.2, -9.7]
     robot = from_numbers(bodies, gravity)
     q = sines(7, len(robot.moving), [0.0, 0.7, 1.9], RATES + 2)

@@ -31,7 +31,7 @@ def test_a_failure_is_told_and_keeps_the_last_motion():
     session.request({"value": -1.0})
     assert session.wait(20.0)
     assert session.recording is first
-    assert isinstance(session.error, jn.AssemblyError)
+    assert isinstance(session.error, jn.errors.AssemblyError)
     assert errors == [session.error]
     assert (session.error.name, session.error.value) == ("value", -1.0)
     session.request({"value": 4.0})  # and a good value takes over again

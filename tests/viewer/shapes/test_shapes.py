@@ -109,7 +109,7 @@ def test_a_trajectory_moves_a_robot_and_must_fit_it():
     recording = subject.solve({}, 1)
     np.testing.assert_allclose(recording.outputs["shoulder"].values[:, 0, 0], 0.3 * recording.time, atol=1e-14)
     assert not recording.outputs["elbow"].values.any()
-    with pytest.raises(jn.RobotError, match="did you mean 'elbow'"):
+    with pytest.raises(jn.errors.RobotError, match="did you mean 'elbow'"):
         robot_subject(robot, jn.JointTrajectory({"elbo": "t"}, 0.0, 1.0))
 
 
@@ -143,7 +143,7 @@ URDF = """<robot name="two">
 </robot>"""
 
 
-def test_shapes_of_a_urdf_are_read_with_places_colours_and_scales(tmp_path):
+def test_shapes_of_a_urdf_are_read_with_places_colors_and_scales(tmp_path):
     (tmp_path / "pack").mkdir()
     (tmp_path / "pack" / "wedge.obj").write_text(
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -152,7 +152,7 @@ def test_shapes_of_a_urdf_are_read_with_places_colours_and_scales(tmp_path):
     path.write_text(URDF)
     shapes = file_shapes(path)
     (block,), (wedge,) = shapes["base"], shapes["hand"]
-    assert block.colour == (255, 0, 0)
+    assert block.color == (255, 0, 0)
     assert block.opacity == 0.5
     assert np.ptp(block.mesh.vertices, axis=0).tolist() == [1, 2, 3]
     assert wedge.mesh.volume == pytest.approx(8 / 6)
@@ -178,7 +178,7 @@ def test_shapes_of_an_mjcf_are_read(tmp_path):
       <joint name="turn" axis="0 0 1"/><geom type="capsule" size="0.1" fromto="0 0 0 1 0 0" rgba="0 0 1 1"/>
       <geom type="box" size="0.1 0.2 0.3" pos="0 0 2" group="3"/></body></worldbody></mujoco>""")
     (capsule,) = file_shapes(path)["arm"]
-    assert capsule.colour == (0, 0, 255)
+    assert capsule.color == (0, 0, 255)
     assert np.ptp(capsule.mesh.vertices, axis=0) == pytest.approx([1.2, 0.2, 0.2], rel=1e-6)
     recording = robot_subject(jn.load_robot(path), path=path).solve(
         {"turn swing": 0.2, "turn middle": 0.0, "period": 1.0}, 1
@@ -209,7 +209,7 @@ SDF = """<sdf version="1.9"><model name="m"><pose>0 0 1 0 0 0</pose>
 </model></sdf>"""
 
 
-def test_shapes_of_an_sdf_are_read_with_places_colours_and_scales(tmp_path):
+def test_shapes_of_an_sdf_are_read_with_places_colors_and_scales(tmp_path):
     (tmp_path / "pack").mkdir()
     (tmp_path / "pack" / "wedge.obj").write_text(
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -218,11 +218,11 @@ def test_shapes_of_an_sdf_are_read_with_places_colours_and_scales(tmp_path):
     path.write_text(SDF)
     shapes = file_shapes(path)
     (block,) = shapes["base"]
-    assert (block.colour, block.opacity) == ((255, 0, 0), 0.75)
+    assert (block.color, block.opacity) == ((255, 0, 0), 0.75)
     assert block.mesh.bounds == pytest.approx(np.array([[-0.5, 1, 4.5], [0.5, 3, 7.5]]))  # beside the base, at the lamp
     wedge, cylinder, ellipsoid, prism, capsule = (shape.mesh for shape in shapes["arm"])
     assert wedge.volume == pytest.approx(8 / 6)
-    assert shapes["arm"][1].colour == (0, 255, 0)
+    assert shapes["arm"][1].color == (0, 255, 0)
     assert np.ptp(cylinder.vertices, axis=0) == pytest.approx([1, 1, 4], rel=1e-6)
     assert np.ptp(ellipsoid.vertices, axis=0) == pytest.approx([2, 4, 6], rel=0.02)
     assert prism.volume == pytest.approx(3.0)

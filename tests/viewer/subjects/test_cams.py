@@ -8,12 +8,12 @@ from jounce.viewer import view
 from jounce.viewer.subjects.cams import CamSubject
 
 FOLLOWERS = [
-    (jn.TranslatingFollower("roller", radius=0.008, offset=0.005), 0.009),
-    (jn.TranslatingFollower("knife_edge"), 0.009),
-    (jn.TranslatingFollower("flat_face"), 0.003),
-    (jn.OscillatingFollower("roller", center_distance=0.08, arm=0.07, radius=0.01), 0.1),
-    (jn.OscillatingFollower("knife_edge", center_distance=0.08, arm=0.07), 0.1),
-    (jn.OscillatingFollower("flat_face", center_distance=0.08, face_offset=0.002), 0.05),
+    (jn.cams.TranslatingFollower("roller", radius=0.008, offset=0.005), 0.009),
+    (jn.cams.TranslatingFollower("knife_edge"), 0.009),
+    (jn.cams.TranslatingFollower("flat_face"), 0.003),
+    (jn.cams.OscillatingFollower("roller", center_distance=0.08, arm=0.07, radius=0.01), 0.1),
+    (jn.cams.OscillatingFollower("knife_edge", center_distance=0.08, arm=0.07), 0.1),
+    (jn.cams.OscillatingFollower("flat_face", center_distance=0.08, face_offset=0.002), 0.05),
 ]
 CASES = [(*case, "clockwise") for case in FOLLOWERS] + [(*FOLLOWERS[k], "counterclockwise") for k in (0, 5)]
 
@@ -28,8 +28,10 @@ def turned(points, angle):
 def test_the_follower_touches_the_cam(follower, rise, sense):
     """Nothing of the outline is within what the follower shows, and some point of it is on its edge."""
     segments = [("dwell", 2.0, {}), ("cycloidal", 1.5, {"by": rise}), ("cycloidal", 1.5, {"by": -rise})]
-    law = jn.SegmentedMotion([jn.Segment(name, long, **given) for name, long, given in segments], beyond="hold")
-    cam = jn.plate_cam(law, follower, base_radius=0.03, sense=sense)
+    law = jn.laws.SegmentedMotion(
+        [jn.laws.Segment(name, long, **given) for name, long, given in segments], beyond="hold"
+    )
+    cam = jn.cams.plate_cam(law, follower, base_radius=0.03, sense=sense)
     seen = CamSubject(cam).solve({}, 2)
     assert not seen.notice
     assert {"cam", "follower"} <= seen.appearance.meshes.keys()
@@ -45,4 +47,4 @@ def test_the_follower_touches_the_cam(follower, rise, sense):
 
 def test_a_cam_has_neither_modes_nor_a_trajectory():
     with pytest.raises(jn.JounceError, match="neither modes nor a trajectory"):
-        view(jn.load_cam("examples/cams/intake.yaml"), modes=True, open_page=False)
+        view(jn.cams.load_cam("examples/cams/intake.yaml"), modes=True, open_page=False)

@@ -31,7 +31,7 @@ def test_a_mode_of_a_robot_moves_its_own_shapes():
     subject = subject_of("examples/robots/planar_arm.xml", modes=ModesChoice(True, hold=["ram"]))
     found = subject.solve({p.name: p.value for p in subject.parameters}, 4)
     robot = subject.subject
-    small = jn.linearise(jn.equilibrium(robot, hold=["ram"]))
+    small = jn.linearize(jn.equilibrium(robot, hold=["ram"]))
     assert f"mode 1 of 2: {small.modes.frequencies[0]:.4g} Hz" in found.notice
     assert found.bodies[0] == robot.base
     assert subject.appearance is not None

@@ -1,4 +1,4 @@
-"""Generalised forces from balances of momentum: virtual work, Newton-Euler. Negrean 2025, equations 78-82, 123-125."""
+"""Generalized forces from balances of momentum: virtual work, Newton-Euler. Negrean 2025, equations 78-82, 123-125."""
 
 from typing import Any
 
@@ -39,7 +39,7 @@ def _virtual_work(tree: Tree, arrays: tuple[Series], _: Any, inertial: bool) -> 
 
 
 def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
-    """Return the generalised inertia forces by recursive Newton-Euler on jets: `inverse_dynamics` without gravity.
+    """Return the generalized inertia forces by recursive Newton-Euler on jets: `inverse_dynamics` without gravity.
 
     For the motion of a mechanism the balances of momentum are those of all bodies together, by multipliers.
 
@@ -73,7 +73,7 @@ def newton_euler(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
 
 
 def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
-    """Return the generalised inertia forces by d'Alembert-Lagrange: Negrean 2025, equations 81, 123 and 124.
+    """Return the generalized inertia forces by d'Alembert-Lagrange: Negrean 2025, equations 81, 123 and 124.
 
     The work that inertia forces and moments of all bodies do along each coordinate, ``sum J^T F``. For the motion of
     a mechanism, J is how the bodies move with the laws of the drivers: the transposed Jacobian of the constraints.
@@ -107,7 +107,7 @@ def virtual_work(system: Robot | Motion, q: ArrayLike | None = None, rates: int 
 
 
 def gravity_forces(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
-    """Return the generalised forces that hold the robot against gravity, and their rates: Q_g of Negrean 2025, 125.
+    """Return the generalized forces that hold the robot against gravity, and their rates: Q_g of Negrean 2025, 125.
 
     With the inertia forces they make the driving forces, ``Q_m = Q_i + Q_g``.
 

@@ -1,6 +1,6 @@
 """A driven mechanism in the coordinates of its drivers: how its bodies move with changes of their laws.
 
-The laws of the drivers are generalised coordinates: with them, joints and loops determine all bodies. A constant is
+The laws of the drivers are generalized coordinates: with them, joints and loops determine all bodies. A constant is
 added to a law, and all poses follow from it to first order by the factored Jacobian, order after order, as in a solve:
 these are the columns of the Jacobian of the bodies, as jets.
 """
@@ -18,7 +18,7 @@ from jounce.dynamics.energy.slopes import Columns, Form, slope_values
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import Masses, required_masses
-from jounce.dynamics.motion_values import Coordinates, cut, labelled, pose_of
+from jounce.dynamics.motion_values import Coordinates, cut, labeled, pose_of
 from jounce.errors import MechanismError
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
@@ -101,11 +101,11 @@ def in_driver_coordinates(
 
 
 def _of_drivers(motion: Motion, values: Float[np.ndarray, "order driver time"], power: int = 0) -> Any:
-    """Return what acts along the coordinates of drivers, labelled, with the unit of each, N or N*m over s^power."""
+    """Return what acts along the coordinates of drivers, labeled, with the unit of each, N or N*m over s^power."""
     drivers = motion.mechanism.drivers
     efforts = ["N*m" if is_turning(driver) else "N" for driver in drivers.values()]
     units = [derivative_unit(unit, power) if power >= 0 else f"{unit}*s^{-power}" for unit in efforts]
-    return labelled(motion, values, driver=tuple(drivers)).assign_coords(unit=("driver", units))
+    return labeled(motion, values, driver=tuple(drivers)).assign_coords(unit=("driver", units))
 
 
 def drivers_of(motion: Motion) -> tuple[str, ...]:
@@ -186,7 +186,7 @@ def _evaluated(
 
 
 def _column(pose: Any, change: Any, center: Any, order: int) -> tuple[Any, Any]:
-    """Return how fast centres of mass move, and bodies turn, as a pose changes, (levels, components, bodies, batch)."""
+    """Return how fast centers of mass move, and bodies turn, as a pose changes, (levels, components, bodies, batch)."""
     linear = change.point(center).truncate(order)
     if isinstance(pose, PlanarPose):
         return stacked(linear), stacked(change.angle.truncate(order)[None])
@@ -210,7 +210,7 @@ def followed(system: System, start_pose: Pose, factor: Factor, time: Jet) -> Pos
     """Return the pose with all derivatives that the time jet has, right to first order in changes of the system.
 
     The factors are those of the system without changes. What they leave of the residual is corrected by them once more,
-    which is all of it to first order: no derivative is taken of a factorisation.
+    which is all of it to first order: no derivative is taken of a factorization.
     """
 
     def solved(pose: Any, solution: Any) -> Any:

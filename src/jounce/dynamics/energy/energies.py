@@ -2,7 +2,7 @@
 
 The acceleration energy of order p is the kinetic energy with derivatives of order p + 1 in the place of velocities,
 ``E_p = 1/2 integral |r^(p+1)|^2 dm``; order 0 is the kinetic energy. With the second moments S of a body about its
-centre of mass C and its axes a this is ``m/2 |r_C^(p+1)|^2 + 1/2 sum S_jk a_j^(p+1) . a_k^(p+1)`` (equation 107), exact
+center of mass C and its axes a this is ``m/2 |r_C^(p+1)|^2 + 1/2 sum S_jk a_j^(p+1) . a_k^(p+1)`` (equation 107), exact
 for any motion. On jets the same two products give the rates.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses, second_moments
-from jounce.dynamics.motion_values import Coordinates, check_motion, concrete_values, cut, labelled, pose_of
+from jounce.dynamics.motion_values import Coordinates, check_motion, concrete_values, cut, labeled, pose_of
 from jounce.errors import JounceError, MechanismError, RobotError, flag, whole_number
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet, dot
@@ -42,7 +42,7 @@ Energies = Float[Numbers, "order body time"]
 """Taylor coefficients of energies of bodies along a motion."""
 
 EnergyFunction = Callable[..., tuple[Jet, ...]]
-"""What maps a pose, masses, centres, second moments and an order to energies, as `body_energy` does."""
+"""What maps a pose, masses, centers, second moments and an order to energies, as `body_energy` does."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ def body_energy(
     center_of_mass : array of shape (3, ...) or (2, ...)
         In the frames of the bodies, m.
     second_moments : array of shape (3, 3, ...) or (2, 2, ...)
-        Integral of rho rho^T dm about the centre of mass, in the frames of the bodies, kg m^2.
+        Integral of rho rho^T dm about the center of mass, in the frames of the bodies, kg m^2.
     order : int, default 1
         Order p of the energy; 0 is the kinetic energy.
 
@@ -183,7 +183,7 @@ def acceleration_energy(
     >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
     >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
     >>> robot = jn.Robot("one", links, [pin])
-    >>> float(jn.acceleration_energy(robot, [[0.0], [2.0], [3.0]]).total[0].round(12))  # (3^2 + 2^4) / 3 / 2
+    >>> float(jn.energy.acceleration_energy(robot, [[0.0], [2.0], [3.0]]).total[0].round(12))  # (3^2 + 2^4) / 3 / 2
     4.166666666667
     """
     drives = flag("drives", drives, error=error_for(system))
@@ -227,7 +227,7 @@ def energies_of(
         bodies = tuple(system.mechanism.rigid_bodies)
         coefficients = energy_coefficients(system, order, function)
         parts = tuple(
-            labelled(system, x[: system.order - order, 1 : 1 + len(bodies)], energy_unit(order), body=bodies)
+            labeled(system, x[: system.order - order, 1 : 1 + len(bodies)], energy_unit(order), body=bodies)
             for x in coefficients
         )
         return *parts, bodies, order
@@ -247,14 +247,14 @@ def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None, *, drives
     --------
     >>> import jounce as jn
     >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
-    >>> jn.kinetic_energy(jn.robot.from_screws([slide]), [[0.0], [3.0], [1.0]]).total.tolist()  # energy and power
+    >>> jn.energy.kinetic_energy(jn.robot.from_screws([slide]), [[0.0], [3.0], [1.0]]).total.tolist()  # J, W
     [9.0, 6.0]
     """
     return acceleration_energy(system, q, order=0, drives=drives)
 
 
 def mass_arrays(tree: Tree) -> tuple[Any, Any, Any]:
-    """Return masses, centres of mass and second moments of the bodies of a robot, as `body_energy` takes them."""
+    """Return masses, centers of mass and second moments of the bodies of a robot, as `body_energy` takes them."""
     tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)[..., None]
     center = jnp.swapaxes(jnp.asarray(tree.center), 0, 1)[:, :, None]
     return jnp.asarray(tree.mass)[:, None], center, second_moments(tensor)
@@ -331,7 +331,7 @@ def potential_energy(motion: Motion) -> "xarray.DataArray":
     [60.0, 60.0]
     """
     check_motion(motion)
-    return labelled(motion, potential_coefficients(motion)[: motion.order + 1].sum(axis=1), "J")
+    return labeled(motion, potential_coefficients(motion)[: motion.order + 1].sum(axis=1), "J")
 
 
 def potential_coefficients(motion: Motion) -> Energies:
@@ -377,7 +377,7 @@ def stored_energy(motion: Motion) -> Any:
     check_motion(motion)
     pose_type, coordinates = motion.poses
     stored = _stored(motion.forces, cut(coordinates, 1), motion.time[None], pose_type)
-    return labelled(motion, concrete_values(motion, stored)[None], "J")[:, 0].drop_vars("derivative")
+    return labeled(motion, concrete_values(motion, stored)[None], "J")[:, 0].drop_vars("derivative")
 
 
 @compiled("pose_type", brief=True)

@@ -30,16 +30,16 @@ class EnergyTerms:
 
     Each is an array of shape (..., rates + 1, bodies), kg m^2 / s^(2 p + 2) for order p, and its derivatives. In the
     formulas for order 1, w and e are angular velocity and acceleration, a is the acceleration of the point of
-    reference, c the way from there to the centre of mass, and I the inertia tensor about the point.
+    reference, c the way from there to the center of mass, and I the inertia tensor about the point.
 
     Parameters
     ----------
     translation : array
         ``1/2 m a . a``: Negrean 2025, equation 84.
     coupling : array
-        ``m a . (e x c)``: equation 85; zero about the centre of mass.
+        ``m a . (e x c)``: equation 85; zero about the center of mass.
     coupling_remaining : array
-        ``m a . (w x (w x c))``: equation 86; zero about the centre of mass.
+        ``m a . (w x (w x c))``: equation 86; zero about the center of mass.
     leading : array
         ``1/2 e . I e``, of the highest derivative of the angular velocity alone: equations 87 and 113.
     mixed : array
@@ -109,7 +109,7 @@ def energy_terms(
     >>> import jounce as jn
     >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
     >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
-    >>> terms = jn.energy_terms(jn.Robot("one", links, [pin]), [[0.0], [2.0], [3.0]])  # 2 rad/s, 3 rad/s^2
+    >>> terms = jn.energy.energy_terms(jn.Robot("one", links, [pin]), [[0.0], [2.0], [3.0]])  # 2 rad/s, 3 rad/s^2
     >>> [float(x[0, 0].round(12)) for x in (terms.translation, terms.leading, terms.mixed, terms.remaining)]
     [3.125, 0.375, 0.0, 0.666666666667]
     >>> float(terms.total[0].round(12))  # (3^2 + 2^4) / 3 / 2
@@ -121,7 +121,7 @@ def energy_terms(
 
 
 def terms_about_center(pose: Pose | Frames, mass: Any, center: Any, moments: Any, order: int) -> tuple[Jet, ...]:
-    """Return the terms of `body_energy` about the centre of mass, as jets: Negrean 2025, equation 106."""
+    """Return the terms of `body_energy` about the center of mass, as jets: Negrean 2025, equation 106."""
     linear = differentiated(pose.point(center), order + 1)
     nothing = dot(linear, linear) * (0.0 * mass)
     return dot(linear, linear) * (0.5 * mass), nothing, nothing, *_rotation(*_rates(pose, order), moments)

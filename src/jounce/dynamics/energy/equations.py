@@ -1,6 +1,6 @@
 """The equations of motion from energies, in every form, for a reader to compare. Negrean 2025, equations 126-134.
 
-All give the generalised inertia forces Q_i of a robot and their rates, and agree to rounding with those of
+All give the generalized inertia forces Q_i of a robot and their rates, and agree to rounding with those of
 `virtual_work` and `newton_euler`; for work, `jounce.inverse_dynamics` is the one to use. Each is a list of partial
 derivatives of energies with respect to ``q^(m)``, which `slopes` adds up in closed form: they differ in the weights of
 the same products, and what cancels is not computed. `energy_slope` gives one of them alone. The coordinates are those
@@ -62,7 +62,7 @@ def _of_robot(tree: Tree, arrays: tuple[Series], _: Any, form: Form) -> Any:
 
 
 def _evaluated(system: Robot | Motion, q: ArrayLike | None, *slopes: Slope, rates: int = 0, power: int = 0) -> Any:
-    """Return a sum of slopes for a robot, (..., rates + 1, n), or for the drivers of a motion, labelled.
+    """Return a sum of slopes for a robot, (..., rates + 1, n), or for the drivers of a motion, labeled.
 
     It is in units of forces, divided by a power of s.
 
@@ -126,9 +126,9 @@ def energy_slope(
     >>> import jounce as jn
     >>> slide = jn.robot.JointAxis([1, 0, 0], type="prismatic", inertia=jn.Inertia(2.0))
     >>> robot, q = jn.robot.from_screws([slide]), [[0.0], [3.0], [5.0], [7.0]]
-    >>> jn.energy_slope(robot, q, m=2).tolist()  # of half the mass times the square of the acceleration
+    >>> jn.energy.energy_slope(robot, q, m=2).tolist()  # of half the mass times the square of the acceleration
     [[10.0]]
-    >>> jn.energy_slope(robot, q, m=2, rate=1).round(12).tolist()  # of the mass times acceleration and jerk
+    >>> jn.energy.energy_slope(robot, q, m=2, rate=1).round(12).tolist()  # of the mass times acceleration and jerk
     [[14.0]]
     """
     numbers = {"m": m, "order": order, "rate": rate, "rates": rates}
@@ -138,7 +138,7 @@ def energy_slope(
 
 
 def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
-    """Return the generalised inertia forces by Lagrange's equations: Negrean 2025, equation 126.
+    """Return the generalized inertia forces by Lagrange's equations: Negrean 2025, equation 126.
 
     ``Q_i = d/dt (dE_0 / dq') - dE_0 / dq`` with the kinetic energy E_0.
 
@@ -175,7 +175,7 @@ def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0)
 
 
 def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0, m: int = 1) -> Any:
-    """Return the generalised inertia forces by Mangeron's equations: Negrean 2025, equation 127.
+    """Return the generalized inertia forces by Mangeron's equations: Negrean 2025, equation 127.
 
     ``Q_i = 1/m (dE_0^(m) / dq^(m) - (m + 1) dE_0 / dq)``; m = 1 are Nielsen's equations.
 
@@ -210,7 +210,7 @@ def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: 
 
 
 def gibbs_appell(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0, m: int = 2) -> Any:
-    """Return the generalised inertia forces by the Gibbs-Appell equations: Negrean 2025, equation 128.
+    """Return the generalized inertia forces by the Gibbs-Appell equations: Negrean 2025, equation 128.
 
     ``Q_i = dE_1^(m-2) / dq^(m)`` with the acceleration energy E_1 of first order.
 
@@ -250,7 +250,7 @@ def higher_order(
     m: int | None = None,
     coefficients: Callable[[int], float] = catalan,
 ) -> Any:
-    """Return the (k - 1)-th rate of the generalised inertia forces by the higher-order equations.
+    """Return the (k - 1)-th rate of the generalized inertia forces by the higher-order equations.
 
     Negrean 2025, equations 129-134, corrected: ``Q_i^(k-1) = (k-1)! m! / (m+k-1)! d/dq^(m) sum_p C_p
     E_p^(m+k-2p-1)``, p = 1 to k, with the Catalan numbers C_p, which the paper prints wrongly from p = 4 on.

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import Gravity, Masses
-from jounce.dynamics.motion_values import Coordinates, check_motion, labelled, pose_of
+from jounce.dynamics.motion_values import Coordinates, check_motion, labeled, pose_of
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
@@ -60,7 +60,7 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
     ...     joints={"O": jn.planar.Revolute(("ground", "wheel"), [0, 0], [0, 0])},
     ...     drivers={"turn": jn.drivers.CoordinateDriver(("ground", "wheel"), "angle", motion="t**2")},
     ... )
-    >>> balance = jn.power_balance(jn.solve(wheel, [0.0, 3.0], order=4))
+    >>> balance = jn.energy.power_balance(jn.solve(wheel, [0.0, 3.0], order=4))
     >>> balance["drivers"].sel(derivative=0).values.tolist()  # 1 N m at 0 and 6 rad/s
     [0.0, 6.0]
     >>> bool((abs(balance["residual"]) <= 1e-12 * balance["scale"]).all())
@@ -78,13 +78,13 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
     power, size = np.sum(driven, axis=0)
     terms = {"drivers": power, "forces": applied.sum(axis=1)}
     terms |= {"kinetic": kinetic.sum(axis=1), "potential": potential.sum(axis=1)}
-    labelled_terms = {name: labelled(motion, part[: motion.order + 1], "W") for name, part in terms.items()}
+    labeled_terms = {name: labeled(motion, part[: motion.order + 1], "W") for name, part in terms.items()}
     residual = (
-        labelled_terms["drivers"] + labelled_terms["forces"] - labelled_terms["kinetic"] - labelled_terms["potential"]
+        labeled_terms["drivers"] + labeled_terms["forces"] - labeled_terms["kinetic"] - labeled_terms["potential"]
     )
-    labelled_terms["residual"] = residual.assign_attrs(units="W")
-    labelled_terms["scale"] = labelled(motion, (size + sizes.sum(axis=1))[: motion.order + 1], "W")
-    return xarray.Dataset(labelled_terms)
+    labeled_terms["residual"] = residual.assign_attrs(units="W")
+    labeled_terms["scale"] = labeled(motion, (size + sizes.sum(axis=1))[: motion.order + 1], "W")
+    return xarray.Dataset(labeled_terms)
 
 
 def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -154,7 +154,7 @@ def _spin(pose: Pose) -> tuple[Jet, ...]:
 def _inertia(
     moments: Float[Numbers, "component component body 1"], turns: int
 ) -> Float[Numbers, "{turns} {turns} body 1"]:
-    """Return the tensors of inertia about the centres of mass from the second moments."""
+    """Return the tensors of inertia about the centers of mass from the second moments."""
     spread = total(moments[k][k] for k in range(len(moments)))
     if turns == 1:
         return spread[None, None]

@@ -99,7 +99,7 @@ def _rate(terms: dict[int, Fraction]) -> dict[int, Fraction]:
 class Columns(NamedTuple):
     """How coordinates move bodies: jets of their velocities and angular velocities for a rate of one.
 
-    Both are of shape (components, coordinates, bodies, batch), of the centre of mass and in the axes of the base; in
+    Both are of shape (components, coordinates, bodies, batch), of the center of mass and in the axes of the base; in
     the plane the angular velocity has one component.
     """
 

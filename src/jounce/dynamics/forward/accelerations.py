@@ -259,7 +259,7 @@ class Equations(Module):
         return factor.solve(-jnp.concatenate([jnp.zeros((columns, gap.shape[-1])), gap]))[:columns]
 
     def with_rates(self, factor: Factor, state: State, time: Instants) -> State:
-        """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
+        """Return the state with the least change of its velocities that fulfills the rates of all constraints."""
         rate = self.system.residual(self.pose(state), Jet.variable(time, 1)).dense().coefficients[1]
         change = by_body(self.least_change(factor, rate), self.system.column_scale)
         shifts = self.pose_type.shifts
@@ -326,7 +326,7 @@ def expand(
     equations : Equations
         Of the mechanism.
     state : State
-        That fulfils the constraints and their rates.
+        That fulfills the constraints and their rates.
     time : array of shape (1, batch)
         The instant, s.
     order : int

@@ -43,7 +43,7 @@ class ConsistentStart:
     equations : Equations
         Its equations of motion.
     state : State
-        That fulfils joints, drivers and initial conditions with their rates; a batch of one.
+        That fulfills joints, drivers and initial conditions with their rates; a batch of one.
     jacobian : HostJacobian
         Of its constraints there.
     sound : array of bool, shape (forces,)
@@ -96,7 +96,7 @@ def consistent_start(
     mechanism = chosen(mechanism, instant)
     masses = required_masses(mechanism, "the equations of motion")
     model, gravity, state, together = build(mechanism, initial=True), gravity_of(mechanism), None, None
-    exact = True  # whether the state is known to fulfil the rates of what is left without the initial conditions
+    exact = True  # whether the state is known to fulfill the rates of what is left without the initial conditions
     if built is not None:
         built(model)
     if mechanism.initial:
@@ -184,13 +184,13 @@ def at_rest(model: Model, coordinates: dict[str, np.ndarray]) -> State:
 
 @compiled(narrow=True, brief=True, alone=True)
 def with_rates(equations: Equations, state: State, time: Instants) -> State:
-    """Return the state with the least change of its velocities that fulfils the rates of all constraints."""
+    """Return the state with the least change of its velocities that fulfills the rates of all constraints."""
     return _moving(equations, state, time)
 
 
 @compiled(narrow=True, brief=True, alone=True)
 def _with_row_rates(equations: Equations, state: State, time: Instants) -> tuple[State, Any, Any]:
-    """Return the state of bodies at rest with velocities, what rates they fulfil, and how the attitude moves."""
+    """Return the state of bodies at rest with velocities, what rates they fulfill, and how the attitude moves."""
     moving = _moving(equations, state, time)
     return moving, _row_rates(equations, state, time), equations.attitude_rate(moving)
 
@@ -303,7 +303,7 @@ def _loose(whole: Float[np.ndarray, "size size"], columns: int) -> Float[np.ndar
 def _is_solid(masses: Masses) -> bool:
     """Tell whether no body has a negative mass or moment of inertia: then no motion has a negative kinetic energy.
 
-    The least moment about an axis through the centre of mass is the sum of the two lowest second moments.
+    The least moment about an axis through the center of mass is the sum of the two lowest second moments.
     """
     mass, _, moments = map(np.asarray, masses)
     planar = len(moments) == 2

@@ -1,4 +1,4 @@
-"""One state of a mechanism as a user gives it, which need not fulfil its joints."""
+"""One state of a mechanism as a user gives it, which need not fulfill its joints."""
 
 import dataclasses
 from collections.abc import Mapping

@@ -24,7 +24,7 @@ from jounce.modules import Module
 from jounce.shapes import Numbers
 
 FRONT_COST = 20.0  # of an operation in fronts, by that of one in dense elimination, as measured for one run
-MOST_NEIGHBOURS = 16  # of a body; with more, its rows would be long
+MOST_NEIGHBORS = 16  # of a body; with more, its rows would be long
 
 Unknowns = Float[Numbers, "size batch"]
 
@@ -75,7 +75,7 @@ class SaddleFronts(Module):
             return None
         where = np.array(owners, int) * whole + width + _ranks(owners)
         entries = _meeting(pattern, where, whole)
-        if max(len(by_body) for by_body in entries) > MOST_NEIGHBOURS:
+        if max(len(by_body) for by_body in entries) > MOST_NEIGHBORS:
             return None
         fronts = Fronts.of(_as_pattern(entries, count, whole, width * width * count + pattern.entry_count + 1))
         number, height, wide = fronts.shape

@@ -58,14 +58,14 @@ def constraint_equations(
         For each moving body ``position``, m, and its derivatives, (n + 1, c), or the position alone, (c,). In the plane
         ``angle``, rad, and its derivatives, (n + 1,). In space ``orientation``, in any form that a `Body` takes, and
         from n = 1 on ``angular_velocity``, rad/s, along the axes of the body, and its derivatives, (n, 3). It need
-        not fulfil the joints. For a mechanism the starting guess of its bodies unless given.
+        not fulfill the joints. For a mechanism the starting guess of its bodies unless given.
     time : float, optional
         When the drivers are looked at for a state, s; 0 unless given. A motion has its instants.
 
     Returns
     -------
     xarray.Dataset
-        SI units, nothing is scaled. Rows are labelled "JOINT.1", "JOINT.2", ..., joints before drivers in the order of
+        SI units, nothing is scaled. Rows are labeled "JOINT.1", "JOINT.2", ..., joints before drivers in the order of
         the mechanism; columns "BODY.x", "BODY.y", "BODY.angle", in space "BODY.x", "BODY.y", "BODY.z", "BODY.wx",
         "BODY.wy", "BODY.wz": the global position of the origin, and the angular velocity along the axes of the body.
         A variable has at ``derivative=k`` its k-th derivative, or what belongs to q^(k); NaN where it has none, as
@@ -75,7 +75,7 @@ def constraint_equations(
         ``residual`` (time, row)
             Phi; angles about axes within half a turn.
         ``jacobian`` (time, row, column)
-            Phi_q; in space, by w instead of coordinates of attitude: there is no row of normalisation.
+            Phi_q; in space, by w instead of coordinates of attitude: there is no row of normalization.
         ``right_side`` (time, derivative, row)
             Phi_q q^(k) for k = 1 to the order of the motion; at a state with n derivatives, to n + 1.
         ``velocities`` (time, derivative, column)

@@ -125,7 +125,7 @@ def least_multipliers(
         def of_case(weight: Any, bent: Numbers) -> Any:
             return redundant_forces.least_multipliers(system, blocks, weight * load, compliance, bent)
 
-        return jax.vmap(of_case)(weights, bent)  # all cases by one factorisation
+        return jax.vmap(of_case)(weights, bent)  # all cases by one factorization
 
     return in_lots(of_lot, LOT, blocks, load)
 

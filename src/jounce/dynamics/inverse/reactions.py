@@ -189,7 +189,7 @@ def ground_reaction(
     ...     joints={"guide": jn.planar.Prismatic(("ground", "lift"), [0, 0], [0, 0], [0, 1], [0, 1])},
     ...     drivers={"motor": jn.drivers.CoordinateDriver(("ground", "lift"), "y", motion="t**3")},
     ... )
-    >>> shaking = jn.ground_reaction(jn.solve(lift, [1.0], order=4))
+    >>> shaking = jn.dynamics.ground_reaction(jn.solve(lift, [1.0], order=4))
     >>> shaking.force.sel(component="y").values.round(12).tolist()  # -2 kg (10 + 6 t) m/s^2
     [[-32.0, -12.0, 0.0]]
     """
@@ -241,7 +241,7 @@ def applied_force(motion: Motion, name: str) -> "xarray.DataArray":
     ...     forces={"spring": jn.forces.Spring(("ground", "sled"), [0, 0], [0, 0], stiffness=5.0, length=1.0)},
     ... )
     >>> motion = jn.solve(sled, [2.0], order=4)
-    >>> jn.applied_force(motion, "spring").values.round(12).tolist()  # -5 t^2 and its rates
+    >>> jn.dynamics.applied_force(motion, "spring").values.round(12).tolist()  # -5 t^2 and its rates
     [[-20.0, -20.0, -10.0]]
     >>> jn.driver_force(motion, "push").values.round(12).tolist()
     [[20.0, 20.0, 10.0]]

@@ -136,7 +136,7 @@ def drives_note(drives: bool) -> str:
 def trajectory_torques(
     robot: Robot, trajectory: JointTrajectory, rates: int = 0, *, times: ArrayLike | None = None, drives: bool = True
 ) -> "xarray.Dataset":
-    """Return the torques and forces that a trajectory needs of the joints of a robot, with rates, labelled.
+    """Return the torques and forces that a trajectory needs of the joints of a robot, with rates, labeled.
 
     Parameters
     ----------

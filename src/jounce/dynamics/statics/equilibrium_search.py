@@ -44,7 +44,7 @@ class SearchResult(NamedTuple):
     point : OperatingPoint
         The mechanism at rest there.
     left : array of shape (directions,)
-        Generalised forces that nothing balances, in free directions of the scaled coordinates.
+        Generalized forces that nothing balances, in free directions of the scaled coordinates.
     balanced : bool
         Whether they are zero but for rounding.
     """

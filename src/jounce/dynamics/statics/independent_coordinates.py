@@ -163,9 +163,9 @@ class Reduction:
         Taylor coefficients of the changes of all bodies, scaled, for a unit of each coordinate, of its rate and of its
         second derivative, one after the other, then for those of each driver that holds.
     matrices : array of shape (coordinates, lanes)
-        Generalised forces of the coordinates that these changes need.
+        Generalized forces of the coordinates that these changes need.
     sizes : array of shape (coordinates, lanes)
-        What they would be if nothing cancelled: by it, what is rounding can be told.
+        What they would be if nothing canceled: by it, what is rounding can be told.
     """
 
     point: OperatingPoint

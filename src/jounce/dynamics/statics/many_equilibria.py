@@ -63,7 +63,7 @@ def equilibria(
     --------
     >>> import jounce as jn
     >>> pendulum = jn.load("examples/simple_pendulum.yaml")
-    >>> [found.stability for found in jn.equilibria(pendulum, starts=5)]
+    >>> [found.stability for found in jn.dynamics.equilibria(pendulum, starts=5)]
     ['stable', 'unstable']
     """
     count = whole_number("starts", starts, error=MechanismError)

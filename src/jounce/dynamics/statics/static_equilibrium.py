@@ -42,7 +42,7 @@ class Equilibrium(Displayed):
         The instant, s.
     motion : Motion
         The mechanism at rest, of one instant: outputs, and by `jounce.joint_reaction`, `jounce.driver_force` and
-        `jounce.applied_force` the forces that hold it.
+        `jounce.dynamics.applied_force` the forces that hold it.
     stability : str
         ``stable``; ``unstable``; ``indifferent``, where no force resists some motion; ``held``, where nothing can
         move; or ``undetermined``.

@@ -39,7 +39,7 @@ class StateSpace(NamedTuple):
     outputs: tuple[str, ...]
 
 
-class Linearisation(Displayed):
+class Linearization(Displayed):
     """The equations of small motions ``M y'' + C y' + K y = B u`` of independent coordinates y.
 
     They hold about an equilibrium, or about one instant of a motion, with all terms of its velocities: of inertia, of
@@ -61,7 +61,7 @@ class Linearisation(Displayed):
         Names of u: what drivers that were released exert beside their force, N or N m; what applied forces do, beside
         what their law says, each component of them.
     input_matrix : numpy.ndarray of shape (coordinates, inputs)
-        Generalised forces by those.
+        Generalized forces by those.
     held : tuple of str
         Drivers that hold; they may be inputs of `state_space` too.
     """
@@ -75,7 +75,7 @@ class Linearisation(Displayed):
     def __repr__(self) -> str:
         title = f"{self.mechanism.title}: " if self.mechanism.title else ""
         where = "a motion" if self.equilibrium is None else f"an equilibrium that is {self.equilibrium.stability}"
-        return f"<Linearisation {title}{', '.join(self.coordinates)} about {where} at {self.time:g} s>"
+        return f"<Linearization {title}{', '.join(self.coordinates)} about {where} at {self.time:g} s>"
 
     @cached_property
     def modes(self) -> Modes:
@@ -112,7 +112,7 @@ class Linearisation(Displayed):
 
     @property
     def input_matrix(self) -> Float[np.ndarray, "coordinate input"]:
-        """Generalised forces of the coordinates by each input, shape (coordinates, inputs)."""
+        """Generalized forces of the coordinates by each input, shape (coordinates, inputs)."""
         return self._inputs[1]
 
     def state_space(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> StateSpace:
@@ -141,7 +141,7 @@ class Linearisation(Displayed):
         --------
         >>> import jounce as jn
         >>> import scipy.signal
-        >>> pendulum = jn.linearise(jn.load("examples/simple_pendulum.yaml"))
+        >>> pendulum = jn.linearize(jn.load("examples/simple_pendulum.yaml"))
         >>> space = pendulum.state_space(outputs=["angle"])
         >>> space.A.round(9).tolist(), space.outputs
         ([[0.0, 1.0], [-9.81, -0.0]], ('angle', 'angle_d1'))
@@ -185,7 +185,7 @@ def named(kind: str, names: str | Sequence[str] | Refused) -> tuple[str, ...]:
 
 
 def _state_space(
-    of: Linearisation,
+    of: Linearization,
     inputs: Sequence[str],
     forces: Sequence[str],
     drivers: Sequence[str],
@@ -214,7 +214,7 @@ def _state_space(
 
 
 def _outputs(
-    of: Linearisation, selection: tuple[str, ...] | None, drivers: Sequence[int], state: tuple[np.ndarray, np.ndarray]
+    of: Linearization, selection: tuple[str, ...] | None, drivers: Sequence[int], state: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
     """Return how outputs and their rates follow from states and inputs, and their names."""
     r, (a, b) = of._reduction, state

@@ -32,7 +32,7 @@ class Modes(Displayed):
         Minus the real part over the size of the eigenvalue: 1 for motions that creep back, negative for those that
         grow, 0 for those without damping or stiffness.
     shapes : numpy.ndarray of shape (coordinates, modes)
-        In the coordinates of the linearisation, of unit modal mass; complex where there is damping.
+        In the coordinates of the linearization, of unit modal mass; complex where there is damping.
     coordinates, bodies : tuple of str
         Names of these coordinates, and of the bodies that move.
     """

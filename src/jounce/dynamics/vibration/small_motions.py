@@ -14,7 +14,7 @@ from jounce.dynamics.statics.kinks import kinked
 from jounce.dynamics.statics.robot_states import DRIVE, GivenState, through_state
 from jounce.dynamics.statics.static_equilibrium import Equilibrium, equilibrium
 from jounce.dynamics.statics.variations import clock_at
-from jounce.dynamics.vibration.linearization import Linearisation, named
+from jounce.dynamics.vibration.linearization import Linearization, named
 from jounce.errors import MechanismError, MobilityError, RobotError, check_name, flag
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.assembly.assemble import freely_moving
@@ -29,7 +29,7 @@ INSTANT = 1e-9  # of the time between the ends of a motion: an instant as near t
 
 
 @concrete
-def linearise(
+def linearize(
     subject: Mechanism | Equilibrium | Motion | Robot | Refused,
     time: Real | None = None,
     *,
@@ -37,7 +37,7 @@ def linearise(
     release: Sequence[str] = (),
     q: GivenState = None,
     drives: bool = True,
-) -> Linearisation:
+) -> Linearization:
     """Return the equations of small motions of a mechanism: mass, damping and stiffness matrix, state space, modes.
 
     They are exact: forces, inertia and constraints are differentiated along changes of the motion, to the second order
@@ -68,7 +68,7 @@ def linearise(
 
     Returns
     -------
-    Linearisation
+    Linearization
         With matrices, inputs and modes.
 
     Raises
@@ -84,7 +84,7 @@ def linearise(
     Examples
     --------
     >>> import jounce as jn
-    >>> small = jn.linearise(jn.load("examples/double_pendulum.yaml"))
+    >>> small = jn.linearize(jn.load("examples/double_pendulum.yaml"))
     >>> small.coordinates, (small.modes.angular_frequencies**2 / 9.81).round(12).tolist()  # 2 - sqrt 2, 2 + sqrt 2
     (('upper.angle', 'lower.angle'), [0.585786437627, 3.414213562373])
     """
@@ -114,16 +114,16 @@ def linearise(
     names = None if coordinates is None else named("coordinates", coordinates)
     reduction = reduced(point, names, released, prefer_outputs=about is not None and about.of_robot)
     _check(reduction)
-    return Linearisation(reduction, about)
+    return Linearization(reduction, about)
 
 
-def _of_robot(robot: Robot, q: GivenState, coordinates: Sequence[str] | None, drives: bool) -> Linearisation:
+def _of_robot(robot: Robot, q: GivenState, coordinates: Sequence[str] | None, drives: bool) -> Linearization:
     """Return the equations of small motions of a robot about a state, in the coordinates of its joints."""
     joint_coordinates = None if coordinates is None else named("coordinates", coordinates)
     point, names = through_state(robot, q, joint_coordinates, drives)
     reduction = reduced(point, released=[name + DRIVE for name in names], drivers=False)
     _check(reduction)
-    return Linearisation(with_joints(reduction, names), None, by_forces=False)  # the dampers of joints are none
+    return Linearization(with_joints(reduction, names), None, by_forces=False)  # the dampers of joints are none
 
 
 def point_along(motion: Motion, time: Real | None) -> OperatingPoint:
@@ -208,6 +208,6 @@ def _check(reduction: Reduction) -> None:
     if names := kinked(reduction):
         message = (
             "the force has a kink or a jump there, or bends within a millionth of the mechanism's size: it cannot "
-            "be linearised; smooth its law, or linearise elsewhere"
+            "be linearized; smooth its law, or linearize elsewhere"
         )
         raise MechanismError(message, name=f"forces.{names[0]}")

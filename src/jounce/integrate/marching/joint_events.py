@@ -45,7 +45,7 @@ class JointEvent:
     Examples
     --------
     >>> import jounce as jn
-    >>> jn.JointEvent("shoulder", 0.5, direction=1).terminal
+    >>> jn.integrate.JointEvent("shoulder", 0.5, direction=1).terminal
     False
     """
 

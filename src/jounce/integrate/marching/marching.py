@@ -163,7 +163,7 @@ def march(
     count: int,
     keep: bool = True,
 ) -> tuple[IntegratorState, tuple[DenseOutput, Bool[Numbers, "steps batch"]] | None, Int[Numbers, ""]]:
-    """Take up to `count` steps towards a time, all runs of a batch side by side.
+    """Take up to `count` steps toward a time, all runs of a batch side by side.
 
     Parameters
     ----------

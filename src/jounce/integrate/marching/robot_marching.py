@@ -243,7 +243,7 @@ def march_robot(
     order: int,
     count: int,
 ) -> tuple[Progress, RobotSteps, Int[Numbers, ""]]:
-    """Take up to `count` steps towards a time.
+    """Take up to `count` steps toward a time.
 
     Parameters
     ----------

@@ -114,7 +114,7 @@ def simulate_batch(
     ...     bodies={"rod": jn.Body([0, 0], mass=2.0, inertia=0.5, center_of_mass=[1, 0])},
     ...     joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
     ...     initial={"rise": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion="lift")},
-    ...     outputs={"angle": jn.AngleOutput("rod")},
+    ...     outputs={"angle": jn.outputs.AngleOutput("rod")},
     ... )
     >>> jn.simulate_batch(pendulum, {"lift": [0.1, 0.2, 0.3]}, [0.0, 0.5]).outputs["angle"].shape
     (3, 2, 5)

@@ -14,7 +14,7 @@ from jounce.dynamics.forward.initial_state import ConsistentStart, consistent_st
 from jounce.errors import MechanismError
 from jounce.integrate.marching.marching import DenseOutput
 from jounce.integrate.results.simulation import Simulation
-from jounce.integrate.steps.projection import normalised
+from jounce.integrate.steps.projection import normalized
 from jounce.integrate.steps.revolution_counts import measured
 from jounce.jet import Jet
 from jounce.mechanism import Mechanism
@@ -56,9 +56,9 @@ def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
     ...     gravity=[0, -9.81],
     ...     bodies={"rod": jn.Body([0, 0], mass=2.0, inertia=0.5, center_of_mass=[1, 0])},
     ...     joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
-    ...     outputs={"angle": jn.AngleOutput("rod")},
+    ...     outputs={"angle": jn.outputs.AngleOutput("rod")},
     ... )
-    >>> equation = jn.ode_term(pendulum)
+    >>> equation = jn.integrate.ode_term(pendulum)
     >>> with jax.enable_x64(True):  # diffrax computes as precisely as JAX is told to
     ...     solution = diffrax.diffeqsolve(
     ...         equation.term, diffrax.Dopri8(), 0.0, 1.0, None, equation.state, args=equation.equations,
@@ -170,7 +170,7 @@ def state_rates(time: Any, state: State | CountedState, equations: Equations) ->
 def _rates(time: Any, state: State, equations: Equations) -> tuple[State, State]:
     """Return the rate of a state, and the state with Euler parameters of unit length, a batch of one."""
     state = state.map(lambda part: part[..., None])
-    state = state._replace(attitude=normalised(state.attitude))
+    state = state._replace(attitude=normalized(state.attitude))
     clock = jnp.reshape(jnp.asarray(time, float), (1, 1))
     trial = jnp.zeros((equations.coordinates, *state.position.shape[1:])), jnp.zeros((equations.system.shape[0], 1))
     forces, second, attitude_rate = equations.balance(state, *trial, clock)

@@ -159,7 +159,7 @@ def simulate(
     ...     gravity=[0, -9.81],
     ...     bodies={"rod": jn.Body([0, 0], mass=2.0, inertia=0.5, center_of_mass=[1, 0])},
     ...     joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
-    ...     outputs={"angle": jn.AngleOutput("rod")},
+    ...     outputs={"angle": jn.outputs.AngleOutput("rod")},
     ... )
     >>> fall = jn.simulate(pendulum, [0.0, 0.5, 1.0], order=3)
     >>> bool(abs(fall.energy - fall.energy[0]).max() < 1e-12)

@@ -37,7 +37,7 @@ from jounce.integrate.steps.host_calls import called
 from jounce.integrate.steps.lookahead import watched_names
 from jounce.integrate.steps.methods import Taylor, evaluated
 from jounce.integrate.steps.options import instants_of
-from jounce.integrate.steps.projection import normalised
+from jounce.integrate.steps.projection import normalized
 from jounce.jet import Jet
 from jounce.kinematics.position_analysis.solve import checked_order, lost_orders
 from jounce.kinematics.sensitivity.jacobian_series import solver
@@ -274,7 +274,7 @@ def _check_guessed(mechanism: Mechanism, simulation: Simulation, known: State) -
     if mechanism.initial or max(away, turned) > AS_GUESSED or speed > AT_REST:
         raise UnsupportedError(
             "the start follows from the starting guess and from least velocities, and is differentiated only where "
-            "the guess fulfils all joints and all is at rest; give an initial condition for each degree of freedom",
+            "the guess fulfills all joints and all is at rest; give an initial condition for each degree of freedom",
             name="initial",
         )
 
@@ -378,7 +378,7 @@ def _inverse(matrix: Any, known: Any) -> Any:
 @compiled(narrow=True)
 def _corrected(equations: Equations, state: State, time: Instants) -> State:
     """Return the state after one correction onto the constraints and their rates; see `projected`."""
-    state = state._replace(attitude=normalised(state.attitude))
+    state = state._replace(attitude=normalized(state.attitude))
     constant, fixed = jax.lax.stop_gradient((equations, state))
     factor = constant.factored(fixed, time)
     rest_pose = equations.pose_at_rest(state.position, state.attitude)

@@ -68,7 +68,7 @@ class Event:
     Examples
     --------
     >>> import jounce as jn
-    >>> jn.Event(jn.AngleOutput("rod"), direction=1).terminal
+    >>> jn.Event(jn.outputs.AngleOutput("rod"), direction=1).terminal
     False
     """
 

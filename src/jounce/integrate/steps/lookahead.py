@@ -72,7 +72,7 @@ class Lookahead(NamedTuple):
 
 
 def mobility_of(equations: Equations, inverse: Inverse) -> BodyMobility:
-    """Return how readily generalised forces on each body move the mechanism, from the inverse of the matrix.
+    """Return how readily generalized forces on each body move the mechanism, from the inverse of the matrix.
 
     The largest acceleration, in rad or sizes of the mechanism by s^2, by a force of one on one of the scaled
     coordinates of the body; of a large mechanism, a bound for it.

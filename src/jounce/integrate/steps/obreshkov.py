@@ -79,7 +79,7 @@ class Obreshkov(AbstractMethod):
         return reach(sizes, first) * (tolerance / constant) ** (1.0 / first)
 
     def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
-        """Return the end that fulfils the formula, not finite where the iteration for it does not converge."""
+        """Return the end that fulfills the formula, not finite where the iteration for it does not converge."""
         measure = _measure(equations.system.column_scale[0], step)
         later = (time + step)[None]
         known = _known(expansion, step, self.highest)

@@ -17,7 +17,7 @@ ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, l
 
 
 def projected(equations: Equations, state: State, time: Instants) -> tuple[State, Lanes, Inverse]:
-    """Return the nearest state that fulfils the constraints and their rates, and how far positions moved.
+    """Return the nearest state that fulfills the constraints and their rates, and how far positions moved.
 
     The correction of positions is that of least kinetic energy, were it a velocity; that of velocities likewise.
 
@@ -41,7 +41,7 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
         Of the equations' matrix at this state, which `expand` takes.
     """
     clock, lanes = Jet([time]), time.shape[-1]
-    position, attitude = state.position, normalised(state.attitude)
+    position, attitude = state.position, normalized(state.attitude)
 
     def correction(position: Any, attitude: Any) -> tuple[Any, Any]:
         factor = equations.factored(state._replace(position=position, attitude=attitude), time)
@@ -76,7 +76,7 @@ def projected(equations: Equations, state: State, time: Instants) -> tuple[State
     return moving, jnp.where(fulfilled, first, jnp.inf), inverted(factor)
 
 
-def normalised(attitude: Attitudes) -> Attitudes:
+def normalized(attitude: Attitudes) -> Attitudes:
     """Return Euler parameters of unit length; angles as they are."""
     if attitude.shape[0] == 1:
         return attitude

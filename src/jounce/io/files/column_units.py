@@ -39,7 +39,7 @@ def in_units(dataset: xarray.Dataset, units: Mapping[str, str] | ShownUnits) -> 
     --------
     >>> import jounce as jn
     >>> motion = jn.solve(jn.load("examples/four_bar.yaml"), [0.0], order=1)
-    >>> shown = jn.in_units(motion.dataset, {"angle": "deg"})
+    >>> shown = jn.io.in_units(motion.dataset, {"angle": "deg"})
     >>> round(float(shown["psi"].sel(derivative=0)[0]), 6), shown["psi"].attrs["units"], shown["C"].attrs["units"]
     (128.272139, 'deg', 'm')
     """

@@ -68,7 +68,7 @@ def load_cam(
     Examples
     --------
     >>> import jounce as jn
-    >>> cam = jn.load_cam("examples/cams/intake.yaml")
+    >>> cam = jn.cams.load_cam("examples/cams/intake.yaml")
     >>> cam.follower.shape, cam.units["length"]
     ('roller', 'mm')
     """

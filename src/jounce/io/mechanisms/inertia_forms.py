@@ -160,7 +160,7 @@ def _closed(value: Any) -> Any:
 
 
 def expanded(given: dict[str, Any], parameters: dict[str, Any], *, planar: bool) -> dict[str, Any]:
-    """Return mass, inertia and centre of mass of a body whose inertia is a solid or a pseudo-inertia.
+    """Return mass, inertia and center of mass of a body whose inertia is a solid or a pseudo-inertia.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def expanded(given: dict[str, Any], parameters: dict[str, Any], *, planar: bool)
     form, mass = given["inertia"], given["mass"]
     if "pseudo" in form:
         if mass is not None or given["center_of_mass"] is not None:
-            message = "a pseudo-inertia contains mass and centre of mass; do not give them besides"
+            message = "a pseudo-inertia contains mass and center of mass; do not give them besides"
             raise MechanismError(message, name="pseudo")
         return _from_pseudo(form["pseudo"], parameters, planar=planar)
     words, kind = ("solid", "axis", "density"), form["solid"]

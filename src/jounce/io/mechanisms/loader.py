@@ -59,7 +59,7 @@ def load(path: str | PathLike[str], *, allow: Iterable[str | PathLike[str]] = ()
     Warns
     -----
     UnitWarning
-        A number without a unit is likely meant in degrees or millimetres.
+        A number without a unit is likely meant in degrees or millimeters.
 
     Examples
     --------

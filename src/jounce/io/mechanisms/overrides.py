@@ -30,7 +30,7 @@ def override(mechanism: Mechanism, texts: Iterable[str]) -> Mechanism:
     Warns
     -----
     UnitWarning
-        A number without a unit is likely meant in degrees or millimetres.
+        A number without a unit is likely meant in degrees or millimeters.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Values without a unit that are likely meant in another one than SI: degrees for radians, millimetres for metres."""
+"""Values without a unit that are likely meant in another one than SI: degrees for radians, millimeters for metres."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ from jounce.units.values import parse_value
 FAR_OFF = 100.0  # times the other lengths
 ALIKE = 30.0  # within which a thousandth of a length must be to them
 TO_COMPARE = 3  # lengths, at least
-LARGE = 5.0  # m, from which on a machine may be one in millimetres
+LARGE = 5.0  # m, from which on a machine may be one in millimeters
 FAST = 120.0  # m/s, which nothing so large reaches
 LIGHT = 0.1  # kg/m, less than which nothing so large has
 SLENDER = 1e-5  # of the mass by the square of the size, less than which no body's inertia is
 
 
 def warn_of_units(source: Source, mechanism: Mechanism) -> None:
-    """Warn of angles that are likely in degrees, laws over the run among them, and of lengths likely in millimetres.
+    """Warn of angles that are likely in degrees, laws over the run among them, and of lengths likely in millimeters.
 
     Warns
     -----
@@ -68,7 +68,7 @@ def warn_of_units(source: Source, mechanism: Mechanism) -> None:
 
 
 def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], option: str) -> None:
-    """Warn of parameters that were given as plain numbers, likely in degrees or millimetres, by the values before.
+    """Warn of parameters that were given as plain numbers, likely in degrees or millimeters, by the values before.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def warn_of_values(before: Mechanism, after: Mechanism, given: Iterable[str], op
 
 
 def _is_thousandfold(value: float, usual: float) -> bool:
-    """Tell whether a length is far larger than usual, and a usual one where it is in millimetres."""
+    """Tell whether a length is far larger than usual, and a usual one where it is in millimeters."""
     return value > FAR_OFF * usual and usual / ALIKE < value / 1000 < ALIKE * usual
 
 
@@ -146,7 +146,7 @@ def _warn_of_lengths(source: Source, mechanism: Mechanism, laws: Iterable[AngleL
         return
     if (why := _too_large(mechanism, in_order[-1], laws)) and not _any_unit(source.data, mechanism):
         location = max(lengths, key=lambda x: x[1])[0]
-        _warn(source, location, f"the lengths of this file go up to {in_order[-1]:g} m, {why}: millimetres?")
+        _warn(source, location, f"the lengths of this file go up to {in_order[-1]:g} m, {why}: millimeters?")
 
 
 def _too_large(mechanism: Mechanism, size: float, laws: Iterable[AngleLaw]) -> str:

@@ -81,7 +81,7 @@ def export_trajectory(
     >>> import jounce as jn
     >>> robot = jn.load_robot("examples/robots/ur5.urdf")
     >>> trajectory = jn.load_trajectory("examples/trajectories/ur5_stack.yaml")
-    >>> times = jn.export_trajectory(robot, trajectory, "stack.csv", "ur")  # doctest: +SKIP
+    >>> times = jn.io.export_trajectory(robot, trajectory, "stack.csv", "ur")  # doctest: +SKIP
     """
     known = FORMATS.get(checked_format(format))
     check_target(path, (".csv",) if known else (".yaml", ".yml"), f"{format} trajectory", overwrite=overwrite)

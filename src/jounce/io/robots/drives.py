@@ -66,7 +66,7 @@ def load_drives(path: str | PathLike[str], system: Robot | Mechanism) -> dict[st
     Examples
     --------
     >>> import jounce as jn
-    >>> drives = jn.load_drives("examples/drives/panda.yaml", jn.load_robot("examples/robots/panda.urdf"))
+    >>> drives = jn.io.load_drives("examples/drives/panda.yaml", jn.load_robot("examples/robots/panda.urdf"))
     >>> drives["panda_joint1"].stiffness, drives["panda_joint1"].gear_ratio
     (14000.0, 100.0)
     """

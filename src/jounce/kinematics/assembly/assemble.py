@@ -46,7 +46,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     tolerance : float
         Of the last correction, rad or sizes of the mechanism.
     free : bool, default False
-        Whether degrees of freedom may be left: then the position is the nearest to the guess that fulfils all joints.
+        Whether degrees of freedom may be left: then the position is the nearest to the guess that fulfills all joints.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     Raises
     ------
     AssemblyError
-        If no position near the guess fulfils all joints; the message names those that stay open.
+        If no position near the guess fulfills all joints; the message names those that stay open.
     MobilityError
         If joints and drivers leave degrees of freedom, or the position is singular.
     MechanismError

@@ -85,7 +85,7 @@ def driver_lag(model: Model, instant: float, residual: Float[np.ndarray, " row"]
 def turned_to_laws(
     model: Model, lag: DriverLag, start: Coordinates, moved: Mover
 ) -> tuple[Coordinates, AttitudeHistory | None] | None:
-    """Follow the mechanism from where drivers are as in the guess to where they fulfil their laws.
+    """Follow the mechanism from where drivers are as in the guess to where they fulfill their laws.
 
     Parameters
     ----------

@@ -183,7 +183,7 @@ def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -
         return independent(columns, rows)
     constraints = ReducedConstraints.at(model, coordinates, matrix, order)
     told = redundancy_of(model, found, time)[1]
-    return dataclasses.replace(_analysed(constraints, Displacements(model, time)), repetitions=told.repetitions)
+    return dataclasses.replace(_analyzed(constraints, Displacements(model, time)), repetitions=told.repetitions)
 
 
 def _released(mechanism: Mechanism, time: float) -> tuple[Model, Coordinates, AssemblyAttempt]:
@@ -205,7 +205,7 @@ def _released(mechanism: Mechanism, time: float) -> tuple[Model, Coordinates, As
     return dataclasses.replace(model, system=system), found.coordinates, found
 
 
-def _analysed(constraints: ReducedConstraints, moved: Mover) -> Mobility:
+def _analyzed(constraints: ReducedConstraints, moved: Mover) -> Mobility:
     """Return the mobility at a position where equations depend on each other."""
     columns, rows = constraints.inverse.shape
     left, order = constraints.free.shape[1], constraints.order

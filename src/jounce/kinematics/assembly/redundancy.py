@@ -179,7 +179,7 @@ def _along_curves(
 def closed_nearby(
     coordinates: Coordinates, sway: Float[np.ndarray, " column"], joints: Bool[np.ndarray, " row"], moved: Mover
 ) -> HostJacobian | None:
-    """Return the Jacobian at a position near a displaced one that fulfils the joints; None where it is not displaced.
+    """Return the Jacobian at a position near a displaced one that fulfills the joints; None where it is not displaced.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Curves through a position that fulfil the reduced constraints: their tangents, and to which order they go on.
+"""Curves through a position that fulfill the reduced constraints: their tangents, and to which order they go on.
 
 A curve is a series y(t) = y_p t^p + y_(p+1) t^(p+1) + ..., its tangent y_p of length one and all later coefficients
 across it, which fixes how it is run through. The equations of order k are met together by coefficients of all orders
@@ -36,7 +36,7 @@ class LocalCurve:
     multiplicity : int
         Order of the first that is not zero: one of a smooth motion, two at a cusp.
     order : int
-        To which it fulfils the constraints; where that is less than the order looked at, it is blocked at the next.
+        To which it fulfills the constraints; where that is less than the order looked at, it is blocked at the next.
     """
 
     series: Series

@@ -57,7 +57,7 @@ class AbstractFollower(abc.ABC):
 
     @abc.abstractmethod
     def center(self, coordinate: Jet) -> Jet:
-        """Return the centre of the roller, or the edge, (2, ...), m."""
+        """Return the center of the roller, or the edge, (2, ...), m."""
 
     @abc.abstractmethod
     def face(self, coordinate: Jet) -> tuple[Jet, Jet]:
@@ -87,7 +87,7 @@ class TranslatingFollower(AbstractFollower):
     radius : float, default 0
         Of the roller, m.
     offset : float, default 0
-        Of the line of travel, along y, from the axis of the cam towards x, m. Of a flat face, that of its middle.
+        Of the line of travel, along y, from the axis of the cam toward x, m. Of a flat face, that of its middle.
 
     Raises
     ------
@@ -99,7 +99,7 @@ class TranslatingFollower(AbstractFollower):
     Examples
     --------
     >>> import jounce as jn
-    >>> jn.TranslatingFollower("roller", radius=0.008, offset=0.005).offset
+    >>> jn.cams.TranslatingFollower("roller", radius=0.008, offset=0.005).offset
     0.005
     """
 
@@ -120,7 +120,7 @@ class TranslatingFollower(AbstractFollower):
         return float(np.sqrt(reach**2 - self.offset**2))
 
     def center(self, coordinate: Jet) -> Jet:
-        """Return the centre of the roller, or the edge."""
+        """Return the center of the roller, or the edge."""
         return stack([coordinate * 0.0 + self.offset, coordinate])
 
     def face(self, coordinate: Jet) -> tuple[Jet, Jet]:
@@ -156,13 +156,13 @@ class OscillatingFollower(AbstractFollower):
     shape : str
         ``"knife_edge"``, ``"roller"`` or ``"flat_face"``.
     center_distance : float
-        Of the pivot from the axis of the cam, towards x, m.
+        Of the pivot from the axis of the cam, toward x, m.
     arm : float, default 0
-        From the pivot to the edge or to the centre of the roller, m; a flat face has none.
+        From the pivot to the edge or to the center of the roller, m; a flat face has none.
     radius : float, default 0
         Of the roller, m.
     face_offset : float, default 0
-        Of a flat face from the pivot, towards the cam, m.
+        Of a flat face from the pivot, toward the cam, m.
 
     Raises
     ------
@@ -174,7 +174,7 @@ class OscillatingFollower(AbstractFollower):
     Examples
     --------
     >>> import jounce as jn
-    >>> jn.OscillatingFollower("roller", center_distance=0.08, arm=0.07, radius=0.01).turning
+    >>> jn.cams.OscillatingFollower("roller", center_distance=0.08, arm=0.07, radius=0.01).turning
     True
     """
 
@@ -206,7 +206,7 @@ class OscillatingFollower(AbstractFollower):
         return float(np.arccos(cosine))
 
     def center(self, coordinate: Jet) -> Jet:
-        """Return the centre of the roller, or the edge."""
+        """Return the center of the roller, or the edge."""
         return stack([self.center_distance - cos(coordinate) * self.arm, sin(coordinate) * self.arm])
 
     def face(self, coordinate: Jet) -> tuple[Jet, Jet]:

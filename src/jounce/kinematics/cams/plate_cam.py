@@ -1,6 +1,6 @@
 """The profile of a plate cam: the envelope of its follower, which goes round it by its law.
 
-Everything is written on jets by the cam angle, in the frame of the cam: the centre of a roller is a curve, of which the
+Everything is written on jets by the cam angle, in the frame of the cam: the center of a roller is a curve, of which the
 profile is the parallel one; a flat face is a line, of which it is the envelope. Tangents, normals, pressure angles and
 curvatures are read off derivatives of these jets; no formula for one is written.
 """
@@ -232,7 +232,7 @@ def plate_cam(
     An eccentric disc of 30 mm, 10 mm off its axis, under a flat face:
 
     >>> import jounce as jn
-    >>> cam = jn.plate_cam("0.01*(1 - cos(t))", jn.TranslatingFollower("flat_face"), base_radius=0.02)
+    >>> cam = jn.cams.plate_cam("0.01*(1 - cos(t))", jn.cams.TranslatingFollower("flat_face"), base_radius=0.02)
     >>> round(1 / float(cam.at(1.0).curvature[0]), 12), [round(end.value, 12) for end in cam.face]
     (0.03, [-0.01, 0.01])
     """

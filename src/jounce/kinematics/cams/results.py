@@ -18,12 +18,12 @@ class Geometry(NamedTuple):
     lift : array of shape (angle,)
         m or rad.
     pitch, profile : array of shape (2, angle)
-        The centre of the roller or the edge, and where it touches; of a flat face both are the same.
+        The center of the roller or the edge, and where it touches; of a flat face both are the same.
     pressure_angle : array of shape (angle,)
         From the travel of the follower to the normal of the profile, in the sense in which the cam turns: positive
         where the cam lifts the follower.
     forward, around : array of shape (angle,)
-        How far the contact, and the centre of the roller, go round the cam per rad; where the contact goes back, the
+        How far the contact, and the center of the roller, go round the cam per rad; where the contact goes back, the
         profile is undercut.
     turned : array of shape (angle,)
         How far the normal turns round the cam per rad, negative where the profile is concave.
@@ -48,7 +48,7 @@ class Geometry(NamedTuple):
 
     @property
     def pitch_curvature(self) -> Numbers1:
-        """Curvature of the curve of the centre of the roller, 1/m."""
+        """Curvature of the curve of the center of the roller, 1/m."""
         return self.turned / self.around
 
 

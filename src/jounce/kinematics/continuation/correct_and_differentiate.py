@@ -1,8 +1,8 @@
-"""One compiled function: from solved neighbours to solved instants, with all their derivatives.
+"""One compiled function: from solved neighbors to solved instants, with all their derivatives.
 
-Each lane of the batch is predicted by the Taylor series of a neighbour, corrected by Newton-Raphson, and
-differentiated order after order with the last factorisation of its Jacobian (Sommer 2024, equations 1-8). That it is on
-the branch of its neighbour is not judged by how near the prediction was: the simplified Newton iteration must contract
+Each lane of the batch is predicted by the Taylor series of a neighbor, corrected by Newton-Raphson, and
+differentiated order after order with the last factorization of its Jacobian (Sommer 2024, equations 1-8). That it is on
+the branch of its neighbor is not judged by how near the prediction was: the simplified Newton iteration must contract
 (Deuflhard 2011, chapter 5), the determinant of the Jacobian must keep its sign, and where an instant is surveyed, the
 nearest zero of that determinant is told, real or complex, beyond which no step may go.
 """
@@ -65,7 +65,7 @@ class StepResult(NamedTuple):
     gaps: Float[Numbers, "2 contradicting batch"]  # of redundant rows, see `_gaps`; of none where none are
 
     def state(self, lanes: slice | np.ndarray) -> SolvedState:
-        """Return what the neighbours of some lanes start from: jets of coordinates and outputs, and the sign."""
+        """Return what the neighbors of some lanes start from: jets of coordinates and outputs, and the sign."""
         return jax.tree.map(lambda x: x[..., lanes], (self.coordinates, self.outputs, self.sign))
 
 
@@ -111,7 +111,7 @@ def _departures(system: System, pose: Pose, predicted: Any) -> Float[Numbers, "b
 
 def _terms(system: System, coordinates: dict[str, Jet], predictor: tuple[str, ...]) -> list[Lanes]:
     """Return the size of each Taylor coefficient but the first, rad or sizes of the mechanism: order x (batch,)."""
-    # a slide that runs away, as towards a dead point of its axes, is measured by where it is
+    # a slide that runs away, as toward a dead point of its axes, is measured by where it is
     scales = {"position": jnp.maximum(system.column_scale[0], _largest(coordinates["position"].coefficients[0]))}
     sizes = [
         jnp.stack([_largest(c) / scales.get(name, 1.0) for name, c in zip(predictor, level, strict=True)])
@@ -134,7 +134,7 @@ def _safe_step(terms: list[Lanes]) -> Lanes:
 
 
 def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes) -> tuple[Numbers, ...]:
-    """Return the jets of the outputs, angles with the turns that the jets of a neighbour give them."""
+    """Return the jets of the outputs, angles with the turns that the jets of a neighbor give them."""
     results, known = [], iter(angles)
     for group in system.outputs:
         result = group.evaluate(pose)
@@ -165,9 +165,9 @@ def _finite_results(
 
 
 def _signs(system: System, factor: Factor, before: Callable[[], tuple[Pose, Jet]], sign: Lanes) -> Lanes:
-    """Return the signs of the determinants of the Jacobians, those of neighbours being known, and where those are.
+    """Return the signs of the determinants of the Jacobians, those of neighbors being known, and where those are.
 
-    With redundant rows there is no determinant: the space of the columns has an orientation as seen from the neighbour.
+    With redundant rows there is no determinant: the space of the columns has an orientation as seen from the neighbor.
     """
     if isinstance(factor, LeastSquaresFactor):
         return factor.orientation(factored(system, *before())) * jnp.where(sign == 0, 1.0, sign)
@@ -233,19 +233,19 @@ def advance(
     order: int,
     with_turnover: bool = True,
 ) -> StepResult:
-    """Solve a batch of instants, each from a neighbour solved before.
+    """Solve a batch of instants, each from a neighbor solved before.
 
     Parameters
     ----------
     system : System
         The mechanism.
     coordinates, angles
-        Jets of the neighbours, shape (order + 1, ..., batch): of the pose, by name, and of each group of outputs that
+        Jets of the neighbors, shape (order + 1, ..., batch): of the pose, by name, and of each group of outputs that
         are angles known up to whole turns.
     sign : array of shape (batch,)
-        Of the determinant of the Jacobian at the neighbours; 0 where it does not matter.
+        Of the determinant of the Jacobian at the neighbors; 0 where it does not matter.
     step, instant : array of shape (batch,)
-        Time from the neighbour, and the time arrived at, s.
+        Time from the neighbor, and the time arrived at, s.
     tolerance : float
         Largest correction of an accepted pose, rad or sizes of the mechanism.
     refine : bool

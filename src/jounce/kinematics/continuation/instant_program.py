@@ -52,14 +52,14 @@ def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -
 
 @mapped(by_xla=_of_many)
 def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
-    """Solve an instant from a neighbour solved before.
+    """Solve an instant from a neighbor solved before.
 
     Parameters
     ----------
     shared : tuple
         System, tolerance, whether to refine, and the highest derivative that must be finite.
     instants : tuple
-        Coordinates, angles and sign of the neighbour, the time from there, the instant, s, the values of its design,
+        Coordinates, angles and sign of the neighbor, the time from there, the instant, s, the values of its design,
         if there are many (see `of_design`), else None, and whether to look for the nearest singular position: each
         of length one.
     pose_type, order

@@ -1,4 +1,4 @@
-"""The factorisation of a mechanism's Jacobian: dense where it is small, front by front where that is less work.
+"""The factorization of a mechanism's Jacobian: dense where it is small, front by front where that is less work.
 
 With redundant constraints, which agree, it has more rows than columns, and its equations are solved in least squares.
 """

@@ -1,6 +1,6 @@
 """Following a motion from anchor to anchor: steps that no singular position hides in, checked one by one.
 
-A run makes the steps that are in the ordinary (see `continuation_steps`). Towards a dead point steps become shorter and
+A run makes the steps that are in the ordinary (see `continuation_steps`). Toward a dead point steps become shorter and
 shorter, and the motion ends there; a near miss is followed through its sharp turn. Where the steps shrink while the
 motion itself stays smooth, two branches cross: a change point. It is passed on the series that leads through it, if
 that arrives on the other side to rounding, and is told.
@@ -293,7 +293,7 @@ def attitudes_between(
 def blended_attitudes(
     times: Float[np.ndarray, " anchor"],
     series: Float[np.ndarray, "order component bodies anchor"],
-    neighbours: tuple[Int[np.ndarray, " time"], Int[np.ndarray, " time"]],
+    neighbors: tuple[Int[np.ndarray, " time"], Int[np.ndarray, " time"]],
     instants: Float[np.ndarray, " time"],
 ) -> Float[np.ndarray, "component bodies time"]:
     """Return attitudes, or places, at instants by the series of the anchors before and after each, by index.
@@ -301,7 +301,7 @@ def blended_attitudes(
     A share s of the way from one to the other, their errors are as s^n and (1 - s)^n, and so are the weights of the
     other one.
     """
-    before, after = neighbours
+    before, after = neighbors
     whole = times[after] - times[before]
     share = np.clip((instants - times[before]) / np.where(whole > 0, whole, 1.0), 0.0, 1.0)
     late, early = share ** len(series), (1.0 - share) ** len(series)

@@ -1,4 +1,4 @@
-"""A mechanism with the settings under which it is solved: what turns known neighbours into solved instants."""
+"""A mechanism with the settings under which it is solved: what turns known neighbors into solved instants."""
 
 import dataclasses
 import math

@@ -115,7 +115,7 @@ def departed(walker: Walker, point: ChangePoint, branch: int) -> Place:
     direction = point.tangents[branch]
     place = walker.directed(point.place, direction)
     for step in FIRST_STEPS:
-        predicted = dataclasses.replace(place.recentred(step), arc_length=0.0)
+        predicted = dataclasses.replace(place.recentered(step), arc_length=0.0)
         start = walker.begun(walker.with_jacobian(predicted), direction)
         finite = all(np.isfinite(c).all() for c in start.coordinates.values())
         if finite and float(walker.tangent(start)[: walker.columns] @ direction[: walker.columns]) > 1 - LARGEST_BEND:
@@ -130,7 +130,7 @@ def _located(walker: Walker, short: Place, step: float) -> Place | None:
     def at(step: float) -> tuple[Place, float]:
         points = walker.points(short, np.array([step]), corrected=False)
         known = {"jacobian": points.jacobian[..., 0], "slope": points.slope[..., 0]}
-        return dataclasses.replace(short.recentred(step, PASSAGE_ORDER), **known), float(points.residual[0])
+        return dataclasses.replace(short.recentered(step, PASSAGE_ORDER), **known), float(points.residual[0])
 
     first = step
     place, residual = at(step)

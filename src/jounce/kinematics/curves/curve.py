@@ -177,7 +177,7 @@ class Curve(Displayed):
     @cached_property
     def _gain(self) -> float:
         last = self._places[-1]
-        return float(last.recentred(self.stop - last.arc_length, 20).value[0]) - float(self._places[0].value[0])
+        return float(last.recentered(self.stop - last.arc_length, 20).value[0]) - float(self._places[0].value[0])
 
     def _around(self, arc_length: float) -> float:
         if self.closed and not self.start <= arc_length <= self.stop:
@@ -189,7 +189,7 @@ class Curve(Displayed):
         known = [place.arc_length for place in self._places]
         after = bisect.bisect_left(known, arc_length)
         near = min(self._places[max(after - 1, 0) : after + 1], key=lambda p: abs(p.arc_length - arc_length))
-        return near.recentred(arc_length - near.arc_length)
+        return near.recentered(arc_length - near.arc_length)
 
     def at(self, arc_length: float) -> Mechanism:
         """Return the mechanism with the configuration at an arc length as its starting guess.

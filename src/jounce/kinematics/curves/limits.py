@@ -57,7 +57,7 @@ def limits_between(place: Place, stop: float, unit: float) -> list[LimitPosition
     for part in roots(slopes):
         if not 0 < part <= 1:
             continue
-        here = place.recentred(part * step)
+        here = place.recentered(part * step)
         found.append(LimitPosition(here.arc_length, float(here.value[0]), _kind(slopes, part, size)))
     return found
 

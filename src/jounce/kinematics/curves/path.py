@@ -124,7 +124,7 @@ def _back_at(walker: Walker, here: Place, start: Place, stretch: float) -> float
         return None
     if walker.timed and abs(horner(here.value, step) - start.value[0]) > SAME_PLACE * walker.value_scale:
         return None
-    ahead, first = (walker.tangent(place)[: walker.columns] for place in (here.recentred(step), start))
+    ahead, first = (walker.tangent(place)[: walker.columns] for place in (here.recentered(step), start))
     return step if float(ahead @ first) > 1 - SAME_DIRECTION else None
 
 
@@ -134,7 +134,7 @@ def meets(walker: Walker, here: Place, stretch: float, target: dict[str, np.ndar
         return None
     step = 0.0
     for _ in range(MOST_CORRECTIONS):
-        there = here.recentred(step)
+        there = here.recentered(step)
         away = walker.difference({name: c[0] for name, c in there.coordinates.items()}, target)
         change = float(walker.tangent(there)[: walker.columns] @ away)
         step -= change

@@ -1,4 +1,4 @@
-"""Planar four-bars and slider-cranks recognised: their type by Grashof, and the transmission angle over a range."""
+"""Planar four-bars and slider-cranks recognized: their type by Grashof, and the transmission angle over a range."""
 
 import dataclasses
 import math
@@ -126,7 +126,7 @@ def extremes(linkage: Linkage, low: float, high: float) -> tuple[tuple[float, fl
     return min(angles), max(angles)
 
 
-def recognised(mechanism: Mechanism, driver: str) -> Linkage | None:
+def recognized(mechanism: Mechanism, driver: str) -> Linkage | None:
     """Return the four-bar or slider-crank that a mechanism is, driven at a link on the ground by its angle, or None."""
     law = {**mechanism.initial, **mechanism.drivers}.get(driver)
     if mechanism.space != "planar" or not isinstance(law, CoordinateDriver) or law.coordinate != "angle":

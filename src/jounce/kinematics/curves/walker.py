@@ -57,7 +57,7 @@ class Place:
         """Return the coordinates that the series gives a step away."""
         return {name: horner(c, step) for name, c in self.coordinates.items()}
 
-    def recentred(self, step: float, order: int = ORDER) -> "Place":
+    def recentered(self, step: float, order: int = ORDER) -> "Place":
         """Return the place a step on that the series gives, with its terms up to an order."""
         power = np.arange(order + 1)
         away = power[None] - power[:, None]

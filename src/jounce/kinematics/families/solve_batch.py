@@ -243,7 +243,7 @@ class _Family:
                 self.progress(count - len(left) + done + 1, count)
 
     def dataset(self, values: Mapping[str, np.ndarray]) -> Any:
-        """Return the results, labelled."""
+        """Return the results, labeled."""
         import xarray
 
         coordinates: dict[str, Any] = {"design": np.arange(len(self.rows)), **time_axes(self.instants, self.order + 1)}

@@ -1,6 +1,6 @@
 """All instants of a time grid, solved from the anchors of a motion that was followed.
 
-A long grid is not solved one instant after another. Instants start from their nearest anchor, or from a neighbour
+A long grid is not solved one instant after another. Instants start from their nearest anchor, or from a neighbor
 solved before, so that most are predicted to rounding, and many are solved side by side (see `grid_blocks`). What fails
 there, and what starts from it, is solved once more, each after what it starts from; so are the few instants of a short
 grid that were not solved on the way. Between two anchors lies no singular position, so that the sign of the determinant
@@ -25,7 +25,7 @@ from jounce.kinematics.continuation.path_following import (
     follow,
 )
 from jounce.kinematics.continuation.solver import SMALL_BATCH, Solver
-from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, blocks_for, neighbours, solve_blocks, stride_of
+from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, blocks_for, neighbors, solve_blocks, stride_of
 from jounce.kinematics.status import Status
 from jounce.mechanism.time import nearest_instants
 
@@ -66,7 +66,7 @@ class GridSolver:
         return coordinates, tuple(map(plain_derivatives, outputs))
 
     def solve(self, progress: Callable[[int, int], None] | None, threads: int, *, explain: bool) -> None:
-        """Solve the instants; one that its neighbour cannot predict is followed to from an anchor.
+        """Solve the instants; one that its neighbor cannot predict is followed to from an anchor.
 
         They are solved in several threads; what comes of it does not depend on how many. To `explain` is to say at the
         first instant that was not reached why.
@@ -122,18 +122,18 @@ class GridSolver:
         failed = left & (self.status != Status.OK)
         if failed.any():
             for lanes in _in_turn(left, stride):
-                neighbour, known = neighbours(lanes, stride)
-                failed[lanes] |= failed[neighbour] & known
+                neighbor, known = neighbors(lanes, stride)
+                failed[lanes] |= failed[neighbor] & known
         return failed
 
     def _sources(self, lanes: Indices, stride: int) -> Indices:
-        """Return from where each instant is predicted: its neighbour, where that is known, or its nearest anchor."""
-        neighbour, known = neighbours(lanes, stride)
-        known &= self.status[neighbour] == Status.OK
+        """Return from where each instant is predicted: its neighbor, where that is known, or its nearest anchor."""
+        neighbor, known = neighbors(lanes, stride)
+        known &= self.status[neighbor] == Status.OK
         time = self.time[lanes]
         nearest = len(self.time) + nearest_instants(self._instants[len(self.time) :], time)
-        nearer = np.abs(time - self._instants[neighbour]) <= np.abs(time - self._instants[nearest])
-        return np.where(nearer & known, neighbour, nearest)
+        nearer = np.abs(time - self._instants[neighbor]) <= np.abs(time - self._instants[nearest])
+        return np.where(nearer & known, neighbor, nearest)
 
     def _solved(self, batch: tuple[Indices, Indices]) -> StepResult:
         """Return what comes of a batch of instants, with their sources; nothing is kept but the state at its lanes."""

@@ -106,26 +106,26 @@ def rounds(count: int, stride: int, width: int) -> Int[np.ndarray, "round lane"]
     return np.where(whole < count, whole, whole[:, :1])
 
 
-def neighbours(lanes: Indices, stride: int) -> tuple[Indices, Bool[np.ndarray, " lane"]]:
-    """Return the neighbour of each of some instants, by index, and whether it is solved before."""
+def neighbors(lanes: Indices, stride: int) -> tuple[Indices, Bool[np.ndarray, " lane"]]:
+    """Return the neighbor of each of some instants, by index, and whether it is solved before."""
     return lanes & (lanes - 1), lanes & (stride - 1) > 0
 
 
 @lru_cache(maxsize=16)
-def _neighbours(count: int, stride: int) -> tuple[Indices, Bool[np.ndarray, " lane"]]:
-    """Return the neighbour of each instant of a block, and whether it is solved before."""
-    return neighbours(np.arange(count), stride)
+def _neighbors(count: int, stride: int) -> tuple[Indices, Bool[np.ndarray, " lane"]]:
+    """Return the neighbor of each instant of a block, and whether it is solved before."""
+    return neighbors(np.arange(count), stride)
 
 
 def _begin(room: Room, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
     """Have a room take up the instants of a block, s, with the anchors around it."""
     room.put_anchors(zip(*(jax.tree.leaves(anchor.state) for anchor in anchors), strict=True))
-    neighbour, known = _neighbours(len(time), stride)
+    neighbor, known = _neighbors(len(time), stride)
     instants = np.array([anchor.instant for anchor in anchors])
     nearest = nearest_instants(instants, time)
-    to_neighbour, to_anchor = time - time[neighbour], time - instants[nearest]
-    near = known & (np.abs(to_neighbour) <= np.abs(to_anchor))
-    sources = np.where(near, neighbour, room.size + nearest), np.where(near, to_neighbour, to_anchor)
+    to_neighbor, to_anchor = time - time[neighbor], time - instants[nearest]
+    near = known & (np.abs(to_neighbor) <= np.abs(to_anchor))
+    sources = np.where(near, neighbor, room.size + nearest), np.where(near, to_neighbor, to_anchor)
     room.take_up(time, sources, rounds(len(time), stride, room.width))
 
 

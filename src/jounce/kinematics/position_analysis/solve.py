@@ -95,7 +95,7 @@ def solve(
 ) -> Motion:
     """Return the motion of a driven mechanism and its time derivatives up to any order, exact to rounding.
 
-    Positions are found by Newton-Raphson; all derivatives of an instant follow from one factorisation of the
+    Positions are found by Newton-Raphson; all derivatives of an instant follow from one factorization of the
     Jacobian there (Sommer 2024, equations 1-8 and all orders beyond).
 
     Parameters

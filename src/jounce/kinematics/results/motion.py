@@ -266,7 +266,7 @@ class Motion(Displayed):
         import xarray
 
         variables = {
-            name: self._labelled(name, values, self.mechanism.outputs[name]) for name, values in self.outputs.items()
+            name: self._labeled(name, values, self.mechanism.outputs[name]) for name, values in self.outputs.items()
         }
         attributes: dict[str, Any] = {"title": self.mechanism.title or "motion of a mechanism", "source": "jounce"}
         if self.change_points.size:
@@ -313,11 +313,11 @@ class Motion(Displayed):
         check_output(given, self.mechanism, name)
         self._check_order(given, name)
         if isinstance(given, AbstractMotionOutput):
-            return self._labelled(name, self._derivatives(given.coefficients(self)), given)
+            return self._labeled(name, self._derivatives(given.coefficients(self)), given)
         group = output_group(given, self.mechanism, self.model, name)
         values = self._derivatives(self._continued(group, self._coefficients(group))[:, :, 0])
         self._check_finite(values, name)
-        return self._labelled(name, values, given)
+        return self._labeled(name, values, given)
 
     def series(self, output: AbstractQuantity) -> Float[Numbers, "order component time"]:
         """Return the Taylor coefficients of any output, (levels, components, time), angles up to whole turns."""
@@ -399,7 +399,7 @@ class Motion(Displayed):
             values = np.where(failed[:, None, None], np.nan, values)
         return values[..., 0] if values.shape[-1] == 1 else values
 
-    def _labelled(
+    def _labeled(
         self, name: str, values: Float[Numbers, "time derivative *component"], output: AbstractQuantity
     ) -> "xarray.DataArray":
         import xarray

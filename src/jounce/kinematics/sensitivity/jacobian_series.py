@@ -1,4 +1,4 @@
-"""The Jacobian along a motion as a Taylor series, and linear equations with it: solved with one factorisation.
+"""The Jacobian along a motion as a Taylor series, and linear equations with it: solved with one factorization.
 
 How the residuals change with virtual displacements of the bodies is a jet, as everything is: none is written anywhere.
 """

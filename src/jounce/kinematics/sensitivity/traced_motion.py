@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 class TracedMotion(Motion):
     """A motion of which JAX traces the values.
 
-    Outputs are arrays of JAX; labelled arrays hold such, and give them as ``.data``. `status` is an array too: within
+    Outputs are arrays of JAX; labeled arrays hold such, and give them as ``.data``. `status` is an array too: within
     `jax.jit` and `jax.vmap` nothing can be raised for it, and an instant that failed is NaN and adds nothing to
     derivatives. There is no dataset of it, and neither faults nor change points are told.
     """

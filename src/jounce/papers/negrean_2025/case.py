@@ -40,9 +40,9 @@ class Link:
     mass : float
         kg.
     center_x, center_z : float
-        Of the centre of mass from the axis, m; x and z are those of the link.
+        Of the center of mass from the axis, m; x and z are those of the link.
     inertia_x, inertia_y, inertia_z : float
-        About the centre of mass, kg m^2; y is along the axis.
+        About the center of mass, kg m^2; y is along the axis.
     radius : float
         From the axis to the accelerometer, m.
     sensor_angle : float, default 0

@@ -42,8 +42,8 @@ def gravity_torques(
 ) -> Float[np.ndarray, "*batch rates"]:
     """Return the torque that holds the link against its weight, and its rates: Q_g of Negrean 2025, 144-146.
 
-    The paper does not write it out. The axis y is horizontal, the link turns from x towards -z and z is up at angle
-    zero, so that the centre of mass stands at the height ``z_C cos q - x_C sin q``.
+    The paper does not write it out. The axis y is horizontal, the link turns from x toward -z and z is up at angle
+    zero, so that the center of mass stands at the height ``z_C cos q - x_C sin q``.
 
     Parameters
     ----------

@@ -14,14 +14,14 @@ from matplotlib.figure import Figure
 from jounce.papers.figures import legend_below, panels
 from jounce.papers.negrean_2025.case import STAND_IN, Case
 from jounce.papers.negrean_2025.history import STEPS, History
-from jounce.plot.style import BLUE, GREEN, GREY, PALE_GREY, VERMILION
+from jounce.plot.style import BLUE, GRAY, GREEN, PALE_GRAY, VERMILION
 
 TORQUES = (
     ("torque", "Driving torque", "N m"),
     ("torque rate", "First rate of the driving torque", "N m/s"),
     ("second rate", "Second rate of the driving torque", r"N m/s$^2$"),
 )
-ENERGY_COLOURS = (BLUE, VERMILION, GREEN)
+ENERGY_COLORS = (BLUE, VERMILION, GREEN)
 
 
 def stand_in_note(case: Case) -> str:
@@ -44,7 +44,7 @@ def _panels(
 ) -> tuple[Figure, np.ndarray]:
     figure, grid = panels(rows, columns, size, title, note, sharex=True)
     for panel in grid.flat:
-        panel.axhline(0.0, color=PALE_GREY, linewidth=0.7, zorder=1)
+        panel.axhline(0.0, color=PALE_GRAY, linewidth=0.7, zorder=1)
         panel.margins(x=0.0)
     for panel in grid[-1]:
         panel.set_xlabel("time / s")
@@ -53,7 +53,7 @@ def _panels(
 
 def accelerations(histories: Mapping[str, History], *, tangential: bool, number: int) -> Figure:
     """Draw the samples and the law through them, one panel for each motion (figures 4 and 5)."""
-    what = "Tangential acceleration" if tangential else "Generalised angular acceleration"
+    what = "Tangential acceleration" if tangential else "Generalized angular acceleration"
     unit = r"m/s$^2$" if tangential else r"rad/s$^2$"
     note = stand_in_note(_any_case(histories))
     figure, grid = _panels(len(histories), 1, (6.0, 4.8), f"{what} (figure {number} of Negrean 2025)", note)
@@ -95,10 +95,10 @@ def energies(histories: Mapping[str, History]) -> Figure:
     for column, history in enumerate(histories.values()):
         for p, panel in enumerate(grid[:, column], 1):
             computed, closed = history.energies[:, p - 1], history.closed_energies[:, p - 1]
-            panel.plot(history.time, computed, color=ENERGY_COLOURS[p - 1], label="library")
+            panel.plot(history.time, computed, color=ENERGY_COLORS[p - 1], label="library")
             every = slice(None, None, STEPS)  # the knots
             panel.plot(
-                history.time[every], closed[every], color=GREY, marker="x", linestyle="", label="closed form", zorder=3
+                history.time[every], closed[every], color=GRAY, marker="x", linestyle="", label="closed form", zorder=3
             )
             panel.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
             if column == 0:

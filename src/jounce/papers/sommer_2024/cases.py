@@ -115,9 +115,9 @@ class Cycle:
         return np.max(np.abs(self.explicit), axis=0)[1:]
 
     @property
-    def normalised_rmse(self) -> Float[np.ndarray, "4"]:
+    def normalized_rmse(self) -> Float[np.ndarray, "4"]:
         """The errors divided by the largest absolute values, shape (4,)."""
-        return normalised_rmse(self.simulated, self.explicit)[1:]
+        return normalized_rmse(self.simulated, self.explicit)[1:]
 
 
 def rmse(computed: Table, right: Table) -> Columns:
@@ -125,7 +125,7 @@ def rmse(computed: Table, right: Table) -> Columns:
     return np.sqrt(np.mean((computed - right) ** 2, axis=0))
 
 
-def normalised_rmse(computed: Table, right: Table) -> Columns:
+def normalized_rmse(computed: Table, right: Table) -> Columns:
     """Return the root-mean-square error over time divided by the largest absolute value (Sommer 2024, section 4)."""
     return rmse(computed, right) / np.max(np.abs(right), axis=0)
 
@@ -143,39 +143,39 @@ def nominal_cycle(case: ValidationCase, mechanism: Mechanism) -> Cycle:
 
 
 def tolerance_error(case: ValidationCase, mechanism: Mechanism, tolerance: float) -> Float[np.ndarray, "4"]:
-    """Return the normalised RMSE of velocity to jounce, with positions no better than an assembly tolerance."""
+    """Return the normalized RMSE of velocity to jounce, with positions no better than an assembly tolerance."""
     time = nominal_time()
     computed = case.simulated(mechanism, time, tolerance=tolerance, refine=False)
-    return normalised_rmse(computed, case.explicit(mechanism, time))[1:]
+    return normalized_rmse(computed, case.explicit(mechanism, time))[1:]
 
 
 def step_errors(case: ValidationCase, mechanism: Mechanism, step: float) -> dict[str, Float[np.ndarray, "2"]]:
-    """Return the normalised RMSE of jerk and jounce at one time step: simulated, and by differences of order 2 and 4.
+    """Return the normalized RMSE of jerk and jounce at one time step: simulated, and by differences of order 2 and 4.
 
     All three stand at the same instants, one whole cycle of them.
     """
-    time, centres = stencil_instants(step)
+    time, centers = stencil_instants(step)
     computed = case.simulated(mechanism, time)
-    right = case.explicit(mechanism, time[centres])[:, 3:]
-    errors = {"simulation": normalised_rmse(computed[centres, 3:], right)}
+    right = case.explicit(mechanism, time[centers])[:, 3:]
+    errors = {"simulation": normalized_rmse(computed[centers, 3:], right)}
     for name, accuracy in (("second order", 2), ("fourth order", 4)):
         estimates = [
-            central_difference(computed[:, 2], step, derivative=derivative, accuracy=accuracy, at=centres)
+            central_difference(computed[:, 2], step, derivative=derivative, accuracy=accuracy, at=centers)
             for derivative in (1, 2)
         ]
-        errors[name] = normalised_rmse(np.stack(estimates, axis=1), right)
+        errors[name] = normalized_rmse(np.stack(estimates, axis=1), right)
     return errors
 
 
-def stencil_instants(step: float) -> tuple[Times, Int[np.ndarray, " centres"]]:
+def stencil_instants(step: float) -> tuple[Times, Int[np.ndarray, " centers"]]:
     """Return increasing instants, and the indices of those around which two more stand on either side, `step` apart.
 
     A grid of that step over one cycle. Where it would have more than some thousand instants, only the surroundings of
     the nominal 201 instants are kept: the mean square of an error over the cycle is the same.
     """
     if 2 * REACH * step < STEP:
-        centres = REACH * step + nominal_time()
-        time = (centres[:, None] + step * np.arange(-REACH, REACH + 1)).ravel()
+        centers = REACH * step + nominal_time()
+        time = (centers[:, None] + step * np.arange(-REACH, REACH + 1)).ravel()
         return time, np.arange(REACH, len(time), 2 * REACH + 1)
     count = round(CYCLE / step) + 1
     return step * np.arange(count + 2 * REACH), np.arange(REACH, REACH + count)

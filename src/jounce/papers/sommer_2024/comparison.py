@@ -15,7 +15,7 @@ PRINTED = {  # root-mean-square errors in the text of the paper, sections 4 and 
     ("rsur", "jounce"): 3.81e-13,
 }
 UNITS = ("rad/s", "rad/s^2", "rad/s^3", "rad/s^4")
-FLOOR = 1e-14  # normalised RMSE of what is computed to rounding
+FLOOR = 1e-14  # normalized RMSE of what is computed to rounding
 ALIKE = 10.0  # errors of velocity to jounce differ by less than this factor
 CONVERGING = (1.5e-3, 3e-2)  # s, steps at which neither rounding nor the next order shows
 STANDS_IN = {  # what of each simulation the text of the paper does not give
@@ -38,7 +38,7 @@ def comparison(results: Mapping[str, Results]) -> str:
         step=cases.STEP,
         tolerance=cases.TOLERANCE,
         errors=markdown_table(
-            "simulation | chosen | quantity | unit | largest value | RMSE | printed RMSE | normalised RMSE",
+            "simulation | chosen | quantity | unit | largest value | RMSE | printed RMSE | normalized RMSE",
             _errors(results),
         ),
         lags=markdown_table(
@@ -110,11 +110,11 @@ def _steps(results: Sequence[Results], _: int) -> tuple[str, bool, str]:
 def _errors(results: Mapping[str, Results]) -> Iterator[tuple[str, ...]]:
     for name, result in results.items():
         cycle = result.cycle
-        columns = zip(cases.QUANTITIES, UNITS, cycle.peak, cycle.rmse, cycle.normalised_rmse, strict=True)
-        for quantity, unit, peak, error, normalised in columns:
+        columns = zip(cases.QUANTITIES, UNITS, cycle.peak, cycle.rmse, cycle.normalized_rmse, strict=True)
+        for quantity, unit, peak, error, normalized in columns:
             printed = PRINTED.get((name, quantity))
             printed_text = "" if printed is None else f"{printed:.3g}"
-            sizes = f"{peak:.4g}", f"{error:.2e}", printed_text, f"{normalised:.1e}"
+            sizes = f"{peak:.4g}", f"{error:.2e}", printed_text, f"{normalized:.1e}"
             yield name, STANDS_IN[name], quantity, unit, *sizes
 
 

@@ -46,9 +46,9 @@ def central_difference(
     >>> central_difference(t**4, 0.1, derivative=2, accuracy=4)
     array([0.48])
     """
-    centres = np.arange(REACH, len(samples) - REACH) if at is None else at
+    centers = np.arange(REACH, len(samples) - REACH) if at is None else at
     weights = WEIGHTS[accuracy, derivative]
-    terms = [weight * samples[centres + k - REACH] for k, weight in enumerate(weights) if weight]
+    terms = [weight * samples[centers + k - REACH] for k, weight in enumerate(weights) if weight]
     return np.sum(terms, axis=0) / step**derivative
 
 

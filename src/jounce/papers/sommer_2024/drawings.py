@@ -17,7 +17,7 @@ from jounce.papers.sommer_2024.cases import VALIDATION_CASES
 from jounce.plot.drawing import View
 from jounce.plot.scene import Scene, drawing_of
 from jounce.plot.sketch import SketchFigure, draw_scale
-from jounce.plot.style import GREY, PALE_GREY
+from jounce.plot.style import GRAY, PALE_GRAY
 
 ARC = 7.0  # radius of the arc of an angle, in halves of a pin
 VIEW = (-130.0, 25.0)  # degrees, of the spatial ones
@@ -106,11 +106,11 @@ def _panel(axes: Any, drawn: Drawn, view: View) -> SketchFigure:
     }
 
     def line(points: Any, **look: Any) -> None:
-        drawing.curve(drawing.flat(np.asarray(points))[None], stroke=PALE_GREY, layer=2, owner="", **look)
+        drawing.curve(drawing.flat(np.asarray(points))[None], stroke=PALE_GRAY, layer=2, owner="", **look)
 
-    def name(text: str, point: np.ndarray, colour: str, owner: str) -> None:
+    def name(text: str, point: np.ndarray, color: str, owner: str) -> None:
         drawing.owner = owner
-        drawing.name(text, drawing.flat(point[None]), colour)
+        drawing.name(text, drawing.flat(point[None]), color)
 
     for pair in drawn.fixed:
         line([positions[letter] for letter in pair], width=0.9, dashes=(5.0, 4.0))
@@ -126,7 +126,7 @@ def _panel(axes: Any, drawn: Drawn, view: View) -> SketchFigure:
         name(symbol, arc[len(arc) // 2], "black", f"joints.{symbol}")
     for pair in drawn.lengths:
         text = f"{pair} = {100 * values[pair]:.2f} cm" if pair in values else f"d = {pair}, driven"
-        name(text, (positions[pair[0]] + positions[pair[1]]) / 2, GREY, f"joints.{pair}")
+        name(text, (positions[pair[0]] + positions[pair[1]]) / 2, GRAY, f"joints.{pair}")
     seen_from = None if drawing.planar else view
     figure = SketchFigure(Scene.of(drawing), None, "", seen_from, axes)
     left, right = axes.get_xlim()

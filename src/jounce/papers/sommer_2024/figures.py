@@ -16,7 +16,7 @@ from jounce.papers.figures import legend_below, panels
 from jounce.papers.sommer_2024 import cases, drawings
 from jounce.papers.sommer_2024.comparison import STANDS_IN
 from jounce.papers.sommer_2024.measure import Results
-from jounce.plot.style import BLUE, GREEN, GREY, PURPLE, VERMILION
+from jounce.plot.style import BLUE, GRAY, GREEN, PURPLE, VERMILION
 
 LINE_STYLES = {
     "velocity": {"color": BLUE, "marker": "o", "linestyle": "-"},
@@ -58,7 +58,7 @@ def time_history(results: Mapping[str, Results], *, name: str, quantity: str, nu
     below.set_ylabel(f"error / ({unit})")
     below.set_title(
         f"simulation minus explicit solution, RMSE {cycle.rmse[index]:.2g} {unit}"
-        f" ({cycle.normalised_rmse[index]:.1g} of the largest value)",
+        f" ({cycle.normalized_rmse[index]:.1g} of the largest value)",
     )
     below.set_xlabel("time / s")
     below.set_xlim(cycle.time[0], cycle.time[-1])
@@ -75,13 +75,13 @@ def tolerance_sweep(results: Mapping[str, Results], *, names: Sequence[str], num
         for k, quantity in enumerate(cases.QUANTITIES):
             panel.loglog(cases.TOLERANCES, results[name].by_tolerance[:, k], label=quantity, **LINE_STYLES[quantity])
         panel.loglog(
-            cases.TOLERANCES, cases.TOLERANCES, color=GREY, linewidth=0.8, zorder=1, label="the tolerance itself"
+            cases.TOLERANCES, cases.TOLERANCES, color=GRAY, linewidth=0.8, zorder=1, label="the tolerance itself"
         )
         panel.set_title(cases.VALIDATION_CASES[name].title)
         panel.set_xlabel("assembly tolerance (rad, or mechanism sizes)")
         _decades(panel.xaxis, 2)
         _decades(panel.yaxis, 2)
-    axes[0, 0].set_ylabel("normalised RMSE")
+    axes[0, 0].set_ylabel("normalized RMSE")
     axes[0, 0].legend(loc="upper left")
     return figure
 
@@ -101,7 +101,7 @@ def step_sweep(results: Mapping[str, Results], *, names: Sequence[str], number: 
     for panel in axes[-1]:
         panel.set_xlabel("time step h / s")
     for panel in axes[:, 0]:
-        panel.set_ylabel("normalised RMSE")
+        panel.set_ylabel("normalized RMSE")
     legend_below(figure, axes[0, 0], min(len(names) + 1, 3), _note(names))
     return figure
 
@@ -114,7 +114,7 @@ def phase_lag(results: Mapping[str, Results], *, name: str, step: float) -> Figu
     figure, axes = panels(2, 1, (6.0, 5.0), title, sharex=True)
     chosen = [lag for lag in results[name].lags if lag.step == step]
     for panel, lag in zip(axes[:, 0], chosen, strict=True):
-        panel.plot(lag.time, lag.explicit, color=GREY, linewidth=1.0, label="explicit solution")
+        panel.plot(lag.time, lag.explicit, color=GRAY, linewidth=1.0, label="explicit solution")
         panel.plot(lag.time, lag.simulated, **LINE_STYLES["simulation"] | {"linestyle": ""}, label="jounce")
         panel.plot(
             lag.time, lag.difference, **LINE_STYLES["second order"], label="backward differences of acceleration"

@@ -30,9 +30,9 @@ class Results:
     cycle : Cycle
         At nominal settings.
     by_tolerance : array of shape (tolerances, 4)
-        Normalised RMSE of velocity to jounce for each of `TOLERANCES`.
+        Normalized RMSE of velocity to jounce for each of `TOLERANCES`.
     by_step : dict of str to array of shape (steps, 2)
-        Normalised RMSE of jerk and jounce for each of `STEPS`: of the simulation, and of the differences of second
+        Normalized RMSE of jerk and jounce for each of `STEPS`: of the simulation, and of the differences of second
         and fourth order of its acceleration.
     lags : list of Lag
         Jerk and jounce by backward differences, for each of the steps of `lag`.

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.mechanism import Mechanism
-from jounce.papers.sommer_2024.cases import CYCLE, QUANTITIES, STEP, ValidationCase, normalised_rmse
+from jounce.papers.sommer_2024.cases import CYCLE, QUANTITIES, STEP, ValidationCase, normalized_rmse
 from jounce.papers.sommer_2024.differences import backward_difference
 
 STEPS = (STEP, 0.02, 0.05, 0.1)  # s, each a whole part of the cycle
@@ -35,7 +35,7 @@ class Lag:
     explicit, simulated, difference : array of shape (time,)
         The quantity by the explicit solution, by the simulation and by backward differences of its acceleration.
     error : float
-        Normalised RMSE that backward differences of these steps must have, from the spectrum of the explicit solution.
+        Normalized RMSE that backward differences of these steps must have, from the spectrum of the explicit solution.
     """
 
     quantity: str
@@ -58,8 +58,8 @@ class Lag:
         return -float(np.angle(np.fft.rfft(computed)[n] / right[n])) * CYCLE / (2 * np.pi * n)
 
     def measured_error(self, computed: Series) -> float:
-        """Return the normalised RMSE of a quantity."""
-        return float(normalised_rmse(computed[:, None], self.explicit[:, None])[0])
+        """Return the normalized RMSE of a quantity."""
+        return float(normalized_rmse(computed[:, None], self.explicit[:, None])[0])
 
 
 def lags(case: ValidationCase, mechanism: Mechanism, step: float) -> list[Lag]:

@@ -60,13 +60,13 @@ def errors_csv(cycles: Mapping[str, Cycle]) -> str:
     rows = (
         (name, *errors)
         for name, cycle in cycles.items()
-        for errors in zip(QUANTITIES, cycle.rmse, cycle.normalised_rmse, strict=True)
+        for errors in zip(QUANTITIES, cycle.rmse, cycle.normalized_rmse, strict=True)
     )
-    return csv_table(("simulation", "quantity", "rmse", "normalised_rmse"), rows)
+    return csv_table(("simulation", "quantity", "rmse", "normalized_rmse"), rows)
 
 
 def tolerances_csv(results: Mapping[str, Results]) -> str:
-    """Return the normalised errors at each assembly tolerance as CSV: what figures 4, 6, 10 and 12 draw."""
+    """Return the normalized errors at each assembly tolerance as CSV: what figures 4, 6, 10 and 12 draw."""
     rows = (
         (name, f"{tolerance:g}", *errors)
         for name, result in results.items()
@@ -76,7 +76,7 @@ def tolerances_csv(results: Mapping[str, Results]) -> str:
 
 
 def steps_csv(results: Mapping[str, Results]) -> str:
-    """Return the normalised errors of jerk and jounce at each time step as CSV: what figures 5, 7, 11 and 13 draw."""
+    """Return the normalized errors of jerk and jounce at each time step as CSV: what figures 5, 7, 11 and 13 draw."""
     rows = (
         (name, f"{step:g}", method, *errors)
         for name, result in results.items()

@@ -49,7 +49,7 @@ class Drive:
     Examples
     --------
     >>> import jounce as jn
-    >>> drive = jn.Drive(stiffness=2e4, damping=10.0, rotor_inertia=5e-5, gear_ratio=100)
+    >>> drive = jn.planning.Drive(stiffness=2e4, damping=10.0, rotor_inertia=5e-5, gear_ratio=100)
     >>> drive.reflected_inertia, drive.time_constant
     (0.5, 0.0005)
     """
@@ -169,12 +169,14 @@ class DriveArrays:
         """
         if not isinstance(drives, Mapping):
             raise RobotError(
-                "must be a mapping of names to jn.Drive, as jn.load_drives gives it", name="drives", value=drives
+                "must be a mapping of names to jn.planning.Drive, as jn.io.load_drives gives it",
+                name="drives",
+                value=drives,
             )
         for name, drive in drives.items():
             check_name(kind, name, names, RobotError, name="drives")
             if not isinstance(drive, Drive):
-                raise RobotError("must be a jn.Drive", name=f"drives.{name}", value=drive)
+                raise RobotError("must be a jn.planning.Drive", name=f"drives.{name}", value=drive)
             if drive.lead is not None and turning[names.index(name)]:
                 message = "is for joints and drivers that slide; this one turns, give a gear_ratio"
                 raise RobotError(message, name=f"drives.{name}.lead", value=drive.lead)

@@ -109,8 +109,9 @@ def feedforward(
     >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
     >>> pin = jn.Joint("pin", "base", "rod", axis=[0, 0, 1])
     >>> arm = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", rod)], [pin], gravity=[0, 0, 0])
-    >>> drive = jn.Drive(stiffness=100.0, rotor_inertia=1e-4, gear_ratio=50)
-    >>> found = jn.feedforward(arm, [[0.0], [0.0], [3.0], [0.0], [60.0]], {"pin": drive})  # q to its fourth derivative
+    >>> drive = jn.planning.Drive(stiffness=100.0, rotor_inertia=1e-4, gear_ratio=50)
+    >>> q = [[0.0], [0.0], [3.0], [0.0], [60.0]]  # to its fourth derivative
+    >>> found = jn.planning.feedforward(arm, q, {"pin": drive})
     >>> found.deflection[0].item(), found.torque[0].round(12).item()  # 1 N m, and 0.25 kg m^2 (3 + 20 / 100) more
     (0.01, 1.8)
     """

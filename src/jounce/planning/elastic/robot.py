@@ -55,7 +55,7 @@ def elastic_robot(robot: Robot, drives: Mapping[str, Drive], *, losses: bool = T
     >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
     >>> pin = jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
     >>> arm = jn.Robot("arm", [jn.Link("base"), jn.Link("rod", rod)], [pin])
-    >>> drive = jn.Drive(stiffness=100.0, rotor_inertia=1e-4, gear_ratio=50)
+    >>> drive = jn.planning.Drive(stiffness=100.0, rotor_inertia=1e-4, gear_ratio=50)
     >>> jn.planning.elastic_robot(arm, {"pin": drive}).joint_names
     ('pin', 'pin_motor')
     """

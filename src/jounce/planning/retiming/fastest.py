@@ -15,7 +15,7 @@ from jounce.planning.retiming.feasibility import bounded_everywhere, check_possi
 from jounce.planning.retiming.program import Program, solve_program
 from jounce.planning.retiming.quantities import Curves, Labels, Source
 from jounce.planning.retiming.rate_law import Conditions, RateLaw, progress, quadrature
-from jounce.planning.retiming.rate_spline import Parametrisation, RateBasis
+from jounce.planning.retiming.rate_spline import Parametrization, RateBasis
 
 COARSE = 60  # cells for a first law, which tells where the time goes
 ENDS = 1e-9  # of a cell: both sides of a knot are looked at
@@ -42,7 +42,7 @@ _Points = Float[np.ndarray, " _"]  # of any length
 
 
 class Search:
-    """The search for the fastest rate in one parametrisation.
+    """The search for the fastest rate in one parametrization.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Search:
         Gives the limited quantities at values of s.
     labels : Labels
         Their names.
-    parameter : Parametrisation
+    parameter : Parametrization
         s over u.
     basis : RateBasis
         Splines of z.
@@ -64,7 +64,7 @@ class Search:
         self,
         source: Source,
         labels: Labels,
-        parameter: Parametrisation,
+        parameter: Parametrization,
         basis: RateBasis,
         conditions: Conditions,
         level: int = 4,
@@ -336,17 +336,17 @@ def fastest(
     duration = 0.0
     coarse = 2 if bounded_everywhere(source, start, stop) else 3
     for count in (COARSE, COARSE):
-        parameter = Parametrisation(share, s, conditions.rests)
+        parameter = Parametrization(share, s, conditions.rests)
         search = Search(source, labels, parameter, RateBasis(count, coarse), conditions, coarse)
         law = search.run(np.full(count + coarse, search.level()), COARSE_ROUNDS)
         share, s = progress(law)
         duration = law.duration
     basis = RateBasis(cells, max(conditions.order + 1, 2))
     if labels.fourth:
-        search = Search(source, labels, Parametrisation(share, s, conditions.rests), basis, conditions, 3)
+        search = Search(source, labels, Parametrization(share, s, conditions.rests), basis, conditions, 3)
         law = search.run(np.full(basis.count, 1 / duration**2))
         (share, s), duration = progress(law), law.duration
-    parameter = Parametrisation(share, s, conditions.rests)
+    parameter = Parametrization(share, s, conditions.rests)
     search = Search(source, labels, parameter, basis, conditions)
     return search.fastest_law(np.full(basis.count, 1 / duration**2)), search
 
@@ -356,7 +356,7 @@ def slowed_only(
 ) -> tuple[RateLaw, Search]:
     """Return the fastest law that is nowhere faster than s itself, s being a time, and the search that found it."""
     check_possible(source, labels, start, stop, bounded=True)
-    parameter = Parametrisation([0.0, 1.0], [start, stop], (1, 1))
+    parameter = Parametrization([0.0, 1.0], [start, stop], (1, 1))
     search = Search(source, labels, parameter, RateBasis(cells, max(conditions.order + 1, 2)), conditions)
     as_it_was = search.law_of(np.full(search.basis.count, search.largest_z))
     if search.peaks(as_it_was)[1].max() <= 1:

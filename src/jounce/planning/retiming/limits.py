@@ -69,8 +69,8 @@ class MotionLimits:
     Examples
     --------
     >>> import jounce as jn
-    >>> slow = jn.MotionLimits(points=(jn.PointLimits("panda_hand", speed=0.25),))
-    >>> near_the_end = jn.MotionLimits(varying={"elbow": {"velocity": lambda q: 2.0 - 0.5 * q**2}})
+    >>> slow = jn.planning.MotionLimits(points=(jn.planning.PointLimits("panda_hand", speed=0.25),))
+    >>> near_the_end = jn.planning.MotionLimits(varying={"elbow": {"velocity": lambda q: 2.0 - 0.5 * q**2}})
     """
 
     joints: Mapping[str, Limits] = dataclasses.field(default_factory=dict)

@@ -121,7 +121,7 @@ class Curves:
         self.vector = np.stack([m * s1, m * s2 + c * s1**2])
         q1, q2, q3, q4 = np.moveaxis(q.fourth, -1, 0)
         s1, s2 = s1[..., 0], s2[..., 0]
-        # derivatives by u of what is limited: composition of the path with the parametrisation
+        # derivatives by u of what is limited: composition of the path with the parametrization
         self.fourth = np.stack(
             [
                 q1 * s1,

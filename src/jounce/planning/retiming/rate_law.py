@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from jounce.planning.retiming.rate_spline import Parametrisation, RateBasis
+from jounce.planning.retiming.rate_spline import Parametrization, RateBasis
 
 _Points = Float[np.ndarray, " _"]  # of any length
 
@@ -16,7 +16,7 @@ class RateLaw:
 
     Parameters
     ----------
-    parameter : Parametrisation
+    parameter : Parametrization
         s over u.
     basis : RateBasis
         Splines over u.
@@ -24,7 +24,7 @@ class RateLaw:
         Of z, 1/s^2.
     """
 
-    parameter: Parametrisation
+    parameter: Parametrization
     basis: RateBasis
     coefficients: _Points
 
@@ -54,7 +54,7 @@ class Conditions:
     rates : tuple of float or None
         Rates of s at the ends, 1/s; zero is rest, and None is free.
     max_rate : float or None
-        Rate of s that is not to be exceeded, 1/s; for a parametrisation by s itself.
+        Rate of s that is not to be exceeded, 1/s; for a parametrization by s itself.
     """
 
     order: int

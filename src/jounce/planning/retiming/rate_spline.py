@@ -1,4 +1,4 @@
-"""The square of the rate along a path as a B-spline, and the parametrisation in which it is smooth also at rest."""
+"""The square of the rate along a path as a B-spline, and the parametrization in which it is smooth also at rest."""
 
 import dataclasses
 from functools import cached_property
@@ -11,13 +11,13 @@ from jounce.shapes import ArrayLike
 from jounce.trajectory import SplineMotion
 from jounce.trajectory.splines import local_powers
 
-SMOOTHNESS = 9  # degree of the parametrisation
-KNOT_INTERVALS = 24  # of the parametrisation
+SMOOTHNESS = 9  # degree of the parametrization
+KNOT_INTERVALS = 24  # of the parametrization
 
 _Points = Float[np.ndarray, " _"]  # of any length
 
 
-class Parametrisation(SplineMotion):
+class Parametrization(SplineMotion):
     """The parameter s of a path over u, which runs from 0 to 1: increasing, with derivatives that vanish at rest ends.
 
     Where a motion starts from rest with a bounded derivative of order p, s grows as the p-th power of the time. With s

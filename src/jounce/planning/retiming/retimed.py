@@ -65,7 +65,7 @@ class RetimedTrajectory(JointTrajectory):
 
 
 def active_limits(search: Search, law: RateLaw, motion: RateMotion) -> Any:
-    """Return which limits bind where, and what they cost, labelled."""
+    """Return which limits bind where, and what they cost, labeled."""
     import xarray
 
     shares = search.curves.ratios(law.at(search.points))

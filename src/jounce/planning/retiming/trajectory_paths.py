@@ -66,7 +66,7 @@ class Ramps:
         self.stops, self.widths = stops, widths
         self.reach = widths / self.share(1.0)
         self.gained = np.append(0.0, np.cumsum(2 * (self.reach - widths)))
-        self.centres = stops + self.gained[:-1] + self.reach - widths
+        self.centers = stops + self.gained[:-1] + self.reach - widths
 
     def parameter(self, lengths: np.ndarray) -> Float[np.ndarray, " length"]:
         """Return the parameter at lengths."""
@@ -81,14 +81,14 @@ class Ramps:
         for _ in range(NEWTON):
             share = np.maximum(share - (self.share(share) - target) / np.maximum(slope(share), 1e-300), 0.0)
         inside = np.abs(away) < self.widths[near]
-        return np.where(inside, self.centres[near] + np.sign(away) * self.reach[near] * share, shifted)
+        return np.where(inside, self.centers[near] + np.sign(away) * self.reach[near] * share, shifted)
 
     def motion(self, total: float) -> JoinedPieces:
         """Return the length over the parameter, up to a total length."""
         begins, pieces = [0.0], [np.polynomial.Polynomial([0.0, 1.0])]
-        for stop, centre, reach, width in zip(self.stops, self.centres, self.reach, self.widths, strict=True):
+        for stop, center, reach, width in zip(self.stops, self.centers, self.reach, self.widths, strict=True):
             before, after = np.polynomial.Polynomial([1.0, -1.0 / reach]), np.polynomial.Polynomial([0.0, 1.0 / reach])
-            begins += [centre - reach, centre, centre + reach]
+            begins += [center - reach, center, center + reach]
             pieces += [stop - reach * self.share(before), stop + reach * self.share(after)]
             pieces.append(np.polynomial.Polynomial([stop + width, 1.0]))
         height = max(len(piece.coef) for piece in pieces)

@@ -94,14 +94,14 @@ def follow_tool_path(
     >>> links = [jn.Link("base"), jn.Link("upper", rod), jn.Link("lower", rod)]
     >>> joints = [jn.Joint("a", "base", "upper"), jn.Joint("b", "upper", "lower", position=[1, 0, 0])]
     >>> arm = jn.Robot("arm", links, joints)
-    >>> path = jn.ToolPath(["1 + 0.2*sin(t)", "0.2*cos(t)", 0.0], start=0.0, stop=6.0)
-    >>> motion = jn.follow_tool_path(arm, "lower", path, order=3, point=[1, 0, 0], start=[-0.8, 1.7])
+    >>> path = jn.planning.ToolPath(["1 + 0.2*sin(t)", "0.2*cos(t)", 0.0], start=0.0, stop=6.0)
+    >>> motion = jn.planning.follow_tool_path(arm, "lower", path, order=3, point=[1, 0, 0], start=[-0.8, 1.7])
     >>> there = jn.forward_kinematics(arm, motion.q[:1], "lower", [1, 0, 0]).position[0, :, 0]
     >>> abs(there.round(9)).tolist()  # 1 + 0.2 sin(t) at t = 0, to jerk
     [1.0, 0.2, 0.0, 0.2]
     """
     if not isinstance(path, ToolPath):
-        raise RobotError("must be a jn.ToolPath", name="path", value=type(path).__name__)
+        raise RobotError("must be a jn.planning.ToolPath", name="path", value=type(path).__name__)
     tool, n = tool_of(robot, link, point, axis), len(robot.joint_names)
     scale = coordinate_scale(robot, tool)
     ranges = joint_ranges(robot)

@@ -119,7 +119,7 @@ class PathEquations(Module):
     def series(
         self, u: Float[Numbers, "unknown batch"], factor: "PathFactor", target: dict[str, Any], order: int
     ) -> Unknowns:
-        """Return the series of the unknowns, order after order by one factorisation."""
+        """Return the series of the unknowns, order after order by one factorization."""
 
         def level(k: Any, series: Any) -> Any:
             missing = jax.lax.dynamic_index_in_dim(self.residual(series, target), k, 0, keepdims=False)

@@ -59,7 +59,8 @@ class ToolPath(Displayed):
     Examples
     --------
     >>> import jounce as jn
-    >>> path = jn.ToolPath(["0.4 + 0.1*cos(t)", "0.1*sin(t)", 0.3], orientation=[0, 1, 0, 0], start=0.0, stop=6.0)
+    >>> circle = ["0.4 + 0.1*cos(t)", "0.1*sin(t)", 0.3]
+    >>> path = jn.planning.ToolPath(circle, orientation=[0, 1, 0, 0], start=0.0, stop=6.0)
     >>> abs(path.position([0.0], order=2)[0]).round(12).tolist()
     [[0.5, 0.0, 0.3], [0.0, 0.1, 0.0], [0.1, 0.0, 0.0]]
     """
@@ -122,7 +123,7 @@ class ToolPath(Displayed):
         >>> import numpy as np
         >>> import jounce as jn
         >>> t = np.linspace(0.0, 1.0, 41)
-        >>> path = jn.ToolPath.through(t, np.stack([t, t**2, 0 * t], axis=1), [1, 0, 0, 0])
+        >>> path = jn.planning.ToolPath.through(t, np.stack([t, t**2, 0 * t], axis=1), [1, 0, 0, 0])
         >>> path.position([0.5], order=2)[0].round(6).tolist()
         [[0.5, 0.25, 0.0], [1.0, 1.0, 0.0], [0.0, 2.0, 0.0]]
         """

@@ -195,7 +195,7 @@ function fill(id, headings, rows, numbers) {
       const text = typeof cell === "number" || cell === null ? shown(cell) : cell;
       const made = element("td", text.text === undefined ? text : text.text, numbers.includes(k) ? "number" : "");
       if (text.largest) made.classList.add("largest");
-      if (text.colour) { const mark = element("span", undefined, "swatch"); mark.style.background = text.colour; made.prepend(mark); }
+      if (text.color) { const mark = element("span", undefined, "swatch"); mark.style.background = text.color; made.prepend(mark); }
       line.append(made);
     });
     body.append(line);
@@ -212,7 +212,7 @@ fill("peaks", ["output", "derivative", "unit", "minimum", "at t / s", "maximum",
   { text: shown(peak.maximum), largest: peak.largest[1] }, peak.maximum_at]), [3, 4, 5, 6]);
 fill("parameters", ["name", "value, SI"], data.parameters, [1]);
 fill("bodies", ["name", "mass, kg", "starting position, m"], data.bodies.map((body) => [
-  { text: body.name, colour: body.colour }, body.mass, body.position]), [1]);
+  { text: body.name, color: body.color }, body.mass, body.position]), [1]);
 fill("elements", ["name", "kind", "bodies"], data.elements, []);
 function layOut() { sketchHeight(); drawSketch(); for (const panel of panels) panel.draw(); }
 window.addEventListener("resize", layOut);

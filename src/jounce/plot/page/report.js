@@ -61,7 +61,7 @@ function pathSizes(path, order) {
   const values = data.outputs[path.output].values[order];
   return values[0].map((_, k) => values.every((c) => c[k] !== null) ? Math.hypot(...values.map((c) => c[k])) : null);
 }
-function colourOf(share) {
+function colorOf(share) {
   return MAP[Math.min(MAP.length - 1, Math.max(0, Math.round(share * (MAP.length - 1))))];
 }
 let traced = [];
@@ -75,8 +75,8 @@ function choosePaths() {
   if (sizes.length) {
     const output = data.outputs[scene.paths[0].output];
     byId("range").textContent = "0 to " + shown(largest, 4) + " " + output.units[order];
-    const pen = byId("colours").getContext("2d");
-    for (let k = 0; k < 120; k += 1) { pen.fillStyle = colourOf(k / 119); pen.fillRect(k, 0, 1, 10); }
+    const pen = byId("colors").getContext("2d");
+    for (let k = 0; k < 120; k += 1) { pen.fillStyle = colorOf(k / 119); pen.fillRect(k, 0, 1, 10); }
   }
   drawSketch();
 }
@@ -101,7 +101,7 @@ function drawSketch() {
         pen.moveTo(X(a * scene.step), Y(b * scene.step));
         pen.lineTo(X(c * scene.step), Y(d * scene.step));
         pen.lineWidth = (sizes ? 3 : 1.2) * print;
-        pen.strokeStyle = sizes ? colourOf(sizes[k] / largest) : "#888888";
+        pen.strokeStyle = sizes ? colorOf(sizes[k] / largest) : "#888888";
         pen.stroke();
       }
     }
@@ -161,13 +161,13 @@ function drawNames(pen, wide, tall, X, Y, at, scale) {
     taken.push(best.box);
     if (best.line) {
       pen.lineWidth = 0.8;
-      pen.strokeStyle = label.colour;
+      pen.strokeStyle = label.color;
       pen.beginPath(); pen.moveTo(...own); pen.lineTo(best.px, best.py); pen.stroke();
     }
     pen.lineWidth = 3;
     pen.strokeStyle = "rgba(255, 255, 255, 0.85)";
     pen.strokeText(label.text, best.px, best.py);
-    pen.fillStyle = label.colour;
+    pen.fillStyle = label.color;
     pen.fillText(label.text, best.px, best.py);
   });
 }
@@ -222,7 +222,7 @@ byId("names").addEventListener("change", drawSketch);
 const choices = [[-1, "none"], [0, "plain"]];
 if (scene.paths.length) data.outputs[scene.paths[0].output].words.forEach((word, k) => { if (k) choices.push([k, word]); });
 for (const [value, text] of choices) {
-  const option = element("option", value > 0 ? "coloured by " + text : text);
+  const option = element("option", value > 0 ? "colored by " + text : text);
   option.value = value;
   byId("paths").append(option);
 }

@@ -56,7 +56,7 @@ def cam_facts(cam: PlateCam) -> dict[str, Any]:
     Examples
     --------
     >>> import jounce as jn
-    >>> facts = cam_facts(jn.load_cam("examples/cams/intake.yaml"))
+    >>> facts = cam_facts(jn.cams.load_cam("examples/cams/intake.yaml"))
     >>> facts["undercut"], facts["continuous_to"]
     (False, 3)
     """

@@ -1,4 +1,4 @@
-"""What is told of an optimised design: facts, words, and a table before and after."""
+"""What is told of an optimized design: facts, words, and a table before and after."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from typing_extensions import TypedDict
 
-from jounce.design import OptimisedDesign
+from jounce.design import OptimizedDesign
 from jounce.reporting.text.tables import Table
 
 
@@ -26,7 +26,7 @@ class ComparisonFacts(TypedDict):
 
 
 class DesignFacts(TypedDict):
-    """An optimised design."""
+    """An optimized design."""
 
     title: str
     file: str
@@ -44,8 +44,8 @@ class DesignFacts(TypedDict):
     notes: list[str]
 
 
-def design_facts(design: OptimisedDesign, file: str | PathLike[str]) -> DesignFacts:
-    """Return what is known of an optimised design."""
+def design_facts(design: OptimizedDesign, file: str | PathLike[str]) -> DesignFacts:
+    """Return what is known of an optimized design."""
     assembly = design.mechanism.assembly
     rows: Any = [dataclasses.asdict(row) for row in design.comparisons]
     return {
@@ -67,7 +67,7 @@ def design_facts(design: OptimisedDesign, file: str | PathLike[str]) -> DesignFa
 
 
 def design_words(facts: DesignFacts) -> str:
-    """Return what became of an optimisation, in a few lines."""
+    """Return what became of an optimization, in a few lines."""
     lines = [facts["title"] or Path(facts["file"]).name, f"{facts['status']}: {facts['message']}"]
     lines += [f"note: {note}" for note in facts["notes"]]
     if facts["assembly"] is not None:

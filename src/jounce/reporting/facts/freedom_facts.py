@@ -72,7 +72,7 @@ class BranchFacts(TypedDict):
 
 
 class MobilityFacts(TypedDict):
-    """How a mechanism can move with its drivers released: see `jounce.Mobility`."""
+    """How a mechanism can move with its drivers released: see `jounce.kinematics.Mobility`."""
 
     count: int
     instantaneous: int

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from typing_extensions import TypedDict
 
-from jounce.dynamics import Equilibrium, Linearisation, Modes
+from jounce.dynamics import Equilibrium, Linearization, Modes
 from jounce.dynamics.statics.independent_coordinates import COLUMNS
 from jounce.io.files.writing import replacing
 from jounce.reporting.text.summaries import count
@@ -52,7 +52,7 @@ class ModesFacts(TypedDict):
     modes: list[ModeFacts]
 
 
-def modes_facts(small: Linearisation, file: str | PathLike[str], without: list[str]) -> ModesFacts:
+def modes_facts(small: Linearization, file: str | PathLike[str], without: list[str]) -> ModesFacts:
     """Return what is known of a mechanism in its equilibrium and of its modes."""
     rest = small.equilibrium
     assert rest is not None  # the command looks for one

@@ -129,7 +129,7 @@ def _remarks(motion: Motion | Stretches) -> list[str]:
             names.setdefault(remark, []).append(name)
     for name, instants in unbounded_outputs(motion).items():
         where = ", ".join(f"{instant:g} s" for instant in instants[:6]) + (", ..." if len(instants) > 6 else "")
-        remark = f"grows without bound towards t = {where}, its extremes say only how near an instant comes"
+        remark = f"grows without bound toward t = {where}, its extremes say only how near an instant comes"
         names.setdefault(remark, []).append(name)
     remarks = [f"{', '.join(those)}: {remark}" for remark, those in names.items()]
     return [*filter(None, [last_step_words(motion.time)]), *remarks]

@@ -9,7 +9,7 @@ import numpy as np
 from typing_extensions import TypedDict
 
 from jounce.kinematics import Curve, trace
-from jounce.kinematics.curves.transmission import extremes, recognised
+from jounce.kinematics.curves.transmission import extremes, recognized
 from jounce.mechanism import Mechanism
 from jounce.reporting.facts.curve_facts import value_words
 from jounce.reporting.text.summaries import Facts
@@ -60,7 +60,7 @@ def range_facts(mechanism: Mechanism, driver: str | None = None) -> dict[str, An
         return None
     low, high = curve.range
     whole = not math.isfinite(low)
-    linkage = recognised(mechanism, curve.driver)
+    linkage = recognized(mechanism, curve.driver)
     transmission = None
     if linkage is not None:
         (least, least_at), (most, most_at) = extremes(linkage, low, high)

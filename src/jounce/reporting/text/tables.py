@@ -108,7 +108,7 @@ def robot_tables(facts: Facts) -> list[Table]:
     tables = [
         table("Moving joints (rad, m, N m, N)", headings, moving, (4, 5)),
         table("Fixed joints", ("joint", "links"), fixed),
-        table("Links", ("link", "mass/kg", "centre of mass/m", "fixed to"), links, (1,)),
+        table("Links", ("link", "mass/kg", "center of mass/m", "fixed to"), links, (1,)),
         table("Loops closed by", ("closure", "type", "links", "equations", "redundant"), closures, (3, 4)),
     ]
     return [each for each in tables if each.rows]

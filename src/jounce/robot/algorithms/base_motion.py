@@ -41,7 +41,7 @@ class BaseMotion:
     Examples
     --------
     >>> import jounce as jn
-    >>> jn.BaseMotion([0, 0, 0.3], [1, 0, 0, 0], [[0.1, 0, 0, 0, 0, 2.0]]).twist
+    >>> jn.robot.BaseMotion([0, 0, 0.3], [1, 0, 0, 0], [[0.1, 0, 0, 0, 0, 2.0]]).twist
     [[0.1, 0, 0, 0, 0, 2.0]]
     """
 
@@ -59,7 +59,7 @@ def base_arrays(base: BaseMotion, lead: tuple[int, ...], levels: int) -> tuple[A
         If shapes do not fit the samples, or a quaternion has no unit length.
     """
     if not isinstance(base, BaseMotion):
-        raise RobotError("must be a jn.BaseMotion", name="base", value=type(base).__name__)
+        raise RobotError("must be a jn.robot.BaseMotion", name="base", value=type(base).__name__)
     parts = []
     for name, shape in (("position", (3,)), ("quaternion", (4,)), ("twist", (levels, 6))):
         array = floats(f"base.{name}", getattr(base, name))

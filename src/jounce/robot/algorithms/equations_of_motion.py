@@ -30,12 +30,12 @@ ABREAST = 8  # coordinates by which the mass matrix is differentiated side by si
 
 
 def centers_of(tree: Tree, frames: Frames) -> Jet:
-    """Return the centres of mass of the bodies, shape (3, bodies, batch)."""
+    """Return the centers of mass of the bodies, shape (3, bodies, batch)."""
     return frames.point(jnp.swapaxes(jnp.asarray(tree.center), 0, 1)[:, :, None])
 
 
 def times_inertia(tree: Tree, frames: Frames, vector: Jet) -> Jet:
-    """Return the inertia tensors of the bodies about their centres times a vector of each, (3, ..., bodies, batch)."""
+    """Return the inertia tensors of the bodies about their centers times a vector of each, (3, ..., bodies, batch)."""
     between = (1,) * (len(vector.shape) - 3)
     frames = jax.tree.map(lambda c: jnp.reshape(c, (3, *between, *c.shape[1:])), frames)
     tensor = jnp.moveaxis(jnp.asarray(tree.inertia), 0, -1)
@@ -45,7 +45,7 @@ def times_inertia(tree: Tree, frames: Frames, vector: Jet) -> Jet:
 
 
 def partial_velocities(tree: Tree, frames: Frames) -> tuple[Jet, Jet]:
-    """Return the velocities of the centres of mass and the angular velocities that the rate of each joint causes.
+    """Return the velocities of the centers of mass and the angular velocities that the rate of each joint causes.
 
     Both for a rate of one, of shape (3, joints, bodies, batch); zero for bodies that the joint does not move.
     """
@@ -60,7 +60,7 @@ def partial_velocities(tree: Tree, frames: Frames) -> tuple[Jet, Jet]:
 def work(partial: tuple[Jet, Jet], force: Jet, moment: Jet | None = None) -> BodySeries:
     """Return the forces of the joints that do the work of forces on all bodies.
 
-    Forces at the centres of mass, and moments, are of shape (3, bodies, batch), in the axes of the base.
+    Forces at the centers of mass, and moments, are of shape (3, bodies, batch), in the axes of the base.
     """
     done = [dot(p, f.map(lambda c: c[:, None])) for p, f in zip(partial, (force, moment), strict=True) if f is not None]
     return stacked(total(done).map(lambda c: jnp.sum(c, axis=1)))
@@ -260,7 +260,7 @@ def bias_forces(
     >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0, 1 / 12, 1 / 12])
     >>> joints = [jn.Joint("pin", "base", "arm"), jn.Joint("slide", "arm", "rod", "prismatic", axis=[1, 0, 0])]
     >>> robot = jn.Robot("ram", [jn.Link("base"), jn.Link("arm"), jn.Link("rod", rod)], joints)
-    >>> q = [[0.0, 0.5], [3.0, 2.0]]  # the rod's centre is 1 m from the pin
+    >>> q = [[0.0, 0.5], [3.0, 2.0]]  # the rod's center is 1 m from the pin
     >>> jn.bias_forces(robot, q, parts="coriolis").round(12).tolist()  # 2 * 3 * 2
     [12.0, 0.0]
     >>> jn.bias_forces(robot, q, parts="centrifugal").round(12).tolist()  # -3^2

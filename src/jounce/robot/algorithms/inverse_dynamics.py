@@ -79,7 +79,7 @@ def inverse_dynamics(
     drives = flag("drives", drives, error=RobotError)
     arrays, static = _applied(robot, q, wrenches, time, free=base is not None)
     if base is None:
-        return _generalised_forces(robot, arrays[0], arrays[1], (*static, drives))
+        return _generalized_forces(robot, arrays[0], arrays[1], (*static, drives))
     moved = base_arrays(base, q.shape[:-2], q.shape[-2] - 1)
     return _forces_of_free_tree(robot, (*arrays[0], *moved), (arrays[1], base_body(robot)), (*static, drives))
 
@@ -113,7 +113,7 @@ def joint_wrenches(
     >>> import jounce as jn
     >>> rod = jn.Inertia(2.0, center_of_mass=[0.5, 0, 0])
     >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod", axis=[0, -1, 0])
-    >>> jn.joint_wrenches(jn.Robot("pendulum", links, [pin]), [[0.0], [0.0], [0.0]])[0, 0].round(12).tolist()
+    >>> jn.robot.joint_wrenches(jn.Robot("pendulum", links, [pin]), [[0.0], [0.0], [0.0]])[0, 0].round(12).tolist()
     [0.0, 0.0, 19.62, 0.0, -9.81, 0.0]
     """
     check_choice("frame", frame, FRAMES, RobotError)
@@ -165,7 +165,7 @@ def _on_bodies(
 
 
 @Batched
-def _generalised_forces(
+def _generalized_forces(
     tree: Tree, arrays: tuple[Any, ...], frames: tuple[Frame, ...], global_axes: tuple[bool, ...], drives: bool
 ) -> Float[Numbers, "levels coordinate batch"]:
     q = arrays[0]

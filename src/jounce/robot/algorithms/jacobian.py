@@ -156,7 +156,7 @@ def operational_accelerations(
     >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
     >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
     >>> robot = jn.Robot("one", links, [pin])
-    >>> jn.operational_accelerations(robot, [[0.0], [2.0], [0.0]], "rod", [1, 0, 0]).tolist()
+    >>> jn.robot.operational_accelerations(robot, [[0.0], [2.0], [0.0]], "rod", [1, 0, 0]).tolist()
     [[0.0, 2.0, 0.0, 0.0, 0.0, 2.0], [-4.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
     """
     return _operational(robot, (checked_coordinates(robot, q, 1),), frame_at(robot, link, point))

@@ -133,7 +133,8 @@ def joint_motion(
     >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
     >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
     >>> robot = jn.Robot("one", links, [pin])
-    >>> jn.joint_motion(robot, [0.0], [[0.0, 2.0, 0.0], [-4.0, 0.0, 0.0]], "rod", [1, 0, 0], task="position").q.tolist()
+    >>> tip = [[0.0, 2.0, 0.0], [-4.0, 0.0, 0.0]]  # its velocity and acceleration
+    >>> jn.robot.joint_motion(robot, [0.0], tip, "rod", [1, 0, 0], task="position").q.tolist()
     [[0.0], [2.0], [0.0]]
     """
     rows = _rows(task)

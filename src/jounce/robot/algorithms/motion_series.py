@@ -1,4 +1,4 @@
-"""The series of the motion of a tree under forces: order by order, by one factorisation of its articulated inertias."""
+"""The series of the motion of a tree under forces: order by order, by one factorization of its articulated inertias."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple

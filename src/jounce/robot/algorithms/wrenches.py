@@ -86,11 +86,11 @@ def wrench_arrays(
 def check_wrenches(robot: Robot, wrenches: Sequence[Wrench] | Refused, *, free: bool) -> None:
     """Raise RobotError unless these are wrenches on links that move; on the base where it is free."""
     if not isinstance(wrenches, Sequence) or isinstance(wrenches, str):
-        raise RobotError("must be a list of jn.Wrench", name="wrenches", value=type(wrenches).__name__)
+        raise RobotError("must be a list of jn.robot.Wrench", name="wrenches", value=type(wrenches).__name__)
     for k, wrench in enumerate(wrenches):
         where = f"wrenches[{k}]"
         if not isinstance(wrench, Wrench):
-            raise RobotError("must be a jn.Wrench", name=where, value=type(wrench).__name__)
+            raise RobotError("must be a jn.robot.Wrench", name=where, value=type(wrench).__name__)
         check_name("link", wrench.link, robot.frames, RobotError, name=f"{where}.link")
         if robot.frames[wrench.link].body < 0 and not free:
             message = "this link is fixed to the base: nothing moves it"

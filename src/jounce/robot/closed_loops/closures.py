@@ -295,7 +295,7 @@ def closure_wrenches(
     >>> links = [jn.Link("base"), *(jn.Link(name, rod) for name in ("crank", "rod", "rocker"))]
     >>> joints = [jn.Joint("A", "base", "crank"), jn.Joint("B", "crank", "rod", position=[1, 0, 0])]
     >>> joints.append(jn.Joint("D", "base", "rocker", position=[1, 1, 0]))
-    >>> tip = jn.Closure("C", ("rod", "rocker"), points=[[1, 0, 0], [1, 0, 0]])
+    >>> tip = jn.robot.Closure("C", ("rod", "rocker"), points=[[1, 0, 0], [1, 0, 0]])
     >>> four_bar = jn.Robot("four-bar", links, joints, closures=[tip])
     >>> borne, redundant = jn.robot.closure_wrenches(four_bar, {"A": 0.1, "B": 0.4})["C"]
     >>> abs(redundant).tolist()  # forces along the axes of the hinges

@@ -98,7 +98,7 @@ class RobotParts:
         if not all(tree.turning[turns]) or any(tree.turning[slides]) or np.abs(tree.position[turns[1:]]).max() > 1e-12:
             return False
         if any(abs(tree.rotation[k][2, 2]) > 1e-9 for k in turns[1:]):
-            return False  # neighbours not at right angles cannot turn a body every way
+            return False  # neighbors not at right angles cannot turn a body every way
         if count == 3:
             return True
         axes = [np.eye(3)[2], tree.rotation[slides[1]] @ np.eye(3)[2]]

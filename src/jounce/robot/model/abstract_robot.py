@@ -140,7 +140,7 @@ class AbstractRobot(Displayed, abc.ABC):
         --------
         >>> import jounce as jn
         >>> left = jn.Joint("left", "base", "a", "prismatic")
-        >>> follows = {"limits": jn.Limits(velocity=1.0), "mimic": jn.Mimic("left", -2.0)}
+        >>> follows = {"limits": jn.Limits(velocity=1.0), "mimic": jn.robot.Mimic("left", -2.0)}
         >>> right = jn.Joint("right", "base", "b", "prismatic", **follows)
         >>> links = [jn.Link(name, jn.Inertia(1.0)) for name in ("base", "a", "b")]
         >>> gripper = jn.Robot("gripper", links, [left, right])
@@ -220,7 +220,7 @@ class AbstractRobot(Displayed, abc.ABC):
         center_of_mass : array_like of shape (3,), optional
             m, in the frame of the link.
         tensor : array_like of shape (3, 3) or (3,), optional
-            Inertia about the centre of mass, in axes parallel to those of the link, kg m^2; three numbers are its
+            Inertia about the center of mass, in axes parallel to those of the link, kg m^2; three numbers are its
             diagonal.
 
         Raises
@@ -275,7 +275,7 @@ class AbstractRobot(Displayed, abc.ABC):
         """Return the robot on a base that moves freely: three slides along x, y, z, then three turns.
 
         The new base is the link ``world``, or ``world_`` where the robot has a link of that name. The coordinates
-        base_x, base_y, base_z (m) and base_angle_1 to 3 (rad) come first in q. Their generalised forces are those that
+        base_x, base_y, base_z (m) and base_angle_1 to 3 (rad) come first in q. Their generalized forces are those that
         would have to hold the base: for one that is free, they tell how far a motion is from what physics allows. The
         angles have a singular orientation (for ``ZYX`` the second at a right angle): choose a sequence that stays away
         from it.

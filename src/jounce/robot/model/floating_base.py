@@ -25,11 +25,11 @@ def floating_joints(
     Raises
     ------
     RobotError
-        If the sequence is not made of three letters X, Y, Z of which neighbours differ.
+        If the sequence is not made of three letters X, Y, Z of which neighbors differ.
     """
     letters = sequence.upper()
     if len(letters) != 3 or set(letters) - set("XYZ") or letters[0] == letters[1] or letters[1] == letters[2]:
-        message = "must be three letters X, Y, Z of which neighbours differ"
+        message = "must be three letters X, Y, Z of which neighbors differ"
         raise RobotError(message, name="sequence", value=sequence)
     axes = dict(zip("XYZ", np.eye(3), strict=True))
     kinds = [("prismatic", axes[letter], letter.lower()) for letter in "XYZ"]

@@ -153,7 +153,7 @@ class Joint:
     rotation : array_like of shape (3, 3), default identity
         Takes components in the frame of the child link, at coordinate zero, to that of the parent.
     axis : array_like of shape (3,), default z
-        Axis in the frame of the child link; it is normalised.
+        Axis in the frame of the child link; it is normalized.
     limits : Limits, optional
         What the joint may do.
     mimic : Mimic, optional
@@ -317,7 +317,7 @@ class Closure:
     Examples
     --------
     >>> import jounce as jn
-    >>> closure = jn.Closure("tip", ("left", "right"), points=[0.2, 0, 0])
+    >>> closure = jn.robot.Closure("tip", ("left", "right"), points=[0.2, 0, 0])
     """
 
     name: str

@@ -6,7 +6,7 @@ from jounce.robot.model.abstract_robot import AbstractRobot
 
 
 def robot_size(robot: AbstractRobot) -> float:
-    """Return the size of a robot: the longest way from its base to a centre of mass, along the links; 1 m for none."""
+    """Return the size of a robot: the longest way from its base to a center of mass, along the links; 1 m for none."""
     tree = robot.tree
     arms = np.linalg.norm(tree.position, axis=1)
     distances = tree.ancestors[:-1] @ arms + np.linalg.norm(tree.center, axis=1)

@@ -51,7 +51,7 @@ class Tree:
     rotation, position : array of shape (bodies, 3, 3) and (bodies, 3)
         Pose of the body at coordinate zero in the frame of its parent body.
     mass, center, inertia : array of shape (bodies,), (bodies, 3), (bodies, 3, 3)
-        Mass, centre of mass and inertia about it, in the frame of the body.
+        Mass, center of mass and inertia about it, in the frame of the body.
     turning : array of shape (bodies,)
         1 where the joint turns, 0 where it slides.
     coordinate, multiplier, offset : array of shape (bodies,)

@@ -25,7 +25,7 @@ LEAST_INERTIA = 1e-13  # of a joint, of that of the articulated body that it mov
 
 
 class RigidInertia(Module):
-    """Inertia of bodies in the axes of the base: mass, centre of mass from the origin, tensor about the centre."""
+    """Inertia of bodies in the axes of the base: mass, center of mass from the origin, tensor about the center."""
 
     mass: Float[Numbers, "*body 1"]
     center: Float[Numbers, "3 *body batch"]

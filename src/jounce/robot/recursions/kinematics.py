@@ -1,4 +1,4 @@
-"""Kinematics of any order: frames, points, centre of mass. Negrean 2025, equations 39, 44-48 and 55-58."""
+"""Kinematics of any order: frames, points, center of mass. Negrean 2025, equations 39, 44-48 and 55-58."""
 
 import dataclasses
 from typing import Any
@@ -167,7 +167,7 @@ def _center_of_mass(tree: Tree, arrays: tuple[Series], constants: Any) -> Any:
 
 
 def center_of_mass(robot: AbstractRobot, q: ArrayLike) -> Float[Numbers, "*batch derivative 3"]:
-    """Return the centre of mass of the whole robot and its derivatives: Negrean 2025, equations 44-48 and 55.
+    """Return the center of mass of the whole robot and its derivatives: Negrean 2025, equations 44-48 and 55.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def center_of_mass(robot: AbstractRobot, q: ArrayLike) -> Float[Numbers, "*batch
     >>> import jounce as jn
     >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
     >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
-    >>> jn.center_of_mass(jn.Robot("one", links, [pin]), [[0.0], [2.0]]).tolist()
+    >>> jn.robot.center_of_mass(jn.Robot("one", links, [pin]), [[0.0], [2.0]]).tolist()
     [[0.5, 0.0, 0.0], [0.0, 1.0, 0.0]]
     """
     q = checked_coordinates(robot, q)

@@ -105,7 +105,7 @@ def _constant(value: Any) -> Any:
 def recursive_newton_euler(
     tree: Tree, q: Series, wrenches: BodyWrenches | None = None, base: tuple[Any, Any] | None = None
 ) -> tuple[Rates, RatesOfVectors, RatesOfVectors, tuple[Any, Any]]:
-    """Return generalised forces at the joints and the wrenches that they carry.
+    """Return generalized forces at the joints and the wrenches that they carry.
 
     Parameters
     ----------

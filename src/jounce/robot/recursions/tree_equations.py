@@ -81,7 +81,7 @@ class Unknowns(NamedTuple):
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class BaseBody:
-    """Mass, centre of mass and inertia about it of a free base, in its axes."""
+    """Mass, center of mass and inertia about it of a free base, in its axes."""
 
     mass: Any
     center: Any
@@ -338,7 +338,7 @@ def _local(axes: Any, vector: Any) -> Any:
 
 
 def _columns(values: tuple[Any, Any, Any], many: bool) -> tuple[Any, Any, Any]:
-    """Return mass, centre and tensor with components first and a batch of one last."""
+    """Return mass, center and tensor with components first and a batch of one last."""
     mass, center, tensor = map(jnp.asarray, values)
     if many:
         return mass[None, :, None], jnp.moveaxis(center, 0, -1)[..., None], jnp.moveaxis(tensor, 0, -1)[..., None]

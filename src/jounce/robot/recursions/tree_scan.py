@@ -26,7 +26,7 @@ def joint_coordinates(tree: Tree, q: Series) -> BodySeries:
 
 
 def to_coordinates(tree: Tree, forces: BodySeries) -> Series:
-    """Return generalised forces from those at the joints of the bodies."""
+    """Return generalized forces from those at the joints of the bodies."""
     if tree.shape.direct:
         return forces
     shape = (forces.shape[0], tree.shape.coordinates, forces.shape[2])

@@ -1,4 +1,4 @@
-"""The legend of the page: what the arrows and colours mean, and how large everything is now."""
+"""The legend of the page: what the arrows and colors mean, and how large everything is now."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from jounce.plot.labels import rounded_down
 from jounce.reporting.peaks import derivative_name
 from jounce.units.shown_units import derivative_unit
 from jounce.viewer.page.overlay import Overlay
-from jounce.viewer.shapes.appearance import Colour
-from jounce.viewer.shapes.arrows import LOAD_COLOURS, LOAD_WORDS, derivative_colour, path_colours, scale_words
+from jounce.viewer.shapes.appearance import Color
+from jounce.viewer.shapes.arrows import LOAD_COLORS, LOAD_WORDS, derivative_color, path_colors, scale_words
 from jounce.viewer.shapes.recording import Recording
 
 __all__ = ["error_box", "legend", "status_line"]
@@ -20,8 +20,8 @@ __all__ = ["error_box", "legend", "status_line"]
 CELL = "padding:1px 6px 1px 0;white-space:nowrap"
 
 
-def _chip(colour: Colour) -> str:
-    style = f"display:inline-block;width:1.5em;height:0.3em;border-radius:2px;background:rgb{colour}"
+def _chip(color: Color) -> str:
+    style = f"display:inline-block;width:1.5em;height:0.3em;border-radius:2px;background:rgb{color}"
     return f'<span style="{style};vertical-align:middle;margin-right:0.4em"></span>'
 
 
@@ -41,16 +41,16 @@ def legend(shown: Overlay, frame: int) -> str:
         motion = recording.motion(each.point)[frame]
         for order in each.orders:
             size = f"{_number(float(np.linalg.norm(motion[order])))} {_powers(derivative_unit('m', order))}"
-            rows.append((f"{_chip(derivative_colour(order))}{derivative_name(order)}", escape(each.point.name), size))
+            rows.append((f"{_chip(derivative_color(order))}{derivative_name(order)}", escape(each.point.name), size))
     parts = [_table(rows)]
     scales = [
-        f"{_chip(derivative_colour(order))}{_powers(scale_words(scale, order, recording.size))}"
+        f"{_chip(derivative_color(order))}{_powers(scale_words(scale, order, recording.size))}"
         for order, scale in shown.scales.items()
     ]
     if scales:
         parts.append(f'<div style="margin-top:4px;opacity:0.75">arrows: {"; ".join(scales)}</div>')
     if any(each.path for each in shown.options.traced):
-        parts.append(_colour_bar(shown))
+        parts.append(_color_bar(shown))
     parts += _loads(shown, frame)
     body = "".join(parts) or "nothing is marked"
     return f'<div style="font-size:0.8em;line-height:1.45;padding:2px 8px 4px 8px">{body}</div>'
@@ -66,7 +66,7 @@ def _loads(shown: Overlay, frame: int) -> list[str]:
         if load.torque is not None and np.abs(load.torque).max() > 1e-9 * max(shown.largest_torque, 1e-300):
             words.append(f"{_number(float(np.linalg.norm(load.torque[frame])))} N m")
         if words:
-            rows.append((f"{_chip(LOAD_COLOURS[load.kind])}{escape(load.name)}", ", ".join(words)))
+            rows.append((f"{_chip(LOAD_COLORS[load.kind])}{escape(load.name)}", ", ".join(words)))
     if not rows:
         return []
     kinds = ", ".join(words for kind, words in LOAD_WORDS.items() if kind in shown.options.kinds)
@@ -79,14 +79,14 @@ def _loads(shown: Overlay, frame: int) -> list[str]:
     ]
 
 
-def _colour_bar(shown: Overlay) -> str:
-    """Return the scale of the colours of paths."""
-    colours = ", ".join(f"rgb{tuple(colour)}" for colour in path_colours(np.linspace(0.0, 1.0, 9)).tolist())
+def _color_bar(shown: Overlay) -> str:
+    """Return the scale of the colors of paths."""
+    colors = ", ".join(f"rgb{tuple(color)}" for color in path_colors(np.linspace(0.0, 1.0, 9)).tolist())
     low, high = shown.extremes
     order = shown.options.path_order
     return (
         f'<div style="margin-top:6px">path: {derivative_name(order)}</div>'
-        f'<div style="height:8px;border-radius:2px;background:linear-gradient(to right, {colours})"></div>'
+        f'<div style="height:8px;border-radius:2px;background:linear-gradient(to right, {colors})"></div>'
         f'<div style="display:flex;justify-content:space-between"><span>{_number(low)}</span>'
         f"<span>{_number(high)} {_powers(derivative_unit('m', order))}</span></div>"
     )
@@ -115,7 +115,7 @@ def error_box(text: str) -> str:
 
 
 def status_line(recording: Recording, elapsed: float, busy: bool) -> str:
-    """Return what is shown, in grey."""
+    """Return what is shown, in gray."""
     words = f"{len(recording.time)} instants, order {recording.order}"
     if busy:
         words += ", solving ..."

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from jounce.viewer.shapes.arrows import Arrows, TracedPoint, arrows_along, coloured_paths, length_scale, load_scale
+from jounce.viewer.shapes.arrows import Arrows, TracedPoint, arrows_along, colored_paths, length_scale, load_scale
 from jounce.viewer.shapes.recording import Load, Recording
 
 __all__ = ["DisplayOptions", "Overlay"]
@@ -25,7 +25,7 @@ class DisplayOptions:
     lengths : dict of int to float
         By what arrows of a derivative are longer than the automatic length.
     path_order : int, default 1
-        Derivative whose size colours the paths.
+        Derivative whose size colors the paths.
     kinds : frozenset of str
         Of loads that are shown: reaction, driver, applied.
     force_length : float, default 1
@@ -65,10 +65,10 @@ class Overlay:
         By derivative, m.
     scales : dict of int to float
         Length of an arrow by unit of the derivative, m.
-    lines, colours : numpy.ndarray
+    lines, colors : numpy.ndarray
         Of paths.
     extremes : tuple of float
-        Sizes that the ends of the colours stand for.
+        Sizes that the ends of the colors stand for.
     loads : sequence of Load
     forces : dict of str to numpy.ndarray of shape (time, arrows, 2, 3)
         By kind, m.
@@ -83,7 +83,7 @@ class Overlay:
     arrows: Mapping[int, Arrows]
     scales: Mapping[int, float]
     lines: Float[np.ndarray, "lines 2 3"]
-    colours: UInt8[np.ndarray, "lines 2 3"]
+    colors: UInt8[np.ndarray, "lines 2 3"]
     extremes: tuple[float, float]
     loads: Sequence[Load]
     forces: Mapping[str, Arrows]
@@ -114,5 +114,5 @@ class Overlay:
         for kind in options.kinds:
             pairs = [(load.point, load.force) for load in loads if load.kind == kind and load.force is not None]
             forces[kind] = arrows_along(recording, pairs, force_scale)
-        paths = coloured_paths(recording, options.traced, options.path_order)
+        paths = colored_paths(recording, options.traced, options.path_order)
         return cls(recording, options, arrows, scales, *paths, loads, forces, force_scale, largest)

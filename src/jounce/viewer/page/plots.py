@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.plot.labels import axis_range, scale_of
-from jounce.plot.style import COLOURS
+from jounce.plot.style import COLORS
 from jounce.units.shown_units import derivative_unit
 from jounce.viewer.page.legend import legend
 from jounce.viewer.page.page import Observer, Page
@@ -103,7 +103,7 @@ class Chart:
         count, plain = self.values.shape[1], {"show": False}
         labels = [f"{name} {c}" for c in recording.outputs[name].labels[:count]] if count > 1 else [name]
         looks = {"width": 1.6, "points": plain}
-        lines = [{"label": label, "stroke": COLOURS[k % 3], **looks} for k, label in enumerate(labels)]
+        lines = [{"label": label, "stroke": COLORS[k % 3], **looks} for k, label in enumerate(labels)]
         now = {"label": "now", "stroke": CURSOR, "width": 1.2, "dash": (4, 3), "points": plain}
         below = {"label": "time (s)", "labelFont": "11px sans-serif", "labelSize": 15, "size": 28, "ticks": TICKS}
         self.handle = gui.add_uplot(

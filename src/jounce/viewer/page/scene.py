@@ -11,8 +11,8 @@ from trimesh import Trimesh
 
 from jounce.plot.labels import rounded_down
 from jounce.viewer.page.overlay import Overlay
-from jounce.viewer.shapes.appearance import Colour, ColouredMesh, Connector
-from jounce.viewer.shapes.arrows import LOAD_COLOURS, derivative_colour, in_front, long_enough
+from jounce.viewer.shapes.appearance import Color, ColoredMesh, Connector
+from jounce.viewer.shapes.arrows import LOAD_COLORS, derivative_color, in_front, long_enough
 from jounce.viewer.shapes.meshes import arc_arrow, coil, cylinder
 from jounce.viewer.shapes.recording import Recording, Vectors
 
@@ -36,7 +36,7 @@ class ViserScene:
     def __init__(self, server: Any):
         self.server, self.scene = server, server.scene
         self._frames: dict[str, Any] = {}
-        self._meshes: dict[str, list[tuple[Any, ColouredMesh]]] = {}
+        self._meshes: dict[str, list[tuple[Any, ColoredMesh]]] = {}
         self._connectors: list[tuple[Any, Vectors, Vectors]] = []
         self._arrows: dict[str, Any] = {}
         self._arcs: dict[str, Any] = {}
@@ -53,33 +53,33 @@ class ViserScene:
             handle.remove()
         self._connectors = [self._connector(recording, each) for each in recording.appearance.connectors]
 
-    def _set_meshes(self, body: str, meshes: Sequence[ColouredMesh]) -> None:
+    def _set_meshes(self, body: str, meshes: Sequence[ColoredMesh]) -> None:
         known = self._meshes.setdefault(body, [])
         for handle, _ in known[len(meshes) :]:
             handle.remove()
         del known[len(meshes) :]
-        for k, coloured in enumerate(meshes):
-            mesh = coloured.mesh
+        for k, colored in enumerate(meshes):
+            mesh = colored.mesh
             if k < len(known):
                 handle, before = known[k]
-                if before.colour == coloured.colour and np.array_equal(before.mesh.faces, mesh.faces):
+                if before.color == colored.color and np.array_equal(before.mesh.faces, mesh.faces):
                     if not np.array_equal(before.mesh.vertices, mesh.vertices):
                         handle.vertices = mesh.vertices.astype(np.float32)
-                        known[k] = (handle, coloured)
+                        known[k] = (handle, colored)
                     continue
                 handle.remove()
-            opacity = None if coloured.opacity >= 1 else coloured.opacity
-            handle = self._mesh(f"/bodies/{body}/{k}", mesh, coloured.colour, opacity)
-            known[k : k + 1] = [(handle, coloured)]
+            opacity = None if colored.opacity >= 1 else colored.opacity
+            handle = self._mesh(f"/bodies/{body}/{k}", mesh, colored.color, opacity)
+            known[k : k + 1] = [(handle, colored)]
 
-    def _mesh(self, name: str, mesh: Trimesh, colour: Colour, opacity: float | None = None) -> Any:
+    def _mesh(self, name: str, mesh: Trimesh, color: Color, opacity: float | None = None) -> Any:
         vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-        return self.scene.add_mesh_simple(name, vertices, faces, color=colour, opacity=opacity, side="double")
+        return self.scene.add_mesh_simple(name, vertices, faces, color=color, opacity=opacity, side="double")
 
     def _connector(self, recording: Recording, its: Connector) -> tuple[Any, Vectors, Vectors]:
         spring = its.kind == "spring"
         mesh = coil(8, its.radius, 0.16 * its.radius) if spring else cylinder(its.radius, 1.0, center=(0, 0, 0.5))
-        handle = self._mesh(f"/connectors/{its.name}", mesh, its.colour)
+        handle = self._mesh(f"/connectors/{its.name}", mesh, its.color)
         ends = zip(its.bodies, its.points, strict=True)
         start, end = (recording.global_point(body, point) + 0.85 * in_front(recording) for body, point in ends)
         return handle, start, end
@@ -98,15 +98,15 @@ class ViserScene:
             if length > 0:
                 handle.position, handle.wxyz = start[frame], quaternion_to(across)
                 handle.scale = (1.0, 1.0, length)
-        shown = {f"derivative {k}": (arrows, derivative_colour(k)) for k, arrows in overlay.arrows.items()}
-        shown |= {kind: (arrows, LOAD_COLOURS[kind]) for kind, arrows in overlay.forces.items()}
+        shown = {f"derivative {k}": (arrows, derivative_color(k)) for k, arrows in overlay.arrows.items()}
+        shown |= {kind: (arrows, LOAD_COLORS[kind]) for kind, arrows in overlay.forces.items()}
         for name in self._arrows.keys() - shown.keys() - {"paths"}:
             self._arrows.pop(name).remove()
-        for name, (arrows, colour) in shown.items():
-            self._show_arrows(name, arrows[frame], colour)
+        for name, (arrows, color) in shown.items():
+            self._show_arrows(name, arrows[frame], color)
         self._show_torques(overlay, frame)
 
-    def _show_arrows(self, name: str, arrows: Float[np.ndarray, "arrows 2 3"], colour: Colour) -> None:
+    def _show_arrows(self, name: str, arrows: Float[np.ndarray, "arrows 2 3"], color: Color) -> None:
         arrows = long_enough(arrows, self._size)
         if not len(arrows):
             if name in self._arrows:
@@ -115,7 +115,7 @@ class ViserScene:
             self._arrows[name].points = arrows.astype(np.float32)
         else:
             sizes = {key: share * self._size for key, share in ARROW.items()}
-            self._arrows[name] = self.scene.add_arrows(f"/arrows/{name}", arrows, _linear(np.array(colour)), **sizes)
+            self._arrows[name] = self.scene.add_arrows(f"/arrows/{name}", arrows, _linear(np.array(color)), **sizes)
 
     def _show_torques(self, overlay: Overlay, frame: int) -> None:
         """Show torques as arrows around their axes, larger where they are larger."""
@@ -124,7 +124,7 @@ class ViserScene:
             self._arcs.pop(name).remove()
         for name, load in torques.items():
             if name not in self._arcs:
-                self._arcs[name] = self._mesh(f"/torques/{name}", arc_arrow(), LOAD_COLOURS[load.kind])
+                self._arcs[name] = self._mesh(f"/torques/{name}", arc_arrow(), LOAD_COLORS[load.kind])
             handle, torque = self._arcs[name], np.asarray(load.torque)[frame]
             share = float(np.linalg.norm(torque)) / (overlay.largest_torque or 1.0)
             handle.visible = share > 1e-6
@@ -140,7 +140,7 @@ class ViserScene:
         self._arrows.clear()
         if len(overlay.lines):
             self._arrows["paths"] = self.scene.add_line_segments(
-                "/paths", overlay.lines, _linear(overlay.colours), thickness=3.0, thickness_units="screen"
+                "/paths", overlay.lines, _linear(overlay.colors), thickness=3.0, thickness_units="screen"
             )
 
     def set_stage(self, recording: Recording) -> None:
@@ -206,8 +206,8 @@ def quaternion_to(direction: Vector) -> Float[np.ndarray, "4"]:
     return quaternion / np.linalg.norm(quaternion) + 0.0
 
 
-def _linear(colours: Integer[np.ndarray, "*batch 3"]) -> UInt8[np.ndarray, "*batch 3"]:
-    """Return colours as the page wants those of arrows and lines: by intensity of light, not as the eye sees them."""
-    share = colours / 255
+def _linear(colors: Integer[np.ndarray, "*batch 3"]) -> UInt8[np.ndarray, "*batch 3"]:
+    """Return colors as the page wants those of arrows and lines: by intensity of light, not as the eye sees them."""
+    share = colors / 255
     light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return (255 * light).round().astype(np.uint8)

@@ -42,7 +42,7 @@ class ArrowsTab(Observer):
         self.point.on_update(lambda _: self._show_own())
         self._show_own()
         self.list = self.gui.add_folder("Arrows and paths")
-        with self.gui.add_folder("Lengths and colours", expand_by_default=False):
+        with self.gui.add_folder("Lengths and colors", expand_by_default=False):
             self._add_lengths(recording.order)
         self._rebuild(page.options.traced)
 
@@ -54,7 +54,7 @@ class ArrowsTab(Observer):
 
     def _add_lengths(self, max_order: int) -> None:
         names = tuple(derivative_name(k) for k in range(1, max(max_order, 1) + 1))
-        self.path = self.gui.add_dropdown("path colour", names, initial_value=names[0])
+        self.path = self.gui.add_dropdown("path color", names, initial_value=names[0])
         self.path.on_update(lambda _: self._set(path_order=1 + names.index(self.path.value)))
         for order, name in enumerate(names[: min(max_order, SHOWN)], 1):
             hint = "Longer or shorter than the automatic length"

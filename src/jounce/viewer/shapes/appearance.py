@@ -1,4 +1,4 @@
-"""What bodies look like on the page, as data: coloured meshes, connectors between two points, points to choose from."""
+"""What bodies look like on the page, as data: colored meshes, connectors between two points, points to choose from."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from jaxtyping import Float
 from trimesh import Trimesh
 
 __all__ = [
-    "BODY_COLOURS",
+    "BODY_COLORS",
     "DARK",
-    "GREY",
+    "GRAY",
     "Appearance",
     "BodyPoint",
-    "Colour",
-    "ColouredMesh",
+    "Color",
+    "ColoredMesh",
     "Connector",
     "Position",
     "upward",
 ]
 
-Colour = tuple[int, int, int]
+Color = tuple[int, int, int]
 """Red, green and blue, from 0 to 255."""
 
 Position = Sequence[float | int] | Float[np.ndarray, " components"]
 """Two or three components, m."""
 
-DARK, GREY = (70, 74, 82), (150, 155, 163)  # of what belongs to no body
-# the light colours of Tol, told apart by the colour-blind; arrows have the strong ones
-BODY_COLOURS = (
+DARK, GRAY = (70, 74, 82), (150, 155, 163)  # of what belongs to no body
+# the light colors of Tol, told apart by the color-blind; arrows have the strong ones
+BODY_COLORS = (
     (119, 170, 221),
     (238, 136, 102),
     (68, 187, 153),
@@ -43,11 +43,11 @@ BODY_COLOURS = (
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class ColouredMesh:
-    """A surface of triangles in the frame of a body, m, with a colour and an opacity from 0 to 1."""
+class ColoredMesh:
+    """A surface of triangles in the frame of a body, m, with a color and an opacity from 0 to 1."""
 
     mesh: Trimesh
-    colour: Colour
+    color: Color
     opacity: float = 1.0
 
 
@@ -82,7 +82,7 @@ class Connector:
         One on each body, in its frame, m.
     radius : float
         m.
-    colour : tuple of int
+    color : tuple of int
     """
 
     name: str
@@ -90,7 +90,7 @@ class Connector:
     bodies: tuple[str, ...]
     points: tuple[Float[np.ndarray, " components"], ...]
     radius: float
-    colour: Colour
+    color: Color
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ class Appearance:
 
     Parameters
     ----------
-    meshes : mapping of str to sequence of ColouredMesh
+    meshes : mapping of str to sequence of ColoredMesh
         By body, in its frame.
     connectors : sequence of Connector
     points : sequence of BodyPoint
@@ -112,7 +112,7 @@ class Appearance:
         z in front of all planar bodies, m; zero in space.
     """
 
-    meshes: Mapping[str, Sequence[ColouredMesh]]
+    meshes: Mapping[str, Sequence[ColoredMesh]]
     connectors: Sequence[Connector]
     points: Sequence[BodyPoint]
     size: float
@@ -124,7 +124,7 @@ class Appearance:
         corners = {}
         for body, meshes in self.meshes.items():
             if meshes:
-                bounds = np.stack([coloured.mesh.bounds for coloured in meshes])
+                bounds = np.stack([colored.mesh.bounds for colored in meshes])
                 box = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
                 corners[body] = np.stack(np.meshgrid(*np.transpose(box)), axis=-1).reshape(-1, 3)
         return corners

@@ -1,4 +1,4 @@
-"""Arrows and paths as numbers: how long each arrow is, where it starts and ends, and the colours along a path."""
+"""Arrows and paths as numbers: how long each arrow is, where it starts and ends, and the colors along a path."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from jaxtyping import Float, UInt8
 
 from jounce.plot.labels import rounded_down
 from jounce.units.shown_units import derivative_unit
-from jounce.viewer.shapes.appearance import BodyPoint, Colour
+from jounce.viewer.shapes.appearance import BodyPoint, Color
 from jounce.viewer.shapes.recording import Load, Recording, Vectors
 
 __all__ = [
-    "COLOURS",
-    "LOAD_COLOURS",
+    "COLORS",
+    "LOAD_COLORS",
     "LOAD_WORDS",
     "Arrows",
     "TracedPoint",
     "arrows_along",
-    "coloured_paths",
-    "derivative_colour",
+    "colored_paths",
+    "derivative_color",
     "in_front",
     "load_scale",
     "long_enough",
-    "path_colours",
+    "path_colors",
     "scale_words",
 ]
 
 LONGEST, LONGEST_FORCE = 0.3, 0.28  # of the longest arrow, in sizes of what moves
-COLOURS = {1: (0, 114, 178), 2: (213, 94, 0), 3: (0, 158, 115), 4: (170, 51, 119)}  # velocity to jounce
+COLORS = {1: (0, 114, 178), 2: (213, 94, 0), 3: (0, 158, 115), 4: (170, 51, 119)}  # velocity to jounce
 HIGHER = ((102, 102, 0), (80, 40, 160), (120, 60, 0), (0, 90, 90))
-LOAD_COLOURS = {"reaction": (40, 40, 46), "driver": (136, 34, 85), "applied": (60, 110, 40)}
+LOAD_COLORS = {"reaction": (40, 40, 46), "driver": (136, 34, 85), "applied": (60, 110, 40)}
 LOAD_WORDS = {"reaction": "reactions of joints", "driver": "forces of drivers", "applied": "applied forces"}
 SHORTEST = 1e-3  # in sizes: arrows shorter than this have no direction that can be seen
 
@@ -57,9 +57,9 @@ class TracedPoint:
     path: bool = True
 
 
-def derivative_colour(order: int) -> Colour:
-    """Return the colour of the arrows of a derivative."""
-    return COLOURS[order] if order in COLOURS else HIGHER[(order - 5) % len(HIGHER)]
+def derivative_color(order: int) -> Color:
+    """Return the color of the arrows of a derivative."""
+    return COLORS[order] if order in COLORS else HIGHER[(order - 5) % len(HIGHER)]
 
 
 def length_scale(recording: Recording, vectors: Iterable[Vectors], share: float = LONGEST) -> float:
@@ -98,19 +98,19 @@ def long_enough(arrows: Float[np.ndarray, "arrows 2 3"], size: float) -> Float[n
     return arrows[np.isfinite(length) & (length > SHORTEST * size)]
 
 
-def coloured_paths(
+def colored_paths(
     recording: Recording, traced: Iterable[TracedPoint], order: int
 ) -> tuple[Float[np.ndarray, "lines 2 3"], UInt8[np.ndarray, "lines 2 3"], tuple[float, float]]:
-    """Return the paths of points as short lines, coloured by the size of a derivative.
+    """Return the paths of points as short lines, colored by the size of a derivative.
 
     Returns
     -------
     lines : numpy.ndarray of shape (lines, 2, 3)
         m.
-    colours : numpy.ndarray of uint8, shape (lines, 2, 3)
+    colors : numpy.ndarray of uint8, shape (lines, 2, 3)
         From dark to light.
     extremes : tuple of float
-        Sizes that the darkest and the lightest colour stand for.
+        Sizes that the darkest and the lightest color stand for.
     """
     motions = [recording.motion(each.point) for each in traced if each.path and len(recording.time) > 1]
     if not motions:
@@ -120,13 +120,13 @@ def coloured_paths(
     low, high = float(sizes.min()), float(sizes.max())
     low = 0.0 if low <= 1e-9 * high else low
     range_ = high - low if high - low > 1e-9 * high else 1.0
-    colours = path_colours((sizes - low) / range_)
-    lines, ends = (np.stack([x[:, :-1], x[:, 1:]], axis=2).reshape(-1, 2, 3) for x in (points, colours))
+    colors = path_colors((sizes - low) / range_)
+    lines, ends = (np.stack([x[:, :-1], x[:, 1:]], axis=2).reshape(-1, 2, 3) for x in (points, colors))
     return lines, ends, (low, high)
 
 
-def path_colours(share: Float[np.ndarray, "*batch"]) -> UInt8[np.ndarray, "*batch 3"]:
-    """Return the colours of a path where a size has a share, from 0 to 1, of its range."""
+def path_colors(share: Float[np.ndarray, "*batch"]) -> UInt8[np.ndarray, "*batch 3"]:
+    """Return the colors of a path where a size has a share, from 0 to 1, of its range."""
     import matplotlib as mpl
 
     return (mpl.colormaps["viridis"](0.93 * share)[..., :3] * 255).astype(np.uint8)

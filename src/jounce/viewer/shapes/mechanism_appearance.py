@@ -12,12 +12,12 @@ from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve
 from jounce.plot.geometry import Skeleton, skeleton
 from jounce.viewer.shapes.appearance import (
-    BODY_COLOURS,
+    BODY_COLORS,
     DARK,
-    GREY,
+    GRAY,
     Appearance,
     BodyPoint,
-    ColouredMesh,
+    ColoredMesh,
     Connector,
     upward,
 )
@@ -25,8 +25,8 @@ from jounce.viewer.shapes.mechanism_meshes import THICKNESS, planar_meshes, spat
 
 __all__ = ["mechanism_appearance"]
 
-ROD, SPRING, ACTUATOR = ("rod", 0.012, GREY), ("spring", 0.022, (90, 120, 90)), ("actuator", 0.016, (136, 34, 85))
-CONNECTORS = {  # by symbol: kind, radius in sizes of the mechanism, and colour
+ROD, SPRING, ACTUATOR = ("rod", 0.012, GRAY), ("spring", 0.022, (90, 120, 90)), ("actuator", 0.016, (136, 34, 85))
+CONNECTORS = {  # by symbol: kind, radius in sizes of the mechanism, and color
     "rod": ROD,
     "spring": SPRING,
     "distance": ACTUATOR,
@@ -46,12 +46,10 @@ def mechanism_appearance(motion: Motion) -> Appearance:
     """
     mechanism = motion.mechanism
     seen, planar = skeleton(mechanism), mechanism.space == "planar"
-    colours = {body: BODY_COLOURS[k % len(BODY_COLOURS)] for k, body in enumerate(mechanism.rigid_bodies)} | {
-        GROUND: DARK
-    }
-    meshes: dict[str, list[ColouredMesh]] = {body: [] for body in seen.links}
-    for body, mesh, colour in (planar_meshes if planar else spatial_meshes)(motion, seen, colours):
-        meshes[body].append(ColouredMesh(mesh, colour))
+    colors = {body: BODY_COLORS[k % len(BODY_COLORS)] for k, body in enumerate(mechanism.rigid_bodies)} | {GROUND: DARK}
+    meshes: dict[str, list[ColoredMesh]] = {body: [] for body in seen.links}
+    for body, mesh, color in (planar_meshes if planar else spatial_meshes)(motion, seen, colors):
+        meshes[body].append(ColoredMesh(mesh, color))
     return Appearance(
         meshes=meshes,
         connectors=list(_connectors(seen)),
@@ -71,8 +69,8 @@ def _connectors(seen: Skeleton) -> Iterator[Connector]:
     """Give the rods, springs and actuators between two points."""
     for symbol in (*seen.symbols, *seen.drivers, *seen.forces):
         if symbol.kind in CONNECTORS and len(symbol.bodies) == 2:
-            kind, share, colour = CONNECTORS[symbol.kind]
-            yield Connector(symbol.name, kind, symbol.bodies, symbol.points, share * seen.size, colour)
+            kind, share, color = CONNECTORS[symbol.kind]
+            yield Connector(symbol.name, kind, symbol.bodies, symbol.points, share * seen.size, color)
 
 
 def _points(mechanism: Mechanism, seen: Skeleton) -> list[BodyPoint]:
@@ -86,6 +84,6 @@ def _points(mechanism: Mechanism, seen: Skeleton) -> list[BodyPoint]:
     for body, link in seen.links.items():
         for position, names in zip(link.points, link.names, strict=True):
             if body != GROUND and (body, tuple(position.tolist())) not in known:
-                words = ", ".join(names) or "centre of mass"
+                words = ", ".join(names) or "center of mass"
                 points.append(BodyPoint(body, tuple(position.tolist()), f"{body}: {words}"))
     return points

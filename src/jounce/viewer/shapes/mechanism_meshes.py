@@ -14,7 +14,7 @@ from jounce.mechanism.mechanism import GROUND
 from jounce.plot.curve_lines import shown
 from jounce.plot.frames import frames, points_at, within
 from jounce.plot.geometry import Point, Skeleton, Symbol, Wheel
-from jounce.viewer.shapes.appearance import DARK, GREY, Colour
+from jounce.viewer.shapes.appearance import DARK, GRAY, Color
 from jounce.viewer.shapes.meshes import (
     box,
     capsule,
@@ -31,7 +31,7 @@ from jounce.viewer.shapes.meshes import (
 
 __all__ = ["THICKNESS", "planar_meshes", "spatial_meshes"]
 
-Pieces = Iterator[tuple[str, Trimesh, Colour]]  # of which body, in its frame
+Pieces = Iterator[tuple[str, Trimesh, Color]]  # of which body, in its frame
 
 STAND = (104, 110, 120)
 THICKNESS, WIDTH, PIN = 0.02, 0.017, 0.011  # of plates, and radius of pins, in sizes of the mechanism
@@ -39,11 +39,11 @@ BAR = 0.013  # radius of spatial bars
 THREADS = 15  # turns of a screw that are drawn
 
 
-def planar_meshes(motion: Motion, skeleton: Skeleton, colours: Mapping[str, Colour]) -> Pieces:
+def planar_meshes(motion: Motion, skeleton: Skeleton, colors: Mapping[str, Color]) -> Pieces:
     """Give the meshes of planar bodies, each body in a layer of its own."""
     size = skeleton.size
     layer = {body: (k - 1) * THICKNESS * size for k, body in enumerate(skeleton.links)}
-    yield from _plates_and_wheels(skeleton, layer, colours)
+    yield from _plates_and_wheels(skeleton, layer, colors)
     for symbol in skeleton.symbols:
         if symbol.kind in ("revolute", "rod", "slot"):
             yield from _pins(symbol, layer, size)
@@ -57,7 +57,7 @@ def planar_meshes(motion: Motion, skeleton: Skeleton, colours: Mapping[str, Colo
             yield from _planar_slide(motion, symbol, layer, size)
 
 
-def _plates_and_wheels(skeleton: Skeleton, layer: Mapping[str, float], colours: Mapping[str, Colour]) -> Pieces:
+def _plates_and_wheels(skeleton: Skeleton, layer: Mapping[str, float], colors: Mapping[str, Color]) -> Pieces:
     size = skeleton.size
     for body, link in skeleton.links.items():
         low, high = layer[body], layer[body] + 0.8 * THICKNESS * size
@@ -70,23 +70,23 @@ def _plates_and_wheels(skeleton: Skeleton, layer: Mapping[str, float], colours: 
             continue
         wheels = sorted((w for w in skeleton.wheels if w.body == body), key=lambda w: -w.radius)
         for step, its_wheel in enumerate(wheels):
-            yield from _wheel(its_wheel, low, high + 0.2 * step * (high - low), colours[body])
+            yield from _wheel(its_wheel, low, high + 0.2 * step * (high - low), colors[body])
         if len(link.points) > 1:
-            yield body, plate(link.points, WIDTH * size, low, high), colours[body]
+            yield body, plate(link.points, WIDTH * size, low, high), colors[body]
         elif not wheels:
-            yield body, wheel(1.6 * WIDTH * size, low, high, link.points[0]), colours[body]
+            yield body, wheel(1.6 * WIDTH * size, low, high, link.points[0]), colors[body]
 
 
-def _wheel(its: Wheel, low: float, high: float, colour: Colour) -> Pieces:
+def _wheel(its: Wheel, low: float, high: float, color: Color) -> Pieces:
     """Give a wheel with its teeth, and a mark that shows how it turns."""
     radius, (x, y) = its.radius, its.center.tolist()
     module = 0.0 if its.partner is None else min(radius, its.partner) / 9
     if its.internal:
-        yield its.body, wheel(radius, low, high, its.center, module=module, outside=1.16 * radius), colour
+        yield its.body, wheel(radius, low, high, its.center, module=module, outside=1.16 * radius), color
         mark, long = 1.09 * radius, 0.12 * radius
     else:
-        red, green, blue = (int(c + 0.35 * (255 - c)) for c in colour)
-        yield its.body, wheel(radius, low, high, its.center, module=module), colour
+        red, green, blue = (int(c + 0.35 * (255 - c)) for c in color)
+        yield its.body, wheel(radius, low, high, its.center, module=module), color
         yield its.body, wheel(0.62 * radius, low, high + 0.1 * (high - low), its.center), (red, green, blue)
         mark, long = 0.5 * radius, 0.9 * radius
     yield its.body, box([long, 0.1 * radius, 0.2 * (high - low)], [x + mark, y, high]), DARK
@@ -119,7 +119,7 @@ def _planar_slide(motion: Motion, symbol: Symbol, layer: Mapping[str, float], si
     middle, length = _rail(motion, symbol, 0.06 * size)
     thick = THICKNESS * size
     depth = layer[first] - (0.6 if first == GROUND else -0.2) * thick
-    yield first, box([length, 0.022 * size, 0.3 * thick], [*middle, depth], _turned_to(symbol.axis_on(0))), GREY
+    yield first, box([length, 0.022 * size, 0.3 * thick], [*middle, depth], _turned_to(symbol.axis_on(0))), GRAY
     if symbol.kind == "prismatic":
         center = [*symbol.points[1], layer[second] + 0.2 * thick]
         yield second, box([0.085 * size, 0.05 * size, 0.9 * thick], center, _turned_to(symbol.axis_on(1))), DARK
@@ -132,7 +132,7 @@ def _groove(motion: Motion, symbol: Symbol, size: float, level: float = 0.0) -> 
     radius = (0.5 if symbol.kind == "curve" else 0.15) * BAR * size
     for line in shown(symbol.curve, visited, 0.1 * size):
         high = np.full((len(line), 1), level + 0.4 * THICKNESS * size)
-        yield body, tube(np.concatenate([line, high], axis=1)[:, :3] if line.shape[1] == 2 else line, radius), GREY
+        yield body, tube(np.concatenate([line, high], axis=1)[:, :3] if line.shape[1] == 2 else line, radius), GRAY
 
 
 def _turned_to(axis: Point) -> Float[np.ndarray, "3 3"]:
@@ -150,7 +150,7 @@ def _rail(motion: Motion, symbol: Symbol, margin: float) -> tuple[Point, float]:
     return symbol.points[0] + axis * 0.5 * (low + high), high - low + 2 * margin
 
 
-def spatial_meshes(motion: Motion, skeleton: Skeleton, colours: Mapping[str, Colour]) -> Pieces:
+def spatial_meshes(motion: Motion, skeleton: Skeleton, colors: Mapping[str, Color]) -> Pieces:
     """Give the meshes of spatial bodies, with hinges, balls, crosses, slides and screws."""
     radius = BAR * skeleton.size
     for body, link in skeleton.links.items():
@@ -160,9 +160,9 @@ def spatial_meshes(motion: Motion, skeleton: Skeleton, colours: Mapping[str, Col
                     yield body, sphere(1.3 * radius, point), DARK
         elif link.edges:
             bars = [capsule(link.points[i], link.points[j], radius) for i, j in link.edges]
-            yield body, merged(bars), colours[body]
+            yield body, merged(bars), colors[body]
         else:
-            yield body, sphere(1.8 * radius, link.points[0]), colours[body]
+            yield body, sphere(1.8 * radius, link.points[0]), colors[body]
     for symbol in skeleton.symbols:
         if symbol.kind in ("prismatic", "cylindrical", "screw"):
             yield from _spatial_slide(motion, symbol, skeleton.size)
@@ -170,7 +170,7 @@ def spatial_meshes(motion: Motion, skeleton: Skeleton, colours: Mapping[str, Col
             yield from _groove(motion, symbol, skeleton.size)
             yield symbol.bodies[1], sphere(1.3 * radius, symbol.points[1]), DARK
         elif symbol.kind == "gear":
-            yield from _shaft_wheels(symbol, skeleton.size, colours)
+            yield from _shaft_wheels(symbol, skeleton.size, colors)
         else:
             yield from _spatial_joint(symbol, skeleton.size)
 
@@ -180,7 +180,7 @@ def _spatial_joint(symbol: Symbol, size: float) -> Pieces:
     points, kind = symbol.points, symbol.kind
     if kind == "revolute":
         yield first, cylinder(1.75 * radius, 0.085 * size, symbol.axis_on(0), points[0]), DARK
-        yield second, cylinder(0.9 * radius, 0.11 * size, symbol.axis_on(1), points[1]), GREY
+        yield second, cylinder(0.9 * radius, 0.11 * size, symbol.axis_on(1), points[1]), GRAY
     elif kind in ("spherical", "rod"):
         yield second, sphere(1.9 * radius, points[1]), DARK
         if kind == "rod":
@@ -188,18 +188,18 @@ def _spatial_joint(symbol: Symbol, size: float) -> Pieces:
     elif kind == "universal":
         yield first, cylinder(0.75 * radius, 0.1 * size, symbol.axis_on(0), points[0]), DARK
         yield second, cylinder(0.75 * radius, 0.1 * size, symbol.axis_on(1), points[1]), DARK
-        yield second, sphere(1.3 * radius, points[1]), GREY
+        yield second, sphere(1.3 * radius, points[1]), GRAY
     elif kind == "plane":
         yield second, sphere(1.3 * radius, points[1]), DARK
 
 
-def _shaft_wheels(symbol: Symbol, size: float, colours: Mapping[str, Colour]) -> Pieces:
+def _shaft_wheels(symbol: Symbol, size: float, colors: Mapping[str, Color]) -> Pieces:
     """Give the wheels of two shafts, with marks that show how they turn."""
     for slot, (body, radius) in enumerate(zip(symbol.bodies[:2], symbol.radii, strict=False)):
         if radius is None or body == GROUND:
             continue
         axis, center, thick = symbol.axis_on(slot), symbol.points[slot], 1.4 * BAR * size
-        yield body, cylinder(radius, thick, axis, center), colours[body]
+        yield body, cylinder(radius, thick, axis, center), colors[body]
         mark = rotation_to(axis) @ np.array([0.5 * radius, 0.0, 0.0])
         yield body, box([0.9 * radius, 0.1 * radius, 1.1 * thick], center + mark, rotation_to(axis)), DARK
 
@@ -210,13 +210,13 @@ def _spatial_slide(motion: Motion, symbol: Symbol, size: float) -> Pieces:
     middle, length = _rail(motion, symbol, 0.08 * size)
     axis, other, thin = symbol.axis_on(0), symbol.axis_on(1), 0.7 * BAR * size
     if symbol.kind == "prismatic":
-        yield first, box([1.6 * thin, 1.6 * thin, length], middle, rotation_to(axis)), GREY
+        yield first, box([1.6 * thin, 1.6 * thin, length], middle, rotation_to(axis)), GRAY
         yield second, box([0.05 * size, 0.05 * size, 0.09 * size], symbol.points[1], rotation_to(other)), DARK
         return
-    yield first, cylinder(thin, length, axis, middle), GREY
+    yield first, cylinder(thin, length, axis, middle), GRAY
     if symbol.kind == "screw":
         share = np.linspace(0.0, 1.0, THREADS * 16)
         angle = 2 * np.pi * THREADS * share
         helix = np.stack([thin * np.cos(angle), thin * np.sin(angle), (share - 0.5) * length], axis=1)
-        yield first, tube(helix @ rotation_to(axis).T + middle, 0.35 * thin), GREY
+        yield first, tube(helix @ rotation_to(axis).T + middle, 0.35 * thin), GRAY
     yield second, sleeve(0.85 * BAR * size, 1.7 * BAR * size, 0.08 * size, other, symbol.points[1]), DARK

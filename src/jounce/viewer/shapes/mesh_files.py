@@ -39,7 +39,7 @@ class MeshFiles:
         self.path, self.allow = path, tuple(allow)
 
     def read(self, name: str) -> list[tuple[trimesh.Trimesh, Rgba | None]]:
-        """Return the parts of a mesh, by its name in the file, with their colours; none where it cannot be read."""
+        """Return the parts of a mesh, by its name in the file, with their colors; none where it cannot be read."""
         try:
             file = self._file(name)
             if file is None:
@@ -56,7 +56,7 @@ class MeshFiles:
         except Exception:  # noqa: BLE001 - readers of meshes fail in ways of their own; bars are shown instead
             return []
         whole = (part for part in parts if isinstance(part, trimesh.Trimesh) and 0 < len(part.faces) <= LARGEST)
-        return [(part, _colour(part)) for part in whole]
+        return [(part, _color(part)) for part in whole]
 
     def _file(self, name: str) -> str | None:
         """Return the file of a mesh: beside the robot, or in the folder of its package somewhere above."""
@@ -72,7 +72,7 @@ class MeshFiles:
         return next((file for file in files if os.path.lexists(file)), None)
 
 
-def _colour(part: trimesh.Trimesh) -> Rgba | None:
+def _color(part: trimesh.Trimesh) -> Rgba | None:
     try:
         visual: Any = part.visual
         rgba = np.asarray(visual.to_color().main_color if visual.defined else None, float) / 255

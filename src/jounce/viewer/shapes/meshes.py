@@ -66,7 +66,7 @@ def merged(meshes: Sequence[Trimesh]) -> Trimesh:
 
 
 def cylinder(radius: float, length: float, axis: Position = Z, center: Position = ORIGIN) -> Trimesh:
-    """Return a cylinder about an axis, its middle in a centre."""
+    """Return a cylinder about an axis, its middle in a center."""
     return transformed(_unit_cylinder(), center, rotation_to(axis) * (radius, radius, length))
 
 
@@ -76,7 +76,7 @@ def _unit_cylinder() -> Trimesh:
 
 
 def sleeve(inside: float, outside: float, length: float, axis: Position = Z, center: Position = ORIGIN) -> Trimesh:
-    """Return a hollow cylinder about an axis, its middle in a centre."""
+    """Return a hollow cylinder about an axis, its middle in a center."""
     ring = creation.annulus(inside, outside, length, sections=AROUND)
     return transformed(_round_walls(ring), center, rotation_to(axis))
 
@@ -115,7 +115,7 @@ def capsule(start: Position, end: Position, radius: float) -> Trimesh:
 
 
 def box(size: Position, center: Position = ORIGIN, rotation: Rotation | None = None) -> Trimesh:
-    """Return a box of three edges about a centre."""
+    """Return a box of three edges about a center."""
     return _flat_walls(transformed(creation.box(np.asarray(size, float)), center, rotation))
 
 

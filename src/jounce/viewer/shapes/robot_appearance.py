@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from jounce.robot.closed_loops.mechanism_parts import on_body
 from jounce.robot.robot import Robot
-from jounce.viewer.shapes.appearance import BODY_COLOURS, DARK, GREY, Appearance, BodyPoint, ColouredMesh, upward
+from jounce.viewer.shapes.appearance import BODY_COLORS, DARK, GRAY, Appearance, BodyPoint, ColoredMesh, upward
 from jounce.viewer.shapes.meshes import box, capsule, cylinder, merged, rotation_to, sphere, transformed
 from jounce.viewer.shapes.robot_shapes import file_shapes
 from jounce.viewer.shapes.shapes import Shapes
@@ -85,7 +85,7 @@ def _ends(robot: Robot) -> dict[str, list[Vector]]:
     for link, point in touched:
         body, position, rotation = _body_of(robot, link)
         ends[body].append(position + rotation @ point)
-    for link in robot.moving_links:  # the last of a branch ends in its centre of mass
+    for link in robot.moving_links:  # the last of a branch ends in its center of mass
         inertia = robot.links[link].inertia
         if not any(np.linalg.norm(end) > 1e-6 for end in ends[link]) and inertia is not None:
             ends[link].append(2.0 * np.asarray(inertia.center_of_mass))
@@ -95,23 +95,23 @@ def _ends(robot: Robot) -> dict[str, list[Vector]]:
 def _bars(robot: Robot, size: float) -> Shapes:
     """Return bars from each joint to the next, and the joints as cylinders and boxes."""
     thin = 0.016 * size
-    colours = {link: BODY_COLOURS[k % len(BODY_COLOURS)] for k, link in enumerate(robot.moving_links)}
-    colours[robot.base] = DARK
+    colors = {link: BODY_COLORS[k % len(BODY_COLORS)] for k, link in enumerate(robot.moving_links)}
+    colors[robot.base] = DARK
     shapes: Shapes = {}
     for body, ends in _ends(robot).items():
         bars = [capsule(np.zeros(3), end, thin) for end in ends if np.linalg.norm(end) > 1e-3 * size]
-        shapes[body] = [ColouredMesh(merged(bars), colours[body])] if bars else []
+        shapes[body] = [ColoredMesh(merged(bars), colors[body])] if bars else []
         if body == robot.base:
-            shapes[body].append(ColouredMesh(cylinder(0.06 * size, 0.02 * size, upward(robot.gravity)), DARK))
+            shapes[body].append(ColoredMesh(cylinder(0.06 * size, 0.02 * size, upward(robot.gravity)), DARK))
         elif not bars:
-            shapes[body].append(ColouredMesh(sphere(1.4 * thin), colours[body]))
+            shapes[body].append(ColoredMesh(sphere(1.4 * thin), colors[body]))
     for joint in robot.joints.values():
         if joint.moving and joint.turning:
-            shapes[joint.child].append(ColouredMesh(cylinder(1.35 * thin, 4.2 * thin, joint.axis), DARK))
+            shapes[joint.child].append(ColoredMesh(cylinder(1.35 * thin, 4.2 * thin, joint.axis), DARK))
         elif joint.moving:
             block = box([3 * thin, 3 * thin, 5 * thin], rotation=rotation_to(joint.axis))
-            shapes[joint.child].append(ColouredMesh(block, DARK))
-            shapes[joint.child].append(ColouredMesh(cylinder(0.6 * thin, 10 * thin, joint.axis), GREY))
+            shapes[joint.child].append(ColoredMesh(block, DARK))
+            shapes[joint.child].append(ColoredMesh(cylinder(0.6 * thin, 10 * thin, joint.axis), GRAY))
     return shapes
 
 

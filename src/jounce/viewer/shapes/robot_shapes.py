@@ -18,11 +18,11 @@ from jounce.errors import RobotFileError
 from jounce.io.robots.mjcf import names_of_bodies
 from jounce.io.robots.mjcf_files import check_assets, included, quiet_mujoco
 from jounce.io.robots.xml_elements import Element, read_markup
-from jounce.viewer.shapes.appearance import ColouredMesh
+from jounce.viewer.shapes.appearance import ColoredMesh
 from jounce.viewer.shapes.mesh_files import MeshFiles, Rgba
 from jounce.viewer.shapes.meshes import box, cylinder, sphere, transformed
 from jounce.viewer.shapes.sdf_shapes import sdf_shapes
-from jounce.viewer.shapes.shapes import Shapes, coloured, upright_capsule, words_as_numbers
+from jounce.viewer.shapes.shapes import Shapes, colored, upright_capsule, words_as_numbers
 
 __all__ = ["file_shapes"]
 
@@ -60,7 +60,7 @@ def _of_urdf(root: Element, files: MeshFiles) -> Shapes:
     return shapes_of_links
 
 
-def _visual(visual: Element, materials: dict[str, Rgba | None], files: MeshFiles) -> list[ColouredMesh]:
+def _visual(visual: Element, materials: dict[str, Rgba | None], files: MeshFiles) -> list[ColoredMesh]:
     geometry = visual.first("geometry")
     shape = geometry.children[0] if geometry is not None and geometry.children else None
     if shape is None:
@@ -68,14 +68,12 @@ def _visual(visual: Element, materials: dict[str, Rgba | None], files: MeshFiles
     own = visual.first("material")
     rgba = None if own is None else _rgba(own) or materials.get(own.attributes.get("name", ""))
     position, rotation = _origin(visual.first("origin"))
-    return [
-        coloured(transformed(mesh, position, rotation), rgba or colour) for mesh, colour in _urdf_shape(shape, files)
-    ]
+    return [colored(transformed(mesh, position, rotation), rgba or color) for mesh, color in _urdf_shape(shape, files)]
 
 
 def _rgba(material: Element) -> Rgba | None:
-    colour = material.first("color")
-    return None if colour is None else tuple(words_as_numbers(colour.attributes.get("rgba", ""))) or None
+    color = material.first("color")
+    return None if color is None else tuple(words_as_numbers(color.attributes.get("rgba", ""))) or None
 
 
 def _origin(element: Element | None) -> tuple[list[float], Rotation]:
@@ -87,11 +85,11 @@ def _origin(element: Element | None) -> tuple[list[float], Rotation]:
 
 
 def _urdf_shape(shape: Element, files: MeshFiles) -> list[tuple[Trimesh, Rgba | None]]:
-    """Return the meshes of a shape of a URDF, with a colour where a mesh brings its own."""
+    """Return the meshes of a shape of a URDF, with a color where a mesh brings its own."""
     given, kind = shape.attributes, shape.tag
     if kind == "mesh":
         scale = words_as_numbers(given.get("scale", "1 1 1"))
-        return [(mesh.apply_scale(scale), colour) for mesh, colour in files.read(given.get("filename", ""))]
+        return [(mesh.apply_scale(scale), color) for mesh, color in files.read(given.get("filename", ""))]
     if kind == "box":
         return [(box(words_as_numbers(given["size"])), None)]
     if kind == "sphere":
@@ -127,7 +125,7 @@ def _of_mjcf(root: Element, path: Path, allow: Iterable[str | PathLike[str]]) ->
             mujoco.mju_quat2Mat(rotation, model.geom_quat[k])
             material = model.geom_matid[k]
             rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[k]
-            shown = coloured(transformed(mesh, model.geom_pos[k], rotation.reshape(3, 3)), tuple(rgba.tolist()))
+            shown = colored(transformed(mesh, model.geom_pos[k], rotation.reshape(3, 3)), tuple(rgba.tolist()))
             shapes_of_links.setdefault(names[model.geom_bodyid[k]], []).append(shown)
     return shapes_of_links
 

@@ -12,10 +12,10 @@ from jounce.errors import RobotFileError
 from jounce.io.robots.sdf import model_frames
 from jounce.io.robots.sdf_poses import FramePose, Frames, number_of, pose_of, text_of
 from jounce.io.robots.xml_elements import Element
-from jounce.viewer.shapes.appearance import ColouredMesh
+from jounce.viewer.shapes.appearance import ColoredMesh
 from jounce.viewer.shapes.mesh_files import MeshFiles, Rgba
 from jounce.viewer.shapes.meshes import box, cylinder, extruded, sphere, transformed
-from jounce.viewer.shapes.shapes import Shapes, coloured, upright_capsule, words_as_numbers
+from jounce.viewer.shapes.shapes import Shapes, colored, upright_capsule, words_as_numbers
 
 __all__ = ["sdf_shapes"]
 
@@ -40,12 +40,12 @@ def sdf_shapes(root: Element, files: MeshFiles) -> Shapes:
     return shapes_of_links
 
 
-def _visual(visual: Element, link: str, frames: Frames, files: MeshFiles) -> list[ColouredMesh]:
+def _visual(visual: Element, link: str, frames: Frames, files: MeshFiles) -> list[ColoredMesh]:
     geometry = visual.first("geometry")
     if geometry is None or len(geometry.children) != 1:
         return []
     pose, rgba = _pose(visual, link, frames), _rgba(visual)
-    return [coloured(transformed(mesh, *pose), rgba or colour) for mesh, colour in _meshes(geometry.children[0], files)]
+    return [colored(transformed(mesh, *pose), rgba or color) for mesh, color in _meshes(geometry.children[0], files)]
 
 
 def _pose(visual: Element, link: str, frames: Frames) -> FramePose:
@@ -58,7 +58,7 @@ def _pose(visual: Element, link: str, frames: Frames) -> FramePose:
 
 
 def _rgba(visual: Element) -> Rgba | None:
-    """Return the colour in diffuse light, or the ambient one, with the transparency."""
+    """Return the color in diffuse light, or the ambient one, with the transparency."""
     material = visual.first("material")
     given = None if material is None else material.first("diffuse") or material.first("ambient")
     if given is None:
@@ -69,10 +69,10 @@ def _rgba(visual: Element) -> Rgba | None:
 
 
 def _meshes(shape: Element, files: MeshFiles) -> list[tuple[Trimesh, Rgba | None]]:
-    """Return the meshes of a shape, with a colour where a mesh brings its own."""
+    """Return the meshes of a shape, with a color where a mesh brings its own."""
     if shape.tag == "mesh":
         scale = _vector(shape, "scale")
-        return [(mesh.apply_scale(scale), colour) for mesh, colour in files.read(text_of(shape, "uri", "mesh"))]
+        return [(mesh.apply_scale(scale), color) for mesh, color in files.read(text_of(shape, "uri", "mesh"))]
     solid = _SOLIDS.get(shape.tag)
     return [] if solid is None else [(solid(shape), None)]
 

@@ -1,27 +1,27 @@
-"""Solids as the files of robots describe them: with colours of three or four numbers, along z, by link."""
+"""Solids as the files of robots describe them: with colors of three or four numbers, along z, by link."""
 
 from __future__ import annotations
 
 import numpy as np
 from trimesh import Trimesh
 
-from jounce.viewer.shapes.appearance import ColouredMesh
+from jounce.viewer.shapes.appearance import ColoredMesh
 from jounce.viewer.shapes.mesh_files import Rgba
 from jounce.viewer.shapes.meshes import capsule
 
-__all__ = ["Shapes", "coloured", "upright_capsule", "words_as_numbers"]
+__all__ = ["Shapes", "colored", "upright_capsule", "words_as_numbers"]
 
 PLAIN = (190, 195, 202)
-Shapes = dict[str, list[ColouredMesh]]
+Shapes = dict[str, list[ColoredMesh]]
 """By link, in its frame."""
 
 
-def coloured(mesh: Trimesh, rgba: Rgba | None) -> ColouredMesh:
-    """Return a mesh with a colour of red, green, blue and perhaps opacity, from 0 to 1; grey without one."""
+def colored(mesh: Trimesh, rgba: Rgba | None) -> ColoredMesh:
+    """Return a mesh with a color of red, green, blue and perhaps opacity, from 0 to 1; gray without one."""
     if rgba is None or len(rgba) < 3:
-        return ColouredMesh(mesh, PLAIN)
+        return ColoredMesh(mesh, PLAIN)
     red, green, blue = (round(255 * float(np.clip(c, 0, 1))) for c in rgba[:3])
-    return ColouredMesh(mesh, (red, green, blue), float(rgba[3]) if len(rgba) > 3 else 1.0)
+    return ColoredMesh(mesh, (red, green, blue), float(rgba[3]) if len(rgba) > 3 else 1.0)
 
 
 def upright_capsule(radius: float, length: float) -> Trimesh:

@@ -15,7 +15,7 @@ from jounce.kinematics import OscillatingFollower, PlateCam, solve
 from jounce.kinematics.cams.plate_cam import SENSES
 from jounce.mechanism import AngleOutput, Body, Mechanism, PointOutput
 from jounce.mechanism.mechanism import GROUND
-from jounce.viewer.shapes.appearance import BODY_COLOURS, Appearance, ColouredMesh
+from jounce.viewer.shapes.appearance import BODY_COLORS, Appearance, ColoredMesh
 from jounce.viewer.shapes.mechanism_appearance import mechanism_appearance
 from jounce.viewer.shapes.mechanism_meshes import THICKNESS
 from jounce.viewer.shapes.meshes import extruded, plate, wheel
@@ -35,7 +35,7 @@ def cam_mechanism(cam: PlateCam) -> Mechanism:
     --------
     >>> import jounce as jn
     >>> from jounce.viewer.subjects.cams import cam_mechanism
-    >>> motion = jn.solve(cam_mechanism(jn.load_cam("examples/cams/intake.yaml")), [0.0, 3.14159265], order=0)
+    >>> motion = jn.solve(cam_mechanism(jn.cams.load_cam("examples/cams/intake.yaml")), [0.0, 3.14159265], order=0)
     >>> [round(1e3 * float(y), 3) for y in motion.outputs["follower"][:, 0, 1]]  # mm; it has risen by 9
     [25.923, 34.923]
     """
@@ -83,7 +83,7 @@ class CamSubject(MechanismSubject):
         seen = mechanism_appearance(motion)
         meshes = {body: list(parts) for body, parts in seen.meshes.items()}
         for k, (body, mesh) in enumerate(_outlines(self.cam, THICKNESS * seen.size)):
-            meshes[body].append(ColouredMesh(mesh, BODY_COLOURS[min(k, 1)]))
+            meshes[body].append(ColoredMesh(mesh, BODY_COLORS[min(k, 1)]))
         appearance: Appearance = dataclasses.replace(seen, meshes=meshes)
         return recorded(motion, appearance)
 

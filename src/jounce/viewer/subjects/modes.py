@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from jounce.dynamics import equilibrium, linearise
+from jounce.dynamics import equilibrium, linearize
 from jounce.mechanism import Mechanism
 from jounce.mechanism.mechanism import GROUND
 from jounce.robot import Robot
@@ -48,7 +48,7 @@ class ModesSubject:
         robot = isinstance(subject, Robot)
         self.title, self.ground = (subject.name, subject.base) if robot else (subject.title, GROUND)
         self.name = f"Modes: {self.title or 'mechanism'}"
-        count = len(linearise(equilibrium(subject, **settings)).modes)
+        count = len(linearize(equilibrium(subject, **settings)).modes)
         own = () if robot else mechanism_parameters(subject)
         taken = {parameter.name for parameter in own}
         self._keys = _unused(taken, MODE), _unused(taken, AMPLITUDE)
@@ -68,7 +68,7 @@ class ModesSubject:
         mode, amplitude = (values[key] for key in self._keys)
         subject = self.subject.with_parameters(**own) if isinstance(self.subject, Mechanism) else self.subject
         rest = equilibrium(subject, **self.settings)
-        modes = linearise(rest).modes
+        modes = linearize(rest).modes
         number = min(max(round(mode), 1), len(modes))
         motion = modes.motion(number, amplitude, duration=SWING)
         recording = recorded(motion, self.appearance, self.title, self.ground)

@@ -98,7 +98,7 @@ def cumulative(operation: str) -> Rule:
 
 
 def sorting(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
-    """Sort arrays by the first of them, NaN last: neighbours change places until all are in order."""
+    """Sort arrays by the first of them, NaN last: neighbors change places until all are in order."""
     arrays = [np.moveaxis(array, equation.params["dimension"], -1).copy() for array in given]
     size = arrays[0].shape[-1]
     if equation.params["num_keys"] != 1 or size > MOST_SORTED:

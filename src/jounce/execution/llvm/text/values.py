@@ -61,14 +61,14 @@ def literal(value: Value) -> str:
 
 
 def nearest(number: Any, dtype: Any) -> int:
-    """Return the whole number of a type that is nearest to a double towards zero, as XLA converts it."""
+    """Return the whole number of a type that is nearest to a double toward zero, as XLA converts it."""
     limits = np.iinfo(dtype)
     whole = 0 if np.isnan(number) else int(min(max(number, -(2.0**63)), 2.0**63))
     return min(max(whole, limits.min), limits.max)
 
 
 def quotient(a: Any, b: Any) -> Any:
-    """Return a quotient of whole numbers as XLA has it: rounded towards zero, -1 where the divisor is zero."""
+    """Return a quotient of whole numbers as XLA has it: rounded toward zero, -1 where the divisor is zero."""
     if b in (0, -1):
         return -1 if b == 0 else -a  # of the least number, itself
     return abs(int(a)) // abs(int(b)) * (1 if (a < 0) == (b < 0) else -1)

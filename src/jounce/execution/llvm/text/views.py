@@ -170,7 +170,7 @@ def spread(array: Stored, shape: Sequence[int], axes: Sequence[int]) -> Stored:
 
 
 def merged(shape: Sequence[int], strides: Sequence[Sequence[int]]) -> tuple[list[int], list[list[int]]]:
-    """Return axes without those of length one, neighbours as one where the numbers of all arrays go on."""
+    """Return axes without those of length one, neighbors as one where the numbers of all arrays go on."""
     sizes: list[int] = []
     steps: list[list[int]] = [[] for _ in strides]
     for k, size in enumerate(shape):

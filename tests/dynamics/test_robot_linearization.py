@@ -17,7 +17,7 @@ def test_a_tree_has_the_derivatives_of_articulated_bodies():
     data = model.createData()
     torque = pinocchio.rnea(model, data, *q)
     pinocchio.computeABADerivatives(model, data, q[0], q[1], torque)
-    small = jn.linearise(robot, q=q, drives=False)
+    small = jn.linearize(robot, q=q, drives=False)
     assert small.coordinates == robot.joint_names
     # as torques: what small masses make of rounding are large accelerations
     for found, known in ((small.A[n:, :n], data.ddq_dq), (small.A[n:, n:], data.ddq_dv)):
@@ -37,7 +37,7 @@ def test_a_loop_has_the_differences_of_constrained_dynamics():
     def moved(place, rate):
         """The mechanism through a state of its motors, at constant rates."""
         values = zip(motors, place, rate, strict=True)
-        laws = {m: jn.ExpressionMotion("p + v*t", {"p": float(p), "v": float(v)}) for m, p, v in values}
+        laws = {m: jn.laws.ExpressionMotion("p + v*t", {"p": float(p), "v": float(v)}) for m, p, v in values}
         return jn.solve(robot.mechanism(near, drivers=laws), [0.0], order=2)
 
     def acceleration(place, rate):
@@ -52,7 +52,7 @@ def test_a_loop_has_the_differences_of_constrained_dynamics():
         torque[names.index(motor)] = float(jn.driver_force(held, f"{motor}_drive")[0, 0])
     np.testing.assert_allclose(acceleration(place, rate), 0.0, atol=1e-10)
     state = np.array([held.outputs[name][0, :2] for name in robot.joint_names]).T
-    small = jn.linearise(robot, q=state, coordinates=motors)
+    small = jn.linearize(robot, q=state, coordinates=motors)
     for k, change in enumerate(np.eye(2) * step):
         for column, (ahead, behind) in (
             (k, ((place + change, rate), (place - change, rate))),

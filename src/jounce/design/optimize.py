@@ -1,4 +1,4 @@
-"""From a mechanism and a wish to the design that fulfils it best."""
+"""From a mechanism and a wish to the design that fulfills it best."""
 
 import dataclasses
 import math
@@ -10,20 +10,22 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.design.measures import PrescribedPath
-from jounce.design.result import OptimisedDesign
+from jounce.design.result import OptimizedDesign
 from jounce.design.study import Asked, Study
 from jounce.errors import DesignError, JounceError, MechanismError, check_name, whole_number
 from jounce.kinematics import assemblies as all_assemblies
 from jounce.mechanism import Mechanism, build, check_mechanism, time_grid, with_outputs_held
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
+from jounce.moved_names import old_keyword
 from jounce.shapes import ArrayLike, real_numbers, seconds
 
 
 @concrete
-def optimise(
+@old_keyword("minimise", "minimize")
+def optimize(
     mechanism: Mechanism,
-    minimise: str,
+    minimize: str,
     vary: Mapping[str, Any],
     subject_to: Sequence[str] = (),
     *,
@@ -36,7 +38,7 @@ def optimise(
     clearance: float = 1e-2,
     iterations: int = 100,
     progress: Callable[[int, int, float], None] | None = None,
-) -> OptimisedDesign:
+) -> OptimizedDesign:
     """Return the design of a mechanism in which something is least, and conditions hold.
 
     What is asked for are expressions of measures: ``peak(psi, 4)`` is the largest magnitude of jounce of the output
@@ -54,7 +56,7 @@ def optimise(
     ----------
     mechanism : Mechanism
         As for `jounce.solve`; constraints must not be redundant.
-    minimise : str
+    minimize : str
         What is to be least; what is to be largest has a minus before it, as ``"-span(psi)"``.
     vary : dict of str to (low, high)
         Bounds of the parameters that may be changed, SI or text with a unit; ``"12cm:16cm"`` holds both.
@@ -83,7 +85,7 @@ def optimise(
 
     Returns
     -------
-    OptimisedDesign
+    OptimizedDesign
         The best design found, compared with the first one, on a finer grid, too.
 
     Raises
@@ -103,7 +105,7 @@ def optimise(
     --------
     >>> import jounce as jn
     >>> mechanism = jn.load("examples/four_bar.yaml")
-    >>> found = jn.optimise(mechanism, "peak(psi, 2)", {"BC": (0.13, 0.15)}, starts=1, time=[0.0, 0.1, 0.2])
+    >>> found = jn.optimize(mechanism, "peak(psi, 2)", {"BC": (0.13, 0.15)}, starts=1, time=[0.0, 0.1, 0.2])
     >>> found.status, round(found.parameters["BC"], 4)
     ('optimal', 0.15)
     """
@@ -118,7 +120,7 @@ def optimise(
     targets = {name: _curve(name, given) for name, given in (curves or {}).items()}
     if isinstance(subject_to, str):
         raise MechanismError("must be a list of conditions", name="subject_to", value=subject_to)
-    asked = Asked(minimise, tuple(subject_to), bounds, targets, instants)
+    asked = Asked(minimize, tuple(subject_to), bounds, targets, instants)
     best, first_error = None, None
     chosen = _assemblies(mechanism, assemblies)
     for number, variant in chosen:
@@ -188,7 +190,7 @@ def _instants(
                 message = "the instants depend on this parameter, and must be the same in all designs; give time"
                 raise MechanismError(message, name=f"vary.{name}", value=pair)
     if len(instants) < 2:
-        raise MechanismError("an optimisation needs at least two instants", name="time", value=given)
+        raise MechanismError("an optimization needs at least two instants", name="time", value=given)
     return instants
 
 

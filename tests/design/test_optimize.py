@@ -1,4 +1,4 @@
-"""Optimised designs against optima in closed form, and what is told where there is none."""
+"""Optimized designs against optima in closed form, and what is told where there is none."""
 
 import dataclasses
 
@@ -18,7 +18,7 @@ CRANK = jn.Mechanism(
     bodies={"crank": jn.Body([0.0, 0.0], mass=2.0, inertia=0.5, center_of_mass=["r", 0.0])},
     joints={"O": jn.planar.Revolute(("ground", "crank"), ["x", 0], [0, 0])},
     drivers={"theta": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion="t**3 + a*t + b*t**2 + c")},
-    outputs={"angle": jn.AngleOutput("crank"), "tip": jn.PointOutput("crank", ["r", 0.0])},
+    outputs={"angle": jn.outputs.AngleOutput("crank"), "tip": jn.outputs.PointOutput("crank", ["r", 0.0])},
     time=TIME,
 )
 CUBIC = {"a": (-2.0, 2.0), "b": (-2.0, 2.0), "c": (-2.0, 2.0)}
@@ -26,7 +26,7 @@ CUBIC = {"a": (-2.0, 2.0), "b": (-2.0, 2.0), "c": (-2.0, 2.0)}
 
 @pytest.fixture(scope="module")
 def chebyshev():
-    return jn.optimise(CRANK, "peak(angle)", CUBIC, starts=1)
+    return jn.optimize(CRANK, "peak(angle)", CUBIC, starts=1)
 
 
 @pytest.mark.slow
@@ -49,7 +49,7 @@ def test_nothing_is_a_success_that_is_not_solved_at_all_instants(chebyshev):
 
 @pytest.mark.slow
 def test_the_least_mean_square_is_that_of_legendre():
-    found = jn.optimise(CRANK, "rms(angle)", CUBIC, starts=1)
+    found = jn.optimize(CRANK, "rms(angle)", CUBIC, starts=1)
     assert found.success
     assert found.objective == pytest.approx(np.sqrt(4 / 175), abs=1e-12)
     assert found.parameters["a"] == pytest.approx(-0.6, abs=1e-7)
@@ -57,7 +57,7 @@ def test_the_least_mean_square_is_that_of_legendre():
 
 @pytest.mark.slow
 def test_goals_of_time_and_parameters_alone_are_to_the_order_that_they_need():
-    found = jn.optimise(CRANK, "rms(r*exp(t), 1)", {"r": (0.1, 0.5)}, ["mean(r*t**2) >= 0.1"], starts=1)
+    found = jn.optimize(CRANK, "rms(r*exp(t), 1)", {"r": (0.1, 0.5)}, ["mean(r*t**2) >= 0.1"], starts=1)
     assert found.success
     assert found.parameters["r"] == pytest.approx(0.3, abs=1e-9)
     assert found.objective == pytest.approx(0.3 * np.sqrt((np.e**2 - np.e**-2) / 4), rel=1e-9)
@@ -72,7 +72,7 @@ def test_a_condition_is_kept_and_its_multiplier_is_the_slope_of_the_optimum():
     end = powers * 1.0
     matrix = np.block([[2 * gram, end[:, None]], [end[None], np.zeros((1, 1))]])
     *place, multiplier = np.linalg.solve(matrix, [*(-2 * cubic), 3.5 - 3.0])
-    found = jn.optimise(CRANK, "mean(angle**2)", CUBIC, ["at(angle, 1, 1) == 3.5"], starts=1)
+    found = jn.optimize(CRANK, "mean(angle**2)", CUBIC, ["at(angle, 1, 1) == 3.5"], starts=1)
     assert found.success
     assert list(found.parameters.values()) == pytest.approx(place, abs=1e-7)
     assert found.objective == pytest.approx(1 / 7 + 2 * cubic @ place + place @ gram @ place, abs=1e-12)
@@ -82,8 +82,8 @@ def test_a_condition_is_kept_and_its_multiplier_is_the_slope_of_the_optimum():
 
 @pytest.mark.slow
 def test_conditions_that_cannot_be_met_are_told_with_how_far_they_are():
-    with pytest.raises(jn.DesignError, match=r"'at\(angle, 1, 1\) == 12': .*9 .* 12, .*3 ") as error:
-        jn.optimise(CRANK, "mean(angle**2)", CUBIC, ["at(angle, 1, 1) == 12"], starts=1, iterations=4)
+    with pytest.raises(jn.errors.DesignError, match=r"'at\(angle, 1, 1\) == 12': .*9 .* 12, .*3 ") as error:
+        jn.optimize(CRANK, "mean(angle**2)", CUBIC, ["at(angle, 1, 1) == 12"], starts=1, iterations=4)
     assert error.value.design.status == "infeasible"
     assert list(error.value.design.parameters.values())[:2] == pytest.approx([2.0, 2.0], abs=1e-6)
 
@@ -92,7 +92,7 @@ def test_conditions_that_cannot_be_met_are_told_with_how_far_they_are():
 def test_a_crank_through_points_has_their_mean_radius():
     radii = np.array([0.2, 0.3, 0.55])
     points = radii[:, None] * np.stack([np.cos([-0.5, 0.1, 0.4]), np.sin([-0.5, 0.1, 0.4])], axis=1)
-    found = jn.optimise(CRANK, "path_error(tip, ring)", {"r": (0.1, 1.0)}, curves={"ring": points}, starts=1)
+    found = jn.optimize(CRANK, "path_error(tip, ring)", {"r": (0.1, 1.0)}, curves={"ring": points}, starts=1)
     assert found.success
     assert found.parameters["r"] == pytest.approx(radii.mean(), abs=1e-9)
     assert found.objective == pytest.approx(radii.std(), abs=1e-9)
@@ -122,7 +122,7 @@ def test_slopes_are_those_of_differences():
     points = np.array([[0.3, 0.2], [0.5, 0.1], [0.1, -0.3]])
     curves = {"ring": points, "timed": (np.array([-0.7, 0.0, 0.456]), points)}
     bounds = {"a": (-1.0, 1.0), "b": (-1.0, 1.0), "r": (0.1, 0.5), "x": (-0.1, 0.1)}
-    from jounce.design.optimise import _curve
+    from jounce.design.optimize import _curve
 
     targets = {name: _curve(name, given) for name, given in curves.items()}
     goals = Goals(CRANK, "mean(angle)", [f"{text} <= 1" for text in asked], tuple(bounds), targets, TIME)
@@ -151,8 +151,9 @@ LIFT = dataclasses.replace(
         "theta": jn.drivers.CoordinateDriver(
             ("ground", "crank"),
             "angle",
-            motion=jn.SegmentedMotion([
-                jn.Segment("dwell", 0.2), jn.Segment("polynomial_3_4_5", "T", to="lift"), jn.Segment("dwell", 0.3),
+            motion=jn.laws.SegmentedMotion([
+                jn.laws.Segment("dwell", 0.2), jn.laws.Segment("polynomial_3_4_5", "T", to="lift"),
+                jn.laws.Segment("dwell", 0.3),
             ]),
         )
     },
@@ -168,8 +169,10 @@ def test_knots_are_those_that_no_design_moves():
 @pytest.mark.parametrize("count, knots", [(5, [0.2, 0.5, 0.7]), (400, [0.2, 0.7])])
 def test_knots_of_forces_count_unless_they_are_too_many(count, knots):
     t = np.linspace(0.0, 1.0, count)  # of five samples only the middle one is a knot: the others are not-a-knot
-    load = jn.forces.Torque(("ground", "crank"), law=jn.SplineMotion(t, np.sin(9 * t), degree=3))
-    loaded = dataclasses.replace(LIFT, forces={"load": load}, outputs={"torque": jn.DriverTorqueOutput("theta")})
+    load = jn.forces.Torque(("ground", "crank"), law=jn.laws.SplineMotion(t, np.sin(9 * t), degree=3))
+    loaded = dataclasses.replace(
+        LIFT, forces={"load": load}, outputs={"torque": jn.outputs.DriverTorqueOutput("theta")}
+    )
     loaded = dataclasses.replace(
         loaded, bodies={"crank": dataclasses.replace(LIFT.bodies["crank"], mass=1.0, inertia=0.1)}
     )
@@ -180,10 +183,12 @@ def test_knots_of_forces_count_unless_they_are_too_many(count, knots):
 @pytest.mark.parametrize("dwell", [0.2, 0.2123])
 def test_a_peak_at_a_knot_of_the_law_is_that_of_the_handbook(dwell):
     """Jerk of 3-4-5 is 60 at both ends, where it jumps: no series goes on beyond, at a knot of the grid or another."""
-    law = jn.SegmentedMotion([jn.Segment("dwell", dwell), jn.Segment("polynomial_3_4_5", 0.5, to="lift")])
+    law = jn.laws.SegmentedMotion(
+        [jn.laws.Segment("dwell", dwell), jn.laws.Segment("polynomial_3_4_5", 0.5, to="lift")]
+    )
     driver = jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion=law)
     mechanism = dataclasses.replace(LIFT, drivers={"theta": driver})
-    found = jn.optimise(mechanism, "peak(angle, 3)", {"lift": (0.1, 0.3)}, starts=1)
+    found = jn.optimize(mechanism, "peak(angle, 3)", {"lift": (0.1, 0.3)}, starts=1)
     assert found.success, found.message
     assert found.objective == pytest.approx(60 * 0.1 / 0.5**3, rel=1e-10)
 
@@ -193,14 +198,14 @@ def test_points_that_are_met_exactly_are_an_optimum():
     """What is left of the distance is rounding, which no finer grid repeats."""
     angles = np.array([-0.6, 0.0, 0.4])
     points = 0.25 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    found = jn.optimise(CRANK, "path_error(tip, p)", {"r": (0.2, 0.5)}, curves={"p": points}, starts=1)
+    found = jn.optimize(CRANK, "path_error(tip, p)", {"r": (0.2, 0.5)}, curves={"p": points}, starts=1)
     assert found.objective < 1e-9
     assert found.success, found.message
 
 
 @pytest.mark.slow
 def test_designs_that_lock_are_kept_away_from(four_bar):
-    found = jn.optimise(four_bar, "peak(psi, 4)", {"BC": (0.12, 0.6)}, starts=3, samples=16)
+    found = jn.optimize(four_bar, "peak(psi, 4)", {"BC": (0.12, 0.6)}, starts=3, samples=16)
     assert found.success
     assert found.smallest_singular_value > 0.01
     assert "cannot be put together, or lock" in found.notes[0]
@@ -210,14 +215,14 @@ def test_designs_that_lock_are_kept_away_from(four_bar):
     for change in (-1e-4, 1e-4):
         other = jn.solve(four_bar.with_parameters(BC=found.parameters["BC"] + change), np.linspace(0.0, 2.0, 4001))
         assert np.abs(other.outputs["psi"][:, 4]).max() > sampled
-    with pytest.raises(jn.DesignError, match=r"none of 16 designs .*put together"):
-        jn.optimise(four_bar, "peak(psi, 4)", {"BC": (0.5, 0.6)}, starts=2, samples=16)
+    with pytest.raises(jn.errors.DesignError, match=r"none of 16 designs .*put together"):
+        jn.optimize(four_bar, "peak(psi, 4)", {"BC": (0.5, 0.6)}, starts=2, samples=16)
 
 
 @pytest.mark.slow
 def test_the_second_assembly_is_asked_for_where_it_is_the_better_one(four_bar):
     """Both turn about the same fixed pivots: the pin of the rocker is above the ground in one, below in the other."""
-    found = jn.optimise(four_bar, "maximum(C_y)", {"BC": (0.14, 0.145)}, starts=1, assemblies="all")
+    found = jn.optimize(four_bar, "maximum(C_y)", {"BC": (0.14, 0.145)}, starts=1, assemblies="all")
     assert found.success
     assert found.mechanism.assembly in (1, 2)
     assert found.objective < 0

@@ -1,0 +1,19 @@
+"""The catalogue of joints and drivers, and the base class for your own."""
+
+import jounce.robot as _robot
+from jounce.constraints import (
+    AbstractConstraint as AbstractConstraint,
+    Cam as Cam,
+    Scalar as Scalar,
+    Vector as Vector,
+    drivers as drivers,
+    planar as planar,
+    rows as rows,
+    spatial as spatial,
+)
+from jounce.trajectory import (
+    ParametricCurve as ParametricCurve,
+    SampledCurve as SampledCurve,
+)
+
+del _robot  # imported so that no joint of your own takes the type of one of robots
