@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from tests import public_names
 from tests.precision import watched
 
 WITHOUT = ("cli", "execution", "papers", "reporting", "io")  # rooms that offer nothing, or say it function by function
@@ -36,7 +37,7 @@ def doors(value):
 
 def offered():
     """Yield what is public, each with its name: functions of rooms, methods and properties of their classes."""
-    yield from ((name, getattr(jn, name)) for name in jn.__all__)
+    yield from public_names.offered().items()
     for name, module in list(sys.modules.items()):
         package, _, room = name.partition(".")
         if package != "jounce" or room.partition(".")[0] not in ROOMS:

@@ -8,6 +8,7 @@ import pytest
 import jounce as jn
 from jounce.design.result import Comparison
 from jounce.display import Displayed
+from tests import public_names
 from tests.problems.small import four_bar
 
 LONGEST, LONGEST_PAGE = 500, 20_000  # characters
@@ -99,7 +100,7 @@ def test_what_is_shown_is_short_and_no_traceback(name):
 
 
 def test_all_that_a_notebook_shows_is_made_here():
-    kinds = [x for x in (getattr(jn, name) for name in jn.__all__) if isinstance(x, type)]
+    kinds = [value for value in public_names.offered().values() if isinstance(value, type)]
     offered = {kind.__name__ for kind in kinds if issubclass(kind, Displayed)}
     assert offered <= {name.partition(",")[0] for name in MAKERS}
 

@@ -7,12 +7,12 @@ import typing
 
 import pytest
 
-import jounce as jn
+from tests import public_names
 
 
 def functions():
     """Return the functions that `jounce` offers, by name; classes and types are none."""
-    offered = {name: inspect.unwrap(getattr(jn, name)) for name in jn.__all__}
+    offered = {name: inspect.unwrap(value) for name, value in public_names.offered().items()}
     return {name: value for name, value in offered.items() if inspect.isfunction(value)}
 
 

@@ -7,6 +7,7 @@ import sys
 import pytest
 
 CALLS = """
+import functools
 import json
 import numpy as np
 import jounce as jn
@@ -15,17 +16,17 @@ q, law = np.zeros((3, 2)), jn.JointTrajectory({"pin": "t"}, start=0.0, stop=1.0)
 path = jn.planning.ToolPath(["t", 0.0, 0.0], start=0.0, stop=1.0)
 calls = {
     "mass_matrix": (q[0],), "bias_forces": (q,), "inverse_dynamics": (q,), "forward_dynamics": (q[:2], q[:1]),
-    "forward_kinematics": (q, "hand"), "jacobian": (q, "hand"), "center_of_mass": (q,), "joint_wrenches": (q,),
-    "kinetic_energy": (q,), "energy_terms": (q,), "inverse_kinematics": ("hand", [0, 0, 0]),
-    "follow_tool_path": ("hand", path), "check_limits": (law,),
-    "driver_force": ("theta",), "joint_reaction": ("A",), "applied_force": ("spring",), "power_balance": (),
-    "potential_energy": (),
+    "forward_kinematics": (q, "hand"), "jacobian": (q, "hand"), "robot.center_of_mass": (q,), "robot.joint_wrenches": (q,),
+    "energy.kinetic_energy": (q,), "energy.energy_terms": (q,), "inverse_kinematics": ("hand", [0, 0, 0]),
+    "planning.follow_tool_path": ("hand", path), "check_limits": (law,),
+    "driver_force": ("theta",), "joint_reaction": ("A",), "dynamics.applied_force": ("spring",), "energy.power_balance": (),
+    "energy.potential_energy": (),
 }
 told = {}
 for name, arguments in calls.items():
     for other in (jn.load("examples/four_bar.yaml"), "arm.urdf", None):
         try:
-            getattr(jn, name)(other, *arguments)
+            functools.reduce(getattr, name.split("."), jn)(other, *arguments)
         except jn.JounceError as error:
             told.setdefault(name, set()).add(str(error).partition(", got ")[0])
 try:
@@ -34,7 +35,13 @@ except jn.errors.RobotError as error:
     told["parts"] = {str(error)}
 print(json.dumps({name: sorted(words) for name, words in told.items()}))
 """
-OF_MOTIONS = {"driver_force", "joint_reaction", "applied_force", "power_balance", "potential_energy"}
+OF_MOTIONS = {
+    "driver_force",
+    "joint_reaction",
+    "dynamics.applied_force",
+    "energy.power_balance",
+    "energy.potential_energy",
+}
 OF_ROBOTS = "robot", "jn.Robot", "jn.load_robot"
 
 

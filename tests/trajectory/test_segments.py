@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce import Segment, SegmentedMotion
+from jounce.laws import Segment, SegmentedMotion
 
 # peaks of velocity, acceleration and jerk over a way and a time of one, as handbooks of cam design print them
 PEAKS = {
