@@ -16,10 +16,12 @@ q, law = np.zeros((3, 2)), jn.JointTrajectory({"pin": "t"}, start=0.0, stop=1.0)
 path = jn.planning.ToolPath(["t", 0.0, 0.0], start=0.0, stop=1.0)
 calls = {
     "mass_matrix": (q[0],), "bias_forces": (q,), "inverse_dynamics": (q,), "forward_dynamics": (q[:2], q[:1]),
-    "forward_kinematics": (q, "hand"), "jacobian": (q, "hand"), "robot.center_of_mass": (q,), "robot.joint_wrenches": (q,),
+    "forward_kinematics": (q, "hand"), "jacobian": (q, "hand"),
+    "robot.center_of_mass": (q,), "robot.joint_wrenches": (q,),
     "energy.kinetic_energy": (q,), "energy.energy_terms": (q,), "inverse_kinematics": ("hand", [0, 0, 0]),
     "planning.follow_tool_path": ("hand", path), "check_limits": (law,),
-    "driver_force": ("theta",), "joint_reaction": ("A",), "dynamics.applied_force": ("spring",), "energy.power_balance": (),
+    "driver_force": ("theta",), "joint_reaction": ("A",),
+    "dynamics.applied_force": ("spring",), "energy.power_balance": (),
     "energy.potential_energy": (),
 }
 told = {}
