@@ -115,7 +115,10 @@ def test_equations_084_to_106_closed_forms_of_first_order(about):
 def test_equations_089_to_102_of_one_particle():
     rho, mass = np.array([0.3, -0.2, 0.5]), 0.7
     robot = free_body(rho[None], np.array([mass]))
-    terms, motion = jn.energy.energy_terms(robot, state(), about="origin"), jn.forward_kinematics(robot, state(), "body")
+    terms, motion = (
+        jn.energy.energy_terms(robot, state(), about="origin"),
+        jn.forward_kinematics(robot, state(), "body"),
+    )
     for sample in range(SAMPLES):
         R, w, e = motion.rotation[sample, 0], *motion.angular_velocity[sample, :2]
         arm = R @ rho

@@ -108,7 +108,7 @@ def test_equations_050_to_055_slopes_of_points_of_any_order(n, m):
 
 def test_slopes_of_points_are_refused_by_their_orders():
     robot = tree()
-    with pytest.raises(jn.RobotError, match="needs derivatives of q to order 3"):
+    with pytest.raises(jn.errors.RobotError, match="needs derivatives of q to order 3"):
         jn.point_slope(robot, np.zeros((1, 3, 3)), "link_2", n=4)
-    with pytest.raises(jn.RobotError, match=r"m.*must be a whole number, 0 or greater"):
+    with pytest.raises(jn.errors.RobotError, match=r"m.*must be a whole number, 0 or greater"):
         jn.point_slope(robot, np.zeros((2, 3)), "link_2", m=-1)
