@@ -95,10 +95,10 @@ def slope_in_digits(robot, q, link, n, m):
 def test_equations_050_to_055_slopes_of_points_of_any_order(n, m):
     robot, q = tree(), np.random.default_rng(3).uniform(-1, 1, (6, 3))
     right = slope_in_digits(robot, q, "link_2", n, m)
-    found = jn.point_slope(robot, q, "link_2", POINT, n=n, m=m)
+    found = jn.robot.point_slope(robot, q, "link_2", POINT, n=n, m=m)
     np.testing.assert_allclose(found, right, rtol=0, atol=1e-13 * max(1.0, np.abs(right).max()))
     if n == m:  # 50; and 55, the velocity
-        np.testing.assert_array_equal(found, jn.point_slope(robot, q, "link_2", POINT))
+        np.testing.assert_array_equal(found, jn.robot.point_slope(robot, q, "link_2", POINT))
         velocity = jn.forward_kinematics(robot, q, "link_2", POINT).position[1]
         np.testing.assert_allclose(found @ q[1], velocity, rtol=0, atol=1e-14)
     if n > m:  # 52 and 54
@@ -109,6 +109,6 @@ def test_equations_050_to_055_slopes_of_points_of_any_order(n, m):
 def test_slopes_of_points_are_refused_by_their_orders():
     robot = tree()
     with pytest.raises(jn.errors.RobotError, match="needs derivatives of q to order 3"):
-        jn.point_slope(robot, np.zeros((1, 3, 3)), "link_2", n=4)
+        jn.robot.point_slope(robot, np.zeros((1, 3, 3)), "link_2", n=4)
     with pytest.raises(jn.errors.RobotError, match=r"m.*must be a whole number, 0 or greater"):
-        jn.point_slope(robot, np.zeros((2, 3)), "link_2", m=-1)
+        jn.robot.point_slope(robot, np.zeros((2, 3)), "link_2", m=-1)

@@ -108,7 +108,7 @@ def point_slope(
     >>> rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0])
     >>> links, pin = [jn.Link("base"), jn.Link("rod", rod)], jn.Joint("pin", "base", "rod")
     >>> robot = jn.Robot("one", links, [pin])
-    >>> jn.point_slope(robot, [[0.0], [3.0]], "rod", [2, 0, 0], n=3, m=2)[:, 0].tolist()  # 3 (dr/dq)'
+    >>> jn.robot.point_slope(robot, [[0.0], [3.0]], "rod", [2, 0, 0], n=3, m=2)[:, 0].tolist()  # 3 (dr/dq)'
     [-18.0, 0.0, 0.0]
     """
     n, m = whole_number("n", n, error=RobotError), whole_number("m", m, error=RobotError)
