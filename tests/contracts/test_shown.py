@@ -58,7 +58,7 @@ MAKERS = {
     "Modes": lambda: made("Linearization").modes,
     "LimitReport": lambda: jn.check_limits(ROBOT, TRAJECTORY),
     "LimitReport, no limits": lambda: jn.check_limits(FREE, TRAJECTORY),
-    "OptimizedDesign": lambda: jn.OptimizedDesign(
+    "OptimizedDesign": lambda: jn.design.OptimizedDesign(
         four_bar(),
         {"BC": 0.142},
         1.3,

@@ -137,7 +137,7 @@ def energy_slope(
     return _evaluated(system, q, Slope(order, rate, m), rates=rates, power=2 * order + rate - m)
 
 
-def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> Any:
+def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0) -> "Numbers | xarray.DataArray":
     """Return the generalized inertia forces by Lagrange's equations: Negrean 2025, equation 126.
 
     ``Q_i = d/dt (dE_0 / dq') - dE_0 / dq`` with the kinetic energy E_0.
@@ -174,7 +174,9 @@ def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0)
     return _evaluated(system, q, Slope(0, 0, 1, rate=1), Slope(0, 0, 0, factor=Fraction(-1)), rates=rates)
 
 
-def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0, m: int = 1) -> Any:
+def mangeron_nielsen(
+    system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0, m: int = 1
+) -> "Numbers | xarray.DataArray":
     """Return the generalized inertia forces by Mangeron's equations: Negrean 2025, equation 127.
 
     ``Q_i = 1/m (dE_0^(m) / dq^(m) - (m + 1) dE_0 / dq)``; m = 1 are Nielsen's equations.
@@ -209,7 +211,9 @@ def mangeron_nielsen(system: Robot | Motion, q: ArrayLike | None = None, rates: 
     return _evaluated(system, q, *slopes, rates=rates)
 
 
-def gibbs_appell(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0, m: int = 2) -> Any:
+def gibbs_appell(
+    system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0, m: int = 2
+) -> "Numbers | xarray.DataArray":
     """Return the generalized inertia forces by the Gibbs-Appell equations: Negrean 2025, equation 128.
 
     ``Q_i = dE_1^(m-2) / dq^(m)`` with the acceleration energy E_1 of first order.
@@ -249,7 +253,7 @@ def higher_order(
     k: int = 1,
     m: int | None = None,
     coefficients: Callable[[int], float] = catalan,
-) -> Any:
+) -> "Numbers | xarray.DataArray":
     """Return the (k - 1)-th rate of the generalized inertia forces by the higher-order equations.
 
     Negrean 2025, equations 129-134, corrected: ``Q_i^(k-1) = (k-1)! m! / (m+k-1)! d/dq^(m) sum_p C_p
