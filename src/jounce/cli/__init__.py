@@ -25,10 +25,12 @@ from jounce.cli.cams import cam
 from jounce.cli.conversion import convert
 from jounce.cli.curves import trace
 from jounce.cli.designs import optimize
+from jounce.cli.example_files import example
 from jounce.cli.exports import export
 from jounce.cli.feedforward import feedforward
 from jounce.cli.figures import plot, report
 from jounce.cli.inspection import inspect
+from jounce.cli.installation import doctor
 from jounce.cli.mechanisms import run, schema, simulate
 from jounce.cli.options import WritingError
 from jounce.cli.papers import reproduce
@@ -69,10 +71,10 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 
 COMMANDS = (
-    new, inspect, run, trace, simulate, optimize, sweep, tolerance, modes, plot, report, view, servo, cam, check,
-    torques, retime, feedforward, export, convert, reproduce, equations, schema, completion,
+    new, example, inspect, run, trace, simulate, optimize, sweep, tolerance, modes, plot, report, view, servo, cam,
+    check, torques, retime, feedforward, export, convert, reproduce, equations, schema, completion, doctor,
 )  # fmt: skip
-LIGHT = (new, completion)  # they compute nothing
+LIGHT = (new, example, completion)  # they compute nothing
 GARBAGE = 50_000  # new objects before the collector looks: imports and traces leave none, and 700 take 0.2 s of a run
 FIRST = """\
   jounce new four-bar                          # a commented starter file

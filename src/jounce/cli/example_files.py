@@ -1,0 +1,52 @@
+"""The command that copies examples of the package."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+from jounce.cli.options import Overwrite
+from jounce.reporting.terminal import say, say_json, show_columns
+
+
+def example(
+    name: str | None = None, file: Path | None = None, /, *, overwrite: Overwrite = False, json: bool = False
+) -> int:
+    """Copy an example of the package, with the files that it names; without a name, list them.
+
+    Parameters
+    ----------
+    name
+        Of the example, such as four_bar or robots/panda.urdf.
+    file
+        File to write [default: its own name, in this folder].
+    overwrite
+        Replace files that are there.
+    json
+        Print the result as JSON.
+
+    Examples
+    --------
+      jounce example
+      jounce example stewart_platform
+      jounce example robots/panda.urdf arm.urdf
+    """
+    from jounce.io.files.examples import copy_example, example_names
+
+    if name is None:
+        known = example_names()
+        if json:
+            say_json("example", {"examples": [{"name": name, "about": about} for name, about in known.items()]})
+            return 0
+        show_columns(list(known.items()))
+        say("\nCopy one with: jounce example NAME [FILE]")
+        return 0
+    written = [str(path) for path in copy_example(name, file, overwrite=overwrite)]
+    if json:
+        say_json("example", {"name": name, "written": written})
+        return 0
+    for path in written:
+        say(f"Written to {path}")
+    if written[0].endswith((".yaml", ".urdf", ".xml", ".sdf")):
+        say(f"\nTry now:\n  jounce inspect {shlex.quote(written[0])}")
+    return 0

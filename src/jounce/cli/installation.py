@@ -1,0 +1,169 @@
+"""The command that says what an installation has and whether it computes what it should."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import os
+import platform
+import re
+import warnings
+from typing import Any
+
+from jounce.reporting.terminal import say, say_json, show_columns
+
+PACKAGES = ("jax", "jaxlib", "equinox", "numpy", "scipy", "xarray", "llvmlite", "pydantic", "pint", "matplotlib")
+FOR_DEVELOPERS = ("test", "bench", "docs", "all")
+VARIABLES = ("JOUNCE_CACHE_DIR", "JOUNCE_THREADS", "JOUNCE_NATIVE", "JOUNCE_DEBUG", "JAX_PLATFORMS")
+LARGEST_ERROR = 1e-12  # of the peak of each derivative
+
+
+def doctor(*, json: bool = False) -> int:
+    """Say what this installation has, and test that it computes what it should: some seconds.
+
+    Versions, whether machine code is used and why not, the folder of compiled programs, devices, extras, variables of
+    the environment, and a test against closed forms: a point on a crank to its fourth derivative, and the torque of a
+    pendulum with its rates. Exit status 1 if the test fails.
+
+    Parameters
+    ----------
+    json
+        Print the result as JSON.
+
+    Examples
+    --------
+      jounce doctor
+      jounce doctor --json
+    """
+    facts = {**_versions(), **_machine_code(), **_program_folder(), **_devices(), **_extras(), **_environment()}
+    tests = _tests()
+    failed = [name for name, error in tests.items() if not error <= LARGEST_ERROR]
+    if json:
+        say_json("doctor", {"facts": facts, "errors": tests, "passed": not failed})
+        return 1 if failed else 0
+    show_columns(list(facts.items()))
+    say("")
+    show_columns(
+        [
+            (name, f"{'FAILED' if name in failed else 'passed'}: error {error:.1e} of the peak")
+            for name, error in tests.items()
+        ]
+    )
+    return 1 if failed else 0
+
+
+def _versions() -> dict[str, str]:
+    from jounce.version import __version__
+
+    found = {"jounce": __version__, "Python": f"{platform.python_version()} ({platform.platform()})"}
+    for name in PACKAGES:
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def _machine_code() -> dict[str, str]:
+    from jounce.execution.backends import is_wanted
+    from jounce.execution.llvm.self_test import is_usable
+
+    if os.environ.get("JOUNCE_NATIVE") == "0":
+        return {"machine code": "not used: JOUNCE_NATIVE=0; XLA computes"}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        usable = is_usable() and is_wanted()
+    if usable:
+        return {"machine code": "used"}
+    why = str(caught[0].message) if caught else "llvmlite is not installed, or an accelerator computes"
+    return {"machine code": f"not used: {why}"}
+
+
+def _program_folder() -> dict[str, str]:
+    from jounce.errors import OutputError
+    from jounce.execution.program_folder import ENDING, chosen_folder
+    from jounce.private_folder import PrivateFolder
+
+    try:
+        path = chosen_folder()
+        if path is None:
+            return {"compiled programs": "not kept: JOUNCE_CACHE_DIR is empty"}
+        sizes = [size for _, size, _ in PrivateFolder(path).files(ENDING)]
+    except (OutputError, RuntimeError, ValueError) as error:
+        return {"compiled programs": f"not kept: {error}"}
+    return {"compiled programs": f"{len(sizes)} in {path}, {sum(sizes) / 2**20:.1f} MiB"}
+
+
+def _devices() -> dict[str, str]:
+    import jax
+
+    from jounce.execution.threads import thread_count
+
+    devices = ", ".join(str(device) for device in jax.devices())
+    return {"devices": devices, "threads": str(thread_count())}
+
+
+def _extras() -> dict[str, str]:
+    """Return which optional packages are there, by extra."""
+    found: dict[str, str] = {}
+    needed: dict[str, list[str]] = {}
+    for requirement in importlib.metadata.requires("jounce") or ():
+        if match := re.match(r"([\w.-]+)[^;]*;.*extra == ['\"]([\w-]+)['\"]", requirement):
+            needed.setdefault(match[2], []).append(match[1])
+    for extra, packages in needed.items():
+        if extra in FOR_DEVELOPERS:
+            continue
+        missing = [package for package in packages if package != "jounce" and not _is_installed(package)]
+        state = "installed" if not missing else f"missing: {', '.join(missing)}"
+        found[f"extra {extra}"] = state
+    return found
+
+
+def _is_installed(package: str) -> bool:
+    try:
+        importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return False
+    return True
+
+
+def _environment() -> dict[str, str]:
+    return {name: repr(os.environ[name]) for name in VARIABLES if name in os.environ}
+
+
+def _tests() -> dict[str, float]:
+    """Return the largest errors, in parts of the peak of each derivative, of what has a closed form."""
+    import numpy as np
+
+    from jounce.constraints import drivers, planar
+    from jounce.kinematics import solve
+    from jounce.mechanism import Body, Mechanism, PointOutput
+    from jounce.robot import Inertia, inverse_dynamics
+    from jounce.robot.construct import JointAxis, from_screws
+
+    def error(found: Any, right: Any) -> float:
+        return float((np.abs(found - right).max(axis=0) / np.abs(right).max(axis=0)).max())
+
+    time, rate = np.linspace(0.0, 1.0, 201), 3.0
+    crank = Mechanism(
+        space="planar",
+        bodies={"crank": Body([0, 0])},
+        joints={"pin": planar.Revolute(("ground", "crank"), [0, 0], [0, 0])},
+        drivers={"motor": drivers.CoordinateDriver(("ground", "crank"), "angle", f"{rate}*t")},
+        outputs={"tip": PointOutput("crank", [0.1, 0.0])},
+    )
+    order = np.arange(5)
+    right = 0.1 * rate**order * np.cos(rate * time[:, None] + order * np.pi / 2)
+    tip = error(solve(crank, time, order=4).outputs["tip"][..., 0], right)
+
+    pendulum = from_screws([JointAxis([0, 1, 0], inertia=Inertia(2.0, [0.5, 0, 0]))])
+    q = np.stack([np.sin(time), np.cos(time), -np.sin(time), -np.cos(time)], axis=1)[..., None]
+    weight = 2.0 * 9.81 * 0.5  # m g l; the axis of y turns x down
+    torque = np.stack([
+        -0.5 * np.sin(time) - weight * np.cos(np.sin(time)),
+        -0.5 * np.cos(time) + weight * np.sin(np.sin(time)) * np.cos(time),
+    ], axis=1)  # fmt: skip
+    return {
+        "test: point of a crank to jounce": tip,
+        "test: torque of a pendulum and its rate": error(inverse_dynamics(pendulum, q)[..., 0], torque),
+    }

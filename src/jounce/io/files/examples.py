@@ -1,0 +1,114 @@
+"""The example files of the package: in its folder where it was installed, in that of the checkout otherwise."""
+
+from __future__ import annotations
+
+import importlib.resources
+import re
+import shutil
+from os import PathLike
+from pathlib import Path
+
+from jounce.errors import JounceError, OutputError, check_name
+
+_MENTIONED = re.compile(r"[\w./-]+\.(?:csv|py|urdf|xml|sdf|yaml|toml|json)\b")
+_TITLE = re.compile(r"^(?:title\s*[:=]\s*(.*)|\"\"\"(.*))", re.MULTILINE)
+_KINDS = (".yaml", ".py", ".ipynb", ".urdf", ".xml", ".sdf", ".csv")
+
+
+def examples_folder() -> Path:
+    """Return the folder of the examples.
+
+    Raises
+    ------
+    JounceError
+        There is none: the package was copied without it.
+    """
+    installed = Path(str(importlib.resources.files("jounce") / "examples"))
+    checkout = Path(__file__).parents[4] / "examples"
+    for folder in (installed, checkout):
+        if (folder / "four_bar.yaml").is_file():
+            return folder
+    raise JounceError(f"no examples at {installed}: install the package again")
+
+
+def example_names() -> dict[str, str]:
+    """Return what the examples are about, by name: mechanisms and scripts, then robots, trajectories and the like.
+
+    Examples
+    --------
+    >>> example_names()["four_bar"]
+    'Planar four-bar'
+    """
+    folder = examples_folder()
+    files = [path for path in sorted(folder.rglob("*")) if path.suffix in _KINDS and "broken" not in path.parts]
+    files.sort(key=lambda path: len(path.relative_to(folder).parts))
+    return {_name(path, folder): _about(path) for path in files}
+
+
+def copy_example(name: str, path: str | PathLike[str] | None = None, *, overwrite: bool = False) -> list[Path]:
+    """Copy an example, and the files beside it that it names, and return what was written, the example first.
+
+    Parameters
+    ----------
+    name : str
+        One of `example_names`, such as ``four_bar`` or ``robots/panda.urdf``.
+    path
+        The file to write; its own name in the working folder unless given. Files that the example names keep their
+        places relative to it.
+    overwrite : bool, default False
+        Whether files that are there may be replaced.
+
+    Raises
+    ------
+    JounceError
+        There is no such example.
+    OutputError
+        A file is there already, or cannot be written; then nothing is.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as here:
+    ...     [path.name for path in copy_example("four_bar", pathlib.Path(here) / "mine.yaml")]
+    ['mine.yaml']
+    """
+    folder = examples_folder()
+    known = {_name(file, folder): file for file in folder.rglob("*") if file.suffix in _KINDS}
+    short = name.removesuffix(".yaml").removesuffix(".py").replace("-", "_")
+    if name not in known:
+        check_name("example", short, known, JounceError)
+    source = known.get(name) or known[short]
+    target = Path(source.name) if path is None else Path(path)
+    pairs = [(source, target)]
+    if source.suffix in (".yaml", ".py"):
+        for mentioned in dict.fromkeys(_MENTIONED.findall(source.read_text(encoding="utf-8"))):
+            beside = (source.parent / mentioned).resolve()
+            if beside.is_file() and beside != source and beside.is_relative_to(folder):
+                pairs.append((beside, target.parent / mentioned))
+    for _, place in pairs:
+        if place.exists() and not overwrite:
+            raise OutputError("is there already; give another name, or replace it with --overwrite", path=place)
+    for file, place in pairs:
+        try:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(file, place)
+        except OSError as error:
+            raise OutputError(f"cannot be written: {error.strerror or error}", path=place) from None
+    return [place for _, place in pairs]
+
+
+def _name(path: Path, folder: Path) -> str:
+    """Return the name of an example: without its ending where there is one file of that name alone."""
+    relative = path.relative_to(folder).as_posix()
+    return relative.rpartition(".")[0] if path.suffix == ".yaml" or "/" not in relative else relative
+
+
+def _about(path: Path) -> str:
+    """Return the title of a file, or what its first comment says."""
+    if path.suffix not in (".yaml", ".py"):
+        return {".csv": "trajectory", ".ipynb": "notebook"}.get(path.suffix, "robot")
+    text = path.read_text(encoding="utf-8")
+    if match := _TITLE.search(text):
+        return next(part for part in match.groups() if part is not None).strip("\"' ").rstrip(".")
+    first = next((line for line in text.splitlines() if line.startswith("#")), "")
+    return first.lstrip("# ").rstrip(".")
