@@ -25,6 +25,7 @@ __all__ = [
     "MechanismFileError",
     "MobilityError",
     "OutputError",
+    "RecordingWarning",
     "RobotError",
     "RobotFileError",
     "RobotWarning",
@@ -350,6 +351,10 @@ class RobotWarning(_BoundedWarning):
 
 class SampleWarning(_BoundedWarning):
     """Samples do not determine the derivatives asked for to a useful accuracy."""
+
+
+class RecordingWarning(_BoundedWarning):
+    """Of a recording something was not taken as it is: rows were sorted, merged or left out, or stamps shifted."""
 
 
 class UnitWarning(_BoundedWarning):

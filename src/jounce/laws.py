@@ -9,6 +9,7 @@ from jounce.trajectory import (
     FollowingMotion as FollowingMotion,
     FunctionMotion as FunctionMotion,
     HermiteMotion as HermiteMotion,
+    HermiteSplineMotion as HermiteSplineMotion,
     IntegratedMotion as IntegratedMotion,
     MeasuredMotion as MeasuredMotion,
     OutputMotion as OutputMotion,

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from jounce.dynamics.limits.check_limits import check_limits
+from jounce.io import load_trajectory
 from jounce.io.robots.limits import load_limits
 from jounce.io.robots.loader import load_robot
-from jounce.io.robots.trajectories import load_trajectory
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "examples"
 PANDA = EXAMPLES / "robots" / "panda.urdf"
@@ -211,11 +211,11 @@ LINE = "0.1,1\n0.2,2\n0.3,3\n0.4,4\n0.5,5\n0.6,6\n"
 BAD_TRAJECTORIES = {
     "unknown joint": ("csv", samples(lambda t: t, names="pim"), "no moving joint of pendulum has this name, got 'pim'"),
     "unknown joint in a law": ("yaml", HOLD.replace("pin", "pim"), "did you mean 'pin'?"),
-    "unsorted times": ("csv", f"time,pin\n0.3,1\n{LINE}", "motion.csv, line 3, time: times must increase"),
+    "unsorted times": ("csv", f"time,pin\n0.3,1\n{LINE}", "motion.csv, line 5, pin: times must increase"),
     "repeated times": (
         "csv",
-        f"time,pin\n0.1,1\n{LINE}",
-        "times must increase, got 0.1; this one repeats that of line 2",
+        f"time,pin\n0.1,9\n{LINE}",
+        "line 3, pin: times must increase, got 0.1; this one repeats the one before",
     ),
     "NaN": ("csv", f"time,pin\n0,nan\n{LINE}", "motion.csv, line 2, pin: must be a finite number, got 'nan'"),
     "too few samples": ("csv", "time,pin\n0,0\n1,1\n", "a spline of degree 5 needs at least 6 samples, got 2"),

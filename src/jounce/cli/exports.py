@@ -69,7 +69,8 @@ def export(
     names = None if joints is None else [name.strip() for name in joints.split(",")]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", SampleWarning)
-        model, motion = reading.robot(robot), reading.trajectory(trajectory)
+        model = reading.robot(robot)
+        motion = reading.trajectory(trajectory, model)
         spare_inputs(out, overwrite=overwrite)
         with errors_about(trajectory, robot):
             times = export_trajectory(

@@ -123,7 +123,8 @@ def _driven(file: Path, trajectory: Path | None, changes: list[str] | None, read
             raise JounceError(
                 "a robot needs a trajectory: jounce feedforward ROBOT TRAJECTORY --drives FILE", path=file
             )
-        return reading.robot(file), reading.trajectory(trajectory)
+        robot = reading.robot(file)
+        return robot, reading.trajectory(trajectory, robot)
     if trajectory is not None:
         if kind_of(file) == "mechanism":
             raise JounceError("is a mechanism, which its own drivers move; leave the trajectory out", path=file)

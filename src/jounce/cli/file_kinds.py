@@ -42,9 +42,9 @@ def kind_of(path: str | PathLike[str]) -> str | None:
         content = read_file(name)
         if content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and _ROOT.search(content):
             return "robot"
-        if suffix == ".csv" and content.lstrip(b'\xef\xbb\xbf"').startswith(b"time"):
+        if suffix == ".csv" and content.lstrip(b'\xef\xbb\xbf"').startswith((b"time", b"__time", b"%time")):
             return "trajectory"
-        return _kind_of_data(read_source(name).data) if suffix in DATA_FILES else None
+        return _kind_of_data(read_source(name, many=True).data) if suffix in DATA_FILES else None
     except JounceError:
         return None
 
@@ -52,7 +52,10 @@ def kind_of(path: str | PathLike[str]) -> str | None:
 def _kind_of_data(data: Any) -> str | None:
     from jounce.io.robots.drives import KEYS as OF_DRIVES
     from jounce.io.robots.limits import KEYS
+    from jounce.io.trajectories.messages import is_message
 
+    if is_message(data):
+        return "trajectory"
     if not isinstance(data, dict):
         return None
     if "cam" in data and "follower" in data:

@@ -43,6 +43,8 @@ OPTIONS = {
     "chunk",
     "deviation",
     "hand_over",
+    "as_controller",
+    "topic",
 }
 """Arguments that are options of the same name."""
 
@@ -109,12 +111,18 @@ class RobotReading:
         Refuse a robot whose links are as those of no real one.
     allow
         Folder whose files it may name, besides its own; repeatable.
+    as_controller
+        Between points what ros2_control's joint_trajectory_controller does.
+    topic
+        Of a bag, as /joint_states.
     """
 
     payload: list[str] | None = None
     degree: int = 5
     strict: bool = False
     allow: list[Path] | None = None
+    as_controller: bool = False
+    topic: str | None = None
 
     def robot(self, file: Path) -> Robot:
         """Return the robot of a file, with what it holds."""
@@ -125,12 +133,19 @@ class RobotReading:
             robot = load_robot(file, strict=self.strict, allow=allowed(self.allow))
         return with_payloads(robot, self.payload or ())
 
-    def trajectory(self, file: Path) -> JointTrajectory:
-        """Return the trajectory of a file."""
+    def trajectory(self, file: Path, robot: Robot) -> JointTrajectory:
+        """Return the trajectory of a file, whose joints are those of a robot where it names none."""
         from jounce.io import load_trajectory
 
         with expecting(file, "trajectory"):
-            return load_trajectory(file, self.degree, allowed(self.allow))
+            return load_trajectory(
+                file,
+                self.degree,
+                allowed(self.allow),
+                as_controller=self.as_controller,
+                topic=self.topic,
+                robot=robot,
+            )
 
 
 @AMONG_THE_OTHERS

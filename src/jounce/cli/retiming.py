@@ -161,7 +161,7 @@ def _of_robot(
         with expecting(limits, "limits"):
             bounds = load_motion_limits(limits, model)
     with expecting(path, "trajectory"):
-        given = load_path(path, reading.degree, allowed(reading.allow))
+        given = load_path(path, reading.degree, allowed(reading.allow), topic=reading.topic, robot=model)
     spare_inputs(output.out, overwrite=output.overwrite)
     with errors_about(path, file):
         retimed = find(model, given, bounds, **asked)

@@ -84,7 +84,7 @@ def check(
             bounds = load_motion_limits(limits, model)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", SampleWarning)
-        motion = reading.trajectory(trajectory)
+        motion = reading.trajectory(trajectory, model)
         with errors_about(trajectory, robot):
             spare_inputs(out, overwrite=overwrite)
             report = check_motion(model, motion, bounds, hand_over=hand_over)
@@ -145,7 +145,8 @@ def torques(
     if not 0 <= rates <= MOST_RATES:
         raise JounceError(f"must be a whole number from 0 to {MOST_RATES}", name="--rates", value=rates)
     output.check()
-    model, motion = reading.robot(robot), reading.trajectory(trajectory)
+    model = reading.robot(robot)
+    motion = reading.trajectory(trajectory, model)
     spare_inputs(output.out, overwrite=output.overwrite)
     with errors_about(trajectory, robot):
         dataset = trajectory_torques(model, motion, rates, drives=not no_drives)

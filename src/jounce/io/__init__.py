@@ -14,16 +14,16 @@ if TYPE_CHECKING:
     from jounce.io.mechanisms.writer import write_mechanism as write_mechanism
     from jounce.io.result_reading import read as read
     from jounce.io.results import check_writable as check_writable, write as write, write_parts as write_parts
-    from jounce.io.robots.controller_files import export_trajectory as export_trajectory
     from jounce.io.robots.drives import load_drives as load_drives
     from jounce.io.robots.limits import load_limits as load_limits, load_motion_limits as load_motion_limits
     from jounce.io.robots.loader import load_robot as load_robot
-    from jounce.io.robots.paths import load_path as load_path
-    from jounce.io.robots.trajectories import load_trajectory as load_trajectory
+    from jounce.io.trajectories.controller_files import export_trajectory as export_trajectory
+    from jounce.io.trajectories.loader import load_trajectory as load_trajectory
+    from jounce.io.trajectories.paths import load_path as load_path
 
 
 def __getattr__(name: str) -> Any:
-    home = _of_mechanisms(name) or _of_robots(name) or _of_results(name)
+    home = _of_mechanisms(name) or _of_robots(name) or _of_trajectories(name) or _of_results(name)
     if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(home, name)
@@ -52,16 +52,24 @@ def _of_robots(name: str) -> ModuleType | None:
     match name:
         case "load_robot":
             from jounce.io.robots import loader as home
-        case "load_trajectory":
-            from jounce.io.robots import trajectories as home
-        case "load_path":
-            from jounce.io.robots import paths as home
         case "load_limits" | "load_motion_limits":
             from jounce.io.robots import limits as home
         case "load_drives":
             from jounce.io.robots import drives as home
+        case _:
+            return None
+    return home
+
+
+def _of_trajectories(name: str) -> ModuleType | None:
+    """Return the file that a name of trajectories is from."""
+    match name:
+        case "load_trajectory":
+            from jounce.io.trajectories import loader as home
+        case "load_path":
+            from jounce.io.trajectories import paths as home
         case "export_trajectory":
-            from jounce.io.robots import controller_files as home
+            from jounce.io.trajectories import controller_files as home
         case _:
             return None
     return home

@@ -138,8 +138,9 @@ def _spaced(grid: TimeGrid, parameters: Mapping[str, Any]) -> SpacedInstants:
         raise MechanismError("the step must be greater than zero", name="time.step", value=values["step"])
     else:
         steps = (stop - start) / values["step"]
-        whole = np.floor(steps + PART_OF_STEP)
-        count = whole + 1 + (steps > whole + PART_OF_STEP)  # the last step is shorter
+        part = PART_OF_STEP + 2 * np.spacing(max(abs(start), abs(stop))) / values["step"]  # what late instants round to
+        whole = np.floor(steps + part)
+        count = whole + 1 + (steps > whole + part)  # the last step is shorter
     if count > MAX_INSTANTS:
         raise MechanismError(f"a time grid holds at most {MAX_INSTANTS} instants", name="time", value=float(count))
     step = values["step"] if "step" in values else (stop - start) / max(int(count) - 1, 1)

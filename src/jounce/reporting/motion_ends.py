@@ -10,8 +10,9 @@ import numpy as np
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.planning.retiming.sampled_paths import lines_of, samples_of
 from jounce.planning.retiming.straight_lines import polynomials_at
-from jounce.trajectory import HermiteMotion, JointTrajectory, SplineMotion
+from jounce.trajectory import HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
 
+WITH_VELOCITIES = 5  # degree of splines through positions and velocities
 LOOKS = 8  # between two points
 NEGLIGIBLE = 1e-9  # rad or m: less is rounding
 SHOWN = 3  # joints of an end
@@ -86,6 +87,9 @@ def _words(law: object) -> str | None:
     if isinstance(law, HermiteMotion):
         levels = {1: "positions alone: straight lines between {}", 3: "positions and velocities: cubics between {}"}
         return levels[law.degree].format(f"{len(law.breakpoints)} points") if law.degree in levels else None
+    if isinstance(law, HermiteSplineMotion):
+        given = "positions and velocities" if law.degree == WITH_VELOCITIES else "positions, velocities, accelerations"
+        return f"{given}: splines of degree {law.degree} through {len(law.samples.value[0])} samples"
     if isinstance(law, SplineMotion) and samples_of(law) is not None:
         return f"positions alone: splines of degree {law.degree} through {len(law.samples.value[0])} samples"
     return None

@@ -7,6 +7,7 @@ from jounce.trajectory.composed import (
 )
 from jounce.trajectory.curves import ParametricCurve as ParametricCurve, SampledCurve as SampledCurve
 from jounce.trajectory.hermite import HermiteMotion as HermiteMotion
+from jounce.trajectory.hermite_spline import HermiteSplineMotion as HermiteSplineMotion
 from jounce.trajectory.integrated import IntegratedMotion as IntegratedMotion
 from jounce.trajectory.joint_trajectory import JointTrajectory as JointTrajectory
 from jounce.trajectory.measured import MeasuredMotion as MeasuredMotion

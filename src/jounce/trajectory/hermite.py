@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from jounce.errors import TrajectoryError, check_choice
 from jounce.shapes import ArrayLike, seconds
@@ -30,6 +30,10 @@ class HermiteMotion(SplineMotion):
         The law and its time derivatives, lowest first: m or rad by s to the power of the order.
     beyond : {"refuse", "hold", "continue"}, default "refuse"
         What the law is before the first and after the last instant, as for `SplineMotion`.
+    incomplete : bool, default False
+        Whether a derivative may be NaN where it is not known, and then those above it, too. Each piece takes what both
+        of its ends know, as joint_trajectory_controller of ros2_control does: it is linear between positions alone, a
+        cubic where velocities are known, and a quintic where accelerations are.
 
     Raises
     ------
@@ -44,18 +48,25 @@ class HermiteMotion(SplineMotion):
     [0.5, 1.875, -0.0]
     """
 
-    def __init__(self, times: ArrayLike, derivatives: ArrayLike, beyond: str = "refuse"):
+    def __init__(self, times: ArrayLike, derivatives: ArrayLike, beyond: str = "refuse", *, incomplete: bool = False):
         check_choice("beyond", beyond, BEYOND, TrajectoryError)
         instants = finite_row("times", times, seconds)
         shape = np.shape(derivatives)
         columns = shape[1] if len(shape) == 2 and shape[1] else 1
-        table = finite_numbers("derivatives", derivatives, (len(instants), columns))
+        table = np.array(derivatives, float) if incomplete else derivatives
+        known = ~np.isnan(table) if incomplete else np.ones(shape, bool)
+        if (known[:, 1:] & ~known[:, :-1]).any() or not known[:, :1].all():
+            message = "a derivative is known only where those below it are"
+            raise TrajectoryError(message, name="derivatives", value=table[~known.all(axis=1)][0].tolist())
+        filled = np.where(known, table, 0.0) if incomplete else table
+        table = finite_numbers("derivatives", filled, (len(instants), columns))
         steps = np.diff(instants)
         twice = steps == 0
         if (steps < 0).any() or (twice[1:] & twice[:-1]).any() or twice[:1].any() or twice[-1:].any():
             raise TrajectoryError("must increase", name="times", value=instants.tolist()[:5])
         begins = np.append(~twice, True)  # of an instant that is given twice the second row begins a piece
-        self._set(instants[begins], _pieces(instants, table)[:, begins], instants[-1], beyond)
+        pieces = _pieces(instants, table) if known.all() else _mixed_pieces(instants, table, known)
+        self._set(instants[begins], pieces[:, begins], instants[-1], beyond)
 
     def jumps(self, order: int = 4) -> Jumps:
         """Return the instants, and by how much derivatives to an order jump there, as for `SegmentedMotion`."""
@@ -78,6 +89,25 @@ def _pieces(
     powers = np.concatenate([scaled, upper]) / steps ** np.arange(levels + met)[:, None]
     powers[:levels] = taylor[:, :-1]
     return np.column_stack([powers, np.concatenate([taylor[:, -1], np.zeros(met)])])
+
+
+def _mixed_pieces(
+    times: Float[np.ndarray, " instants"],
+    derivatives: Float[np.ndarray, "instants levels"],
+    known: Bool[np.ndarray, "instants levels"],
+) -> Float[np.ndarray, "powers instants"]:
+    """Return the powers of pieces between instants of which some have fewer derivatives than others."""
+    levels = np.minimum(known[:-1].sum(axis=1), known[1:].sum(axis=1))
+    highest = int(levels.max())
+    result = np.zeros((highest + min(highest, MET), len(times)))
+    for count in np.unique(levels).tolist():
+        (first,) = np.nonzero(levels == count)
+        pairs = np.stack([first, first + 1], axis=1).reshape(-1)
+        powers = _pieces(times[pairs], derivatives[pairs, :count])[:, ::2]
+        result[: len(powers), first] = powers
+    last = derivatives[-1, : known[-1].sum()][:highest]
+    result[: len(last), -1] = last / np.array([math.factorial(k) for k in range(len(last))], float)
+    return result
 
 
 def _binomials(orders: int, powers: np.ndarray) -> Float[np.ndarray, "orders powers"]:

@@ -117,9 +117,7 @@ class JointTrajectory(Displayed):
         [1.0, 3.0, 6.0, 6.0]
         """
         names = _names(names)
-        if isinstance(degree, bool) or degree not in range(3, HIGHEST_DEGREE + 1, 2):
-            message = f"the degree of the splines is odd, from 3 to {HIGHEST_DEGREE}"
-            raise TrajectoryError(f"{message}; even ones carry errors along undamped", name="degree", value=degree)
+        check_odd(degree)
         times, positions = check_samples(times, positions)
         if positions.ndim != 2 or positions.shape[1] != len(names):
             message = f"positions of {len(names)} joints have the shape (samples, {len(names)})"
@@ -350,6 +348,13 @@ class JointTrajectory(Displayed):
             message = f"the trajectory goes from {self.start:.9g} to {self.stop:.9g} s; choose instants within it"
             raise TrajectoryError(message, name=f"times[{first}]", value=float(times[first]))
         return np.clip(times, self.start, self.stop)
+
+
+def check_odd(degree: object) -> None:
+    """Raise TrajectoryError unless a degree of splines is odd, from 3 to 11."""
+    if isinstance(degree, bool) or degree not in range(3, HIGHEST_DEGREE + 1, 2):
+        message = f"the degree of the splines is odd, from 3 to {HIGHEST_DEGREE}"
+        raise TrajectoryError(f"{message}; even ones carry errors along undamped", name="degree", value=degree)
 
 
 def _law(name: Any, law: Any) -> AbstractMotion:

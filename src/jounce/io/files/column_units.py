@@ -13,6 +13,7 @@ from jounce.units.shown_units import ShownUnits, unit_size
 if TYPE_CHECKING:
     import xarray
 
+_WITH_INDEX = re.compile(r".*\S\[[0-9]+\]\s*")
 _WITH_UNIT = re.compile(r"(.*\S)\s*\[([^\[\]]*)\]\s*")
 
 
@@ -86,8 +87,8 @@ def name_and_unit(text: str) -> tuple[str, str | None]:
 
     Examples
     --------
-    >>> name_and_unit("psi_d1 [deg/s]"), name_and_unit("psi")
-    (('psi_d1', 'deg/s'), ('psi', None))
+    >>> name_and_unit("psi_d1 [deg/s]"), name_and_unit("psi"), name_and_unit("q[0]")
+    (('psi_d1', 'deg/s'), ('psi', None), ('q[0]', None))
     """
-    match = _WITH_UNIT.fullmatch(text)
+    match = None if _WITH_INDEX.fullmatch(text) else _WITH_UNIT.fullmatch(text)
     return (match[1], match[2].strip()) if match else (text, None)

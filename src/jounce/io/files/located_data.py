@@ -46,6 +46,7 @@ class Source:
     lines: dict[Location, int] = field(default_factory=dict)
     allow: tuple[str, ...] = ()
     error_type: type[JounceError] = MechanismFileError
+    several: bool = False  # whether the data are the list of several documents
 
     def line(self, location: Location) -> int | None:
         """Return the line of an entry, or of the nearest entry around it whose line is known."""

@@ -50,16 +50,16 @@ def plain_scalar(text: str) -> Any:
     return text
 
 
-def read_yaml(path: str, text: str) -> Source:
+def read_yaml(path: str, text: str, *, many: bool = False) -> Source:
     """Read YAML 1.2 through the events of ruamel.yaml.
 
     Aliases, tags and more than one document are refused: a mechanism file does not need them, and they are the usual
-    way to make a small file unfold without end.
+    way to make a small file unfold without end. With `many`, the data are the list of the documents.
     """
     from ruamel.yaml import YAML, events as kinds
     from ruamel.yaml.error import YAMLError
 
-    builder = Builder(path)
+    builder = _builder(path, many=many)
     documents = 0
     try:
         for event in YAML(typ="safe", pure=True).parse(text):
@@ -84,13 +84,20 @@ def read_yaml(path: str, text: str) -> Source:
                 )
             elif isinstance(event, kinds.DocumentStartEvent):
                 documents += 1
-                if documents > 1:
+                if documents > 1 and not many:
                     raise MechanismFileError("a second YAML document starts (---)", path=path, line=line)
     except YAMLError as error:
         raise _yaml_error(path, error) from None
     except (RecursionError, ValueError, IndexError, OverflowError) as error:
         raise MechanismFileError(f"the YAML cannot be read: {error}", path=path) from None
     return builder.source
+
+
+def _builder(path: str, *, many: bool) -> Builder:
+    builder = Builder(path)
+    if many:
+        builder.open([], 1)
+    return builder
 
 
 def _refuse_tag(builder: Builder, event: Any, line: int) -> None:

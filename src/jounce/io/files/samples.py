@@ -12,7 +12,8 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError, MechanismFileError, UnitError, did_you_mean, no_such
 from jounce.io.files.column_units import name_and_unit
-from jounce.io.files.reading import fault_of_number, known_name, read_rows
+from jounce.io.files.long_tables import Numbers, numbers_of
+from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, known_name, read_rows
 from jounce.units.dimensions import NUMBER, TIME, Dimension, describe_dimension, dimension_of
 from jounce.units.shown_units import unit_size
 
@@ -79,9 +80,9 @@ def sampled_dimension(
 
 def _sampled(
     path: str | Path, time: str | None, value: str | None, error_type: type[JounceError]
-) -> tuple[_Table, int, int]:
+) -> tuple[Table, int, int]:
     """Return a table of samples, and the numbers of the columns of time and value."""
-    table = _Table(str(path), error_type)
+    table = Table(str(path), error_type)
     if len(table.header) < 2:
         raise table.error("samples need a column of times and one of values", line=1)
     first = table.find(time) if time is not None else table.header.index("time") if "time" in table.header else 0
@@ -107,8 +108,8 @@ def read_columns(
         Of the type given: the file cannot be read, names are missing or repeat, there is no ``time`` or it does not
         increase, or an entry is not a finite number.
     """
-    table = _Table(str(path), error_type)
-    line = _check_named(table)
+    table = Table(str(path), error_type)
+    line = check_named(table)
     header = table.header
     time = table.find("time")
     if len(header) < 2:
@@ -121,41 +122,13 @@ def read_columns(
     times = columns.pop(header[time])
     for k in np.flatnonzero(np.diff(times) <= 0)[:1]:
         what = "repeats" if times[k + 1] == times[k] else "comes before"
-        message = f"times must increase; this one {what} that of line {table.rows[k][0]}"
-        raise table.error(message, line=table.rows[k + 1][0], name="time", value=float(times[k + 1]))
+        message = f"times must increase; this one {what} that of line {table.line(int(k))}"
+        raise table.error(message, line=table.line(int(k) + 1), name="time", value=float(times[k + 1]))
     return (
         times,
         columns,
         {name: table.unit(k)[1] for k, name in enumerate(header) if name in columns and table.units[k]},
     )
-
-
-def column_names(path: str | Path, error_type: type[JounceError] = MechanismFileError) -> list[str]:
-    """Return the names in the first row of a CSV file, without their units; none where it has no such row."""
-    table = _Table(str(path), error_type)
-    return [] if table.header_line is None else list(table.header)
-
-
-def read_chosen(
-    path: str | Path, time: str, selection: Sequence[str], error_type: type[JounceError] = MechanismFileError
-) -> tuple[Float[np.ndarray, " time"], Float[np.ndarray, "time column"]]:
-    """Read a column of increasing times, and others in the order given; what else there is may be anything.
-
-    Raises
-    ------
-    JounceError
-        Of the type given: a column does not exist, an entry is not a finite number, or times do not increase.
-    """
-    table = _Table(str(path), error_type)
-    for row_line, row in table.rows:
-        if len(row) != len(table.header):
-            message = f"each row has one value for each of the {len(table.header)} columns; this one has another number"
-            raise table.error(message, line=row_line, value=len(row))
-    times = np.array(table.column(table.find(time), (TIME,)))
-    for k in np.flatnonzero(np.diff(times) <= 0)[:1]:
-        message = f"times must increase; this one does not come after that of line {table.rows[k][0]}"
-        raise table.error(message, line=table.rows[k + 1][0], name=time, value=float(times[k + 1]))
-    return times, np.stack([table.column(table.find(name)) for name in selection], axis=1)
 
 
 def read_table(
@@ -168,18 +141,18 @@ def read_table(
     JounceError
         Of the type given: the file cannot be read, names are missing or repeat, or an entry is not a finite number.
     """
-    table = _Table(str(path), error_type)
-    _check_named(table)
+    table = Table(str(path), error_type)
+    check_named(table)
     return {name: np.array(table.column(k, rates(("angle", "length"), 0))) for k, name in enumerate(table.header)}
 
 
-def has_column(path: str | Path, name: str, error_type: type[JounceError] = MechanismFileError) -> bool:
-    """Tell whether a CSV file names a column, or does not name its columns at all."""
-    table = _Table(str(path), error_type)
-    return table.header_line is None or name in table.header
+def has_column(path: str | Path, names: Iterable[str], error_type: type[JounceError] = MechanismFileError) -> bool:
+    """Tell whether a CSV file has a column of one of some names, or does not name its columns at all."""
+    table = Table(str(path), error_type)
+    return table.header_line is None or any(name in table.header for name in names)
 
 
-def _check_named(table: _Table) -> int:
+def check_named(table: Table) -> int:
     """Check that columns have names and rows an entry for each; return the line of the names."""
     header, line = table.header, table.header_line
     if line is None:
@@ -192,10 +165,7 @@ def _check_named(table: _Table) -> int:
         if name in known:
             raise table.error("two columns have this name", line=line, value=name)
         known.add(name)
-    for row_line, row in table.rows:
-        if len(row) != len(header):
-            message = f"each row has one value for each of the {len(header)} columns; this one has another number"
-            raise table.error(message, line=row_line, value=len(row))
+    table.check_lengths()
     return line
 
 
@@ -218,7 +188,7 @@ def read_points(
     JounceError
         Of the type given: the file cannot be read, columns are missing, or an entry is not a finite number.
     """
-    table = _Table(str(path), error_type)
+    table = Table(str(path), error_type)
     if table.header_line is None:
         if len(table.header) not in (2, 3):
             message = "points have two or three columns; name them in the first row where there are others"
@@ -241,11 +211,20 @@ def read_points(
     return times, points
 
 
-class _Table:
-    """Rows of a CSV file with their lines, and the names of its columns, made up where it has none."""
+class Table:
+    """Rows of a CSV file with their lines, and the names of its columns, made up where it has none.
+
+    Long files of numbers alone have no rows of text, but `numbers`.
+    """
 
     def __init__(self, path: str, error_type: type[JounceError]):
         self.path, self.error_type = path, error_type
+        self.rows: list[tuple[int, list[str]]] = []
+        self.numbers: Numbers | None = numbers_of(path, error_type)
+        if self.numbers is not None:
+            self.header_line = self.numbers.header_line
+            self._name(self.numbers.names)
+            return
         self.rows = [(line, row) for line, row in read_rows(path, error_type) if any(row)]
         if not self.rows:
             raise self.error("the file of samples is empty")
@@ -255,10 +234,21 @@ class _Table:
         self.units: list[str | None] = [None] * len(self.header)
         if any(_number(entry) is None for entry in self.rows[0][1]):
             self.header_line, names = self.rows.pop(0)
-            pairs = [name_and_unit(known_name(name)) for name in names]
-            self.header, self.units = [name for name, _ in pairs], [unit for _, unit in pairs]
+            self._name(names)
+
+    def _name(self, names: Sequence[str]) -> None:
+        pairs = [name_and_unit(known_name(name)) for name in names]
+        self.header, self.units = [name for name, _ in pairs], [unit for _, unit in pairs]
+
+    def __len__(self) -> int:
+        return len(self.rows) if self.numbers is None else len(self.numbers.values)
+
+    def line(self, row: int) -> int:
+        """Return the line of a row."""
+        return self.rows[row][0] if self.numbers is None else self.numbers.header_line + 1 + row
 
     def error(self, message: str, **location: object) -> JounceError:
+        """Return an error about the file."""
         return self.error_type(message, path=self.path, **location)  # type: ignore[arg-type]
 
     def _check_commas(self) -> None:
@@ -269,6 +259,15 @@ class _Table:
             if len(parts) > len(row) and (len(row) == 1 or all(_number(part) is not None for part in parts)):
                 message = f"entries are separated by commas, here by {name}; write commas, and points in decimals"
                 raise self.error(message, line=line)
+
+    def check_lengths(self) -> None:
+        """Check that each row has an entry for each column."""
+        for row_line, row in self.rows:
+            if len(row) != len(self.header):
+                message = (
+                    f"each row has one value for each of the {len(self.header)} columns; this one has another number"
+                )
+                raise self.error(message, line=row_line, value=len(row))
 
     def find(self, column: str) -> int:
         """Return the number of a column by its name, with its unit or without."""
@@ -295,6 +294,15 @@ class _Table:
     def column(self, number: int, allowed: Sequence[Dimension] = ()) -> list[float]:
         """Return the numbers of a column, in SI units."""
         size, _ = self.unit(number, allowed)
+        if self.numbers is not None:
+            column = self.numbers.values[:, number] + float(self.numbers.offsets.get(number, 0))
+            bad = np.flatnonzero(~(np.abs(column) <= LARGEST_NUMBER))
+            if len(bad):
+                value = float(column[bad[0]])
+                raise self.error(
+                    fault_of_number(value), line=self.line(int(bad[0])), name=self.header[number], value=value
+                )
+            return (column * size).tolist()
         values = []
         for line, row in self.rows:
             text = row[number] if number < len(row) else ""

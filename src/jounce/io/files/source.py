@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable
 from os import PathLike, fspath
 from pathlib import Path
@@ -13,6 +14,7 @@ from jounce.io.files.located_data import Source
 from jounce.io.files.reading import check_allowed, read_file
 
 MAX_LINES = 1_000_000
+_DOCUMENT = re.compile(r"^---(?=\s|$)", re.MULTILINE)
 MAX_LINE_LENGTH = 100_000
 
 
@@ -42,6 +44,7 @@ def read_source(
     *,
     kind: str = "mechanism",
     error_type: type[JounceError] = MechanismFileError,
+    many: bool = False,
 ) -> Source:
     """Read a YAML, TOML or JSON file, chosen by its suffix, into plain data with line numbers.
 
@@ -55,6 +58,8 @@ def read_source(
         What the file holds, for messages.
     error_type : type
         Of the exceptions, also of those that the source makes.
+    many : bool, default False
+        Whether a YAML file may have more than one document: its data are then the list of those that are not empty.
 
     Returns
     -------
@@ -77,10 +82,27 @@ def read_source(
         )
     reader = {".toml": parsers.read_toml, ".json": parsers.read_json}.get(suffix, parsers.read_yaml)
     try:
-        source = reader(name, _decode(name, read_file(name)))
+        text = _decode(name, read_file(name))
+        several = many and reader is parsers.read_yaml and len(_DOCUMENT.findall(text)) > 0
+        source = _without_empty(parsers.read_yaml(name, text, many=True)) if several else reader(name, text)
         source.allow, source.error_type = check_allowed(allow), error_type
     except MechanismFileError as error:
         raise error_type(error.message, path=error.path, line=error.line, name=error.name, value=error.value) from None
     if source.data is None and not source.lines:  # only comments
         raise error_type("the file is empty", path=name)
     return source
+
+
+def _without_empty(source: Source) -> Source:
+    """Return the source of several documents without empty ones; that of the only one if there is but one."""
+    full = [k for k, document in enumerate(source.data) if document is not None]
+    if len(full) == 1:
+        lines = {location[1:]: line for location, line in source.lines.items() if location[:1] == (full[0],)}
+        return Source(source.path, source.data[full[0]], lines)
+    places = {old: new for new, old in enumerate(full)}
+    lines = {
+        (places[location[0]], *location[1:]): line  # type: ignore[index]
+        for location, line in source.lines.items()
+        if location and location[0] in places
+    }
+    return Source(source.path, [source.data[k] for k in full], lines, several=True)

@@ -18,6 +18,7 @@ from jounce.trajectory import (
     ExpressionMotion,
     FollowingMotion,
     HermiteMotion,
+    HermiteSplineMotion,
     IntegratedMotion,
     MeasuredMotion,
     OutputMotion,
@@ -85,7 +86,7 @@ class WrittenLaws:
         if law.degree % 2 == 0 and not isinstance(law, MeasuredMotion):
             message = f"a spline of even degree ({law.degree}) has no form in a file; use an odd degree"
             raise MechanismError(message, name=place)
-        if isinstance(law, HermiteMotion):
+        if isinstance(law, HermiteMotion | HermiteSplineMotion):
             message = "a law through derivatives has no form in a file; write its values as samples, or another law"
             raise MechanismError(message, name=place)
         name = self._file_of(place)

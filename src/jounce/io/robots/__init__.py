@@ -1,1 +1,1 @@
-"""Files of robots, of their trajectories and of their limits."""
+"""Files of robots and of their limits."""

@@ -14,7 +14,7 @@ from jounce.errors import SampleWarning
 from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.straight_lines import Lines, rounded
 from jounce.planning.retiming.trajectory_paths import path_of_trajectory
-from jounce.trajectory import AbstractMotion, HermiteMotion, JointTrajectory, SplineMotion
+from jounce.trajectory import AbstractMotion, HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
 
 DEVIATION = 1e-3  # rad or m, from the straight lines between samples, unless given
 SHARE = 1e-3  # of the size of the path, if that is less
@@ -28,7 +28,7 @@ def samples_of(law: AbstractMotion) -> tuple[Float[np.ndarray, " sample"], Float
 
     Positions alone, as polynomials of degree 1 go through, are samples as well.
     """
-    if type(law) is SplineMotion and law.samples.value is not None and law.beyond == "refuse":
+    if type(law) in (SplineMotion, HermiteSplineMotion) and law.samples.value is not None and law.beyond == "refuse":
         return law.samples.value
     if isinstance(law, HermiteMotion) and law.degree == 1 and law.beyond == "refuse":
         return np.asarray(law.breakpoints, float), np.asarray(law.coefficients, float)[0]

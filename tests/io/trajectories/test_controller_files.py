@@ -117,7 +117,10 @@ POINT = "- positions: [1.0]\n  time_from_start: {sec: 0, nanosec: 0}\n"
     [
         ("joint_names: [a]\npoints: []\n", "two points"),
         ("joint_names: a\npoints: []\n", "list of names"),
-        (f"joint_names: [a]\npoints:\n{POINT}{POINT}", "after that of the point before"),
+        (
+            f"joint_names: [a]\npoints:\n{POINT}{POINT.replace('1.0', '2.0')}",
+            "after that of the point before, which is",
+        ),
         (f"joint_names: [a]\npoints:\n{POINT}- positions: [1.0, 2.0]\n", "1 finite numbers"),
         (f"joint_names: [a]\npoints:\n{POINT}- positions: [2.0]\n", "sec and nanosec"),
         (f"joint_names: [a]\npoints:\n{POINT}- positions: [2.0]\n  time_from_start: {{sec: 1.5}}\n", "whole number"),
@@ -135,7 +138,7 @@ def test_faults_of_messages_are_told_with_their_line(tmp_path, text, words):
 def test_faults_of_tables_are_told(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("timestamp,target_q_0,target_qd_0\n0,1,0\n0,2,0\n")
-    with pytest.raises(jn.errors.TrajectoryError, match="times must increase"):
+    with pytest.raises(jn.errors.TrajectoryError, match="line 3, time: must come after"):
         jn.load_trajectory(path)
     path.write_text("timestamp,target_q_0,actual_q_0\n0,1,x\n0.5,2,y\n")
     assert jn.load_trajectory(path, joints=["a"]).derivatives([0.25], 0)[0, 0, 0] == 1.5

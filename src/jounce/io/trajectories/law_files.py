@@ -1,24 +1,18 @@
-"""Trajectories of robots from files: samples in CSV, laws and point-to-point motions in YAML, TOML or JSON."""
+"""Laws and point-to-point motions of joints in YAML, TOML or JSON."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Mapping
-from os import PathLike, fspath
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from jounce.errors import JounceError, TrajectoryError, no_such, show_value
-from jounce.io.files import DATA_FILES
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.reading import fault_of_number
 from jounce.io.files.samples import rates, read_columns, read_samples, sampled_dimension
-from jounce.io.files.source import read_source
-from jounce.io.robots.controller_files import is_message, read_message, read_table
+from jounce.io.trajectories.tables import measured
 from jounce.mechanism import TimeGrid, time_grid
-from jounce.settings import under_own_settings
 from jounce.shapes import ArrayLike
 from jounce.trajectory import (
     AbstractMotion,
@@ -32,105 +26,11 @@ from jounce.trajectory.trapezoid import LIMITS
 from jounce.units.dimensions import TIME, Dimension, describe_dimension, is_rate, per_power
 from jounce.units.expression import check_parameter_name
 
-_DERIVATIVE = re.compile(r"_d[0-9]+$")
 _KINDS = ("joints", "point_to_point", "motion")
 _KEYS = ("title", "parameters", "time", *_KINDS)
 _SAMPLE_KEYS = ("samples", "degree", "derivative", "initial")
 _ORDERS = (("degree", 5), ("derivative", 0))
 _MOTION_KEYS = ("profile", "duration", "start_time", "from", "to", "limits")
-
-
-@under_own_settings
-def load_trajectory(
-    path: str | PathLike[str],
-    degree: int = 5,
-    allow: Iterable[str | PathLike[str]] = (),
-    joints: Iterable[str] | None = None,
-) -> JointTrajectory:
-    """Read the trajectory of a robot from a CSV file of samples, from a file of laws, or from one of a controller.
-
-    A CSV file has a row of names, ``time, JOINT, JOINT, ...``, and below it numbers in s, m and rad; splines go through
-    them. The columns ``JOINT_d1, JOINT_d2, ...`` of derivatives, which files of results have, are not read.
-
-    A YAML, TOML or JSON file has either ``joints``, a law for each joint, or ``point_to_point`` with the keys
-    ``profile``, ``duration``, ``start_time``, ``from``, ``to`` and ``limits``. Laws are expressions of ``t`` and
-    of ``parameters``; ``time`` has the keys ``start``, ``stop`` and ``step`` or ``count``, and may be left out for
-    ``point_to_point``. A law may also go through samples, ``{samples: FILE.csv, value: COLUMN}``, of the coordinate or,
-    with ``derivative: 2``, of its acceleration; ``initial`` holds the coordinate and the velocity at the first sample.
-    In the place of ``joints``, ``motion: {samples: FILE.csv, derivative: 2}`` gives each column to the joint of its
-    name, ``initial`` then being a list for each joint, and ``time`` may be left out.
-
-    What controllers take (`export_trajectory`) is told by its content: tables with the columns ``q_d_0`` or
-    ``target_q_0``, and ROS messages with ``joint_names`` and ``points``. Polynomials go through their positions with
-    velocities and accelerations, where there are such.
-
-    Parameters
-    ----------
-    path
-        A file ending in .csv, .yaml, .yml, .toml or .json.
-    degree : int, default 5
-        Degree of the splines through samples, odd from 3 to 11.
-    allow
-        Folders besides its own that files named in it may be below.
-    joints
-        Names of the joints of a controller's file, in its order; ``joint_0``, ``joint_1``, ... in a table, which names
-        none, unless given.
-
-    Returns
-    -------
-    JointTrajectory
-        Its `times` are those of the samples, or the instants of ``time``.
-
-    Raises
-    ------
-    TrajectoryError
-        The file cannot be read or something in it is wrong: the message names the file, the line, the column or entry,
-        and the value.
-
-    Examples
-    --------
-    >>> import jounce as jn
-    >>> trajectory = jn.load_trajectory("examples/trajectories/panda_good.csv")
-    >>> trajectory.names[:2], trajectory.stop
-    (('panda_joint1', 'panda_joint2'), 4.0)
-    """
-    name = str(fspath(path))
-    suffix = Path(name).suffix.lower()
-    if suffix not in (".csv", *DATA_FILES):
-        message = "the kind of a trajectory file is given by its extension"
-        raise TrajectoryError(f"{message}; valid: {', '.join(('.csv', *DATA_FILES))}", path=name)
-    if suffix == ".csv":
-        trajectory = read_table(name, joints)
-        return _read_csv(name, degree, joints) if trajectory is None else trajectory
-    source = read_source(name, allow, kind="trajectory", error_type=TrajectoryError)
-    if is_message(source.at(())):
-        return read_message(source, joints)
-    _check_no_names(joints, name)
-    return _LawFile(source).trajectory()
-
-
-def _check_no_names(joints: object, path: str) -> None:
-    if joints is not None:
-        message = "this file names its joints; give names for what controllers take only"
-        raise TrajectoryError(message, path=path, name="joints")
-
-
-def _read_csv(path: str, degree: int, joints: object) -> JointTrajectory:
-    _check_no_names(joints, path)
-    times, columns, units = read_columns(path, TrajectoryError)
-    bare = {name: _DERIVATIVE.sub("", name) for name in columns}  # of what a column is a derivative
-    names = [name for name in columns if bare[name] == name or bare[name] not in columns]
-    measures = {name: measure for name in names if (measure := _measured(units.get(name)))}
-    try:
-        measure = JointTrajectory.from_samples(times, np.stack([columns[n] for n in names], axis=1), names, degree)
-        return JointTrajectory(measure.laws, measure.start, measure.stop, measure.times, measures)
-    except TrajectoryError as error:
-        raise error.located(path=path) from None
-
-
-def _measured(dimension: Dimension | None) -> str | None:
-    """Return which of an angle and a length a coordinate is whose value, or a rate of it, has a dimension."""
-    return next((base for base, _ in dimension or () if base in ("angle", "length")), None)
 
 
 def _order(data: Mapping[str, Any]) -> int:
@@ -139,7 +39,7 @@ def _order(data: Mapping[str, Any]) -> int:
     return order if isinstance(order, int) else 0
 
 
-class _LawFile:
+class LawFile:
     """Reads laws from the plain data of a file; every error names the file, the line and the entry."""
 
     def __init__(self, source: Source) -> None:
@@ -306,8 +206,8 @@ class _LawFile:
 
     def _note(self, joint: Any, dimension: Dimension | None, at: Location) -> None:
         """Keep whether a unit of the law of a joint says that its coordinate is an angle or a length."""
-        measured = _measured(dimension)
-        if measured and self.measures.setdefault(joint, measured) != measured:
+        measure = measured(dimension)
+        if measure and self.measures.setdefault(joint, measure) != measure:
             message = f"the units of {show_value(joint)} are those of an angle here and of a length there"
             raise self.source.error(message, at)
 

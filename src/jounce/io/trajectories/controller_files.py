@@ -1,8 +1,8 @@
-"""Trajectories in the forms that controllers take: written at their rates, and read back."""
+"""Trajectories in the forms that controllers take, written at their rates."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from typing import Any
 
@@ -10,13 +10,11 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import TrajectoryError, check_name
-from jounce.io.files.located_data import Source
-from jounce.io.files.samples import column_names, read_chosen
 from jounce.io.files.writing import check_target, replacing
-from jounce.io.robots.controller_formats import FORMATS, ControllerFormat, checked_format, format_of, joint_count
+from jounce.io.trajectories.controller_formats import FORMATS, ControllerFormat, checked_format
 from jounce.robot import Robot, inverse_dynamics
 from jounce.settings import under_own_settings
-from jounce.trajectory import HermiteMotion, JointTrajectory
+from jounce.trajectory import JointTrajectory
 
 UNITS = ("", "/s", "/s^2")
 REST_SPEED = 1e-9  # rad/s or m/s: slower is at rest
@@ -218,98 +216,3 @@ def _number(value: float) -> str:
 
 def _quoted(name: str) -> str:
     return "'" + name.replace("'", "''") + "'"
-
-
-def read_table(path: str, joints: Iterable[str] | None = None) -> JointTrajectory | None:
-    """Return the trajectory of a table of a controller; None where it is another table.
-
-    Raises
-    ------
-    TrajectoryError
-        If columns are missing, names do not fit, or the times do not increase.
-    """
-    columns = column_names(path, TrajectoryError)
-    known = format_of(columns)
-    if known is None:
-        return None
-    count = joint_count(known, columns)
-    names = _named(joints, count, path)
-    levels = [level for level in known.levels if f"{level}_0" in columns]
-    expected = [f"{level}_{j}" for level in levels for j in range(count)]
-    times, values = read_chosen(path, known.time, expected, TrajectoryError)
-    table = values.reshape(len(times), len(levels), count)
-    return _through(times, table, names, path)
-
-
-def read_message(source: Source, joints: Iterable[str] | None = None) -> JointTrajectory:
-    """Return the trajectory of a ROS message; names given take the place of its own.
-
-    Raises
-    ------
-    TrajectoryError
-        If something in it is missing, or is none of the numbers it should be.
-    """
-    source.mapping((), ("header", "joint_names", "points"))
-    own = source.at(("joint_names",))
-    if not isinstance(own, list) or not own or not all(isinstance(name, str) for name in own):
-        raise source.error("must be a list of names", ("joint_names",), value=own)
-    names = tuple(own) if joints is None else _named(joints, len(own), source.path)
-    points = source.at(("points",))
-    if not isinstance(points, list) or len(points) < 2:
-        raise source.error("must be a list of two points at least", ("points",))
-    times, rows = [], []
-    levels = [level for level in LEVELS if isinstance(points[0], dict) and points[0].get(level)]
-    if "positions" not in levels:
-        raise source.error("positions are missing", ("points", 0))
-    for k, point in enumerate(points):
-        if not isinstance(point, dict) or set(point) - {*LEVELS, "effort", "time_from_start"}:
-            raise source.error("must be a point of a trajectory, with positions", ("points", k), value=point)
-        rows.append([_row(source, ("points", k, level), point.get(level), len(own)) for level in levels])
-        times.append(_seconds(source, ("points", k, "time_from_start"), point.get("time_from_start")))
-        if k and times[k] <= times[k - 1]:
-            raise source.error(
-                "must come after that of the point before", ("points", k, "time_from_start"), value=times[k]
-            )
-    return _through(np.array(times), np.array(rows), names, source.path)
-
-
-def _row(source: Source, at: Any, given: Any, count: int) -> list[float]:
-    numbers = isinstance(given, list) and all(isinstance(x, int | float) and not isinstance(x, bool) for x in given)
-    if not numbers or len(given) != count or not np.isfinite(given).all():
-        location = at if given is not None else at[:-1]
-        raise source.error(f"must be {count} finite numbers, one for each joint: {at[-1]}", location, value=given)
-    return [float(x) for x in given]
-
-
-def _seconds(source: Source, at: Any, given: Any) -> float:
-    parts = ("sec", "nanosec") if isinstance(given, dict) and "sec" in given else ("secs", "nsecs")
-    if not isinstance(given, dict) or set(given) - set(parts):
-        location = at if given is not None else at[:-1]
-        raise source.error("must hold sec and nanosec: time_from_start", location, value=given)
-    values = [given.get(part, 0) for part in parts]
-    for part, value in zip(parts, values, strict=True):
-        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-            raise source.error("must be a whole number, 0 or greater", (*at, part), value=value)
-    return values[0] + values[1] / NANO
-
-
-def _named(joints: Iterable[str] | None, count: int, path: str) -> tuple[str, ...]:
-    names = tuple(f"joint_{k}" for k in range(count)) if joints is None else tuple(joints)
-    if len(names) != count or len(set(names)) < count:
-        message = f"the file has {count} joints; give as many different names, in its order"
-        raise TrajectoryError(message, path=path, name="joints", value=list(names))
-    return names
-
-
-def _through(times: np.ndarray, table: np.ndarray, names: tuple[str, ...], path: str) -> JointTrajectory:
-    """Return polynomials through values with their derivatives at instants: (time, level, joint)."""
-    try:
-        laws = {name: HermiteMotion(times, table[:, :, k]) for k, name in enumerate(names)}
-        return JointTrajectory(laws, float(times[0]), float(times[-1]), times)
-    except TrajectoryError as error:
-        raise error.located(path=path) from None
-
-
-def is_message(data: Any) -> bool:
-    """Tell whether the data of a file are those of a ROS message."""
-    return isinstance(data, dict) and "joint_names" in data and "points" in data

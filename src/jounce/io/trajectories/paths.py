@@ -11,15 +11,22 @@ from jounce.errors import JounceError, TrajectoryError
 from jounce.io.files import DATA_FILES
 from jounce.io.files.samples import has_column, read_table
 from jounce.io.files.source import read_source
-from jounce.io.robots.trajectories import load_trajectory
+from jounce.io.trajectories.loader import load_trajectory
+from jounce.io.trajectories.table_columns import TIMES
 from jounce.planning.retiming.paths import Path, path_of
+from jounce.robot import Robot
 from jounce.settings import under_own_settings
 from jounce.trajectory import JointTrajectory
 
 
 @under_own_settings
 def load_path(
-    path: str | PathLike[str], degree: int = 5, allow: Iterable[str | PathLike[str]] = ()
+    path: str | PathLike[str],
+    degree: int = 5,
+    allow: Iterable[str | PathLike[str]] = (),
+    *,
+    topic: str | None = None,
+    robot: Robot | None = None,
 ) -> Path | JointTrajectory:
     """Read the path of a robot: a trajectory, of which only the geometry counts, or a path that knows of no time.
 
@@ -35,6 +42,8 @@ def load_path(
         Degree of the splines through samples of a trajectory.
     allow
         Folders besides its own that files named in it may be below.
+    topic, robot
+        As for `load_trajectory`.
 
     Returns
     -------
@@ -48,12 +57,12 @@ def load_path(
     """
     name = str(fspath(path))
     suffix = FilePath(name).suffix.lower()
-    if suffix == ".csv" and not has_column(name, "time", TrajectoryError):
+    if suffix == ".csv" and not has_column(name, TIMES, TrajectoryError):
         columns = read_table(name, TrajectoryError)
         return _path_in_file(name, {joint: values.tolist() for joint, values in columns.items()})
     if suffix in DATA_FILES:
-        source = read_source(name, allow, kind="trajectory", error_type=TrajectoryError)
-        if "path" in source.data:
+        source = read_source(name, allow, kind="trajectory", error_type=TrajectoryError, many=True)
+        if isinstance(source.data, dict) and "path" in source.data:
             data = source.mapping((), ("title", "path"))
             given: dict[str, Any] = {}
             for joint, raw in source.mapping(("path",)).items():
@@ -64,7 +73,7 @@ def load_path(
                     given[joint] = raw if isinstance(raw, str) else str(_number(source, raw, at))
             del data
             return _path_in_file(name, given)
-    return load_trajectory(path, degree, allow)
+    return load_trajectory(path, degree, allow, topic=topic, robot=robot)
 
 
 def _number(source: Any, raw: Any, at: tuple[Any, ...]) -> float:

@@ -1,0 +1,1 @@
+"""Trajectories and paths of robots: files of laws and samples, recordings and messages of other tools."""

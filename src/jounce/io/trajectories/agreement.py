@@ -1,0 +1,95 @@
+"""Whether velocities and accelerations of a recording are those of its positions."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.io.trajectories.recordings import LEVELS, Recording
+from jounce.trajectory.sample_errors import noise
+
+CONTRADICTS, DOUBTFUL = 0.2, 0.05
+"""Of the change over a stretch: from there on a column is refused, or mentioned."""
+STRETCHES = 50  # of a recording, over which changes are compared
+NOISES = 6.0  # times the deviation of what noise makes of a change: a smaller difference says nothing
+BLOCK = 20_000  # samples that noise is estimated from
+
+
+@dataclasses.dataclass(frozen=True)
+class _Difference:
+    share: float  # of the change, by the root of the mean of squares
+    row: int  # where it is largest
+    given: float  # the change there, by the derivative
+    found: float  # the change there, by the level below it
+
+
+def check_agreement(recording: Recording) -> list[str]:
+    """Return in words where derivatives differ a little from what positions say.
+
+    Over stretches of the recording the change of a level is compared with the integral of the one above it, beyond what
+    noise and the distance of the samples explain.
+
+    Raises
+    ------
+    TrajectoryError
+        If they differ by more than a fifth: the message names the joint and the line.
+    """
+    doubts = []
+    for level in range(1, recording.values.shape[1]):
+        for k, name in enumerate(recording.names):
+            rows = np.flatnonzero(~np.isnan(recording.values[:, level - 1 : level + 1, k]).any(axis=1))
+            if len(rows) < 4:
+                continue
+            below, rate = recording.values[rows, level - 1, k], recording.values[rows, level, k]
+            worst = _difference(recording.times[rows], below, rate)
+            if worst is None or worst.share < DOUBTFUL:
+                continue
+            first = recording.times[rows[worst.row]]
+            fact = (
+                f"{LEVELS[level]} say a change of {worst.given:.4g}, and {LEVELS[level - 1]} one of {worst.found:.4g}, "
+                f"from t = {first:.6g} s on"
+            )
+            if worst.share >= CONTRADICTS:
+                message = f"{fact}: they contradict each other; correct units, signs or order, or leave the columns out"
+                raise recording.error(message, int(rows[worst.row]), name=name)
+            doubts.append(f"{name}: {fact}")
+    return doubts
+
+
+def _difference(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> _Difference | None:
+    """Return by how much the integral of a rate differs from what it is the rate of; None where nothing is known."""
+    steps = np.diff(times)
+    length = max(1, len(steps) // STRETCHES)
+    sums = np.append(0.0, np.cumsum(steps * (rate[1:] + rate[:-1]) / 2))
+    coarse = _coarse(times, rate)
+    first = np.arange(0, len(times) - length, max(1, length // 2))
+    last = first + length
+    given, found = sums[last] - sums[first], below[last] - below[first]
+    apart = given - found
+    block = slice(0, BLOCK)
+    sigmas = noise(times[block], below[block]), noise(times[block], rate[block])
+    step = float(np.median(steps))
+    by_noise = np.hypot(np.sqrt(2) * sigmas[0], sigmas[1] * step * np.sqrt(length))
+    by_step = np.abs(coarse[last] - coarse[first] - given) / 3  # of the trapezoidal rule, by twice the step
+    size = max(_root(given), _root(found))
+    beyond = np.maximum(np.abs(apart) - by_step - NOISES * by_noise, 0.0)
+    if size == 0 or not beyond.any():
+        return None
+    worst = int(np.argmax(beyond))
+    return _Difference(_root(beyond) / size, int(first[worst]), float(given[worst]), float(found[worst]))
+
+
+def _coarse(times: Float[np.ndarray, " row"], rate: Float[np.ndarray, " row"]) -> Float[np.ndarray, " row"]:
+    """Return the integral of a rate by every second sample, at all samples."""
+    half = np.unique(np.append(np.arange(0, len(times), 2), len(times) - 1))
+    sums = np.append(0.0, np.cumsum(np.diff(times[half]) * (rate[half][1:] + rate[half][:-1]) / 2))
+    own = np.clip(np.searchsorted(half, np.arange(len(times)), side="right") - 1, 0, len(half) - 2)
+    since = times - times[half[own]]
+    slope = (rate[half[own + 1]] - rate[half[own]]) / (times[half[own + 1]] - times[half[own]])
+    return sums[own] + rate[half[own]] * since + slope * since**2 / 2
+
+
+def _root(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

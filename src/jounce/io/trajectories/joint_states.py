@@ -1,0 +1,53 @@
+"""Recordings of joint states, each of some joints at one stamp."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+
+from jounce.io.trajectories.recordings import Recording
+from jounce.io.trajectories.stamps import epoch
+
+
+@dataclasses.dataclass(frozen=True)
+class State:
+    """The positions of some joints at a stamp, and perhaps their velocities.
+
+    Parameters
+    ----------
+    stamp : Decimal
+        s, exactly.
+    names : sequence of str
+        Of the joints.
+    levels : sequence of array_like
+        Positions, then velocities where there are such.
+    line : int, default 0
+        Of a file; 0 where it has none.
+    """
+
+    stamp: Decimal
+    names: Sequence[str]
+    levels: Sequence[Any]
+    line: int = 0
+
+
+def recorded_states(path: str, states: Sequence[State]) -> Recording:
+    """Return the recording of states, of which some may be of other joints than others."""
+    names = list(dict.fromkeys(name for state in states for name in state.names))
+    columns = {name: k for k, name in enumerate(names)}
+    values = np.full((len(states), 2, len(names)), np.nan)
+    for k, state in enumerate(states):
+        own = [columns[name] for name in state.names]
+        for level, numbers in enumerate(state.levels):
+            values[k, level, own] = numbers
+    first = states[0].stamp
+    known = epoch(first)
+    times = np.array([float(state.stamp - (first if known else 0)) for state in states])
+    moving = ~np.isnan(values[:, 0])
+    levels = 2 if (~np.isnan(values[:, 1]) == moving).all() else 1
+    lines = [state.line for state in states] if states[0].line else ()
+    return Recording(path, tuple(names), times, values[:, :levels], lines, notes=() if known is None else (known[1],))

@@ -1,0 +1,165 @@
+"""The trajectory of a robot from a file: laws, samples, messages and recordings of other tools."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from os import PathLike, fspath
+from pathlib import Path
+
+from jounce.errors import TrajectoryError
+from jounce.io.files import DATA_FILES
+from jounce.io.files.source import read_source
+from jounce.io.trajectories.bags import SUFFIXES, is_bag, read_bag
+from jounce.io.trajectories.law_files import LawFile
+from jounce.io.trajectories.messages import is_message, read_messages
+from jounce.io.trajectories.recorded_trajectories import trajectory_of
+from jounce.io.trajectories.recordings import Recording
+from jounce.io.trajectories.tables import read_recording
+from jounce.robot import Robot
+from jounce.settings import under_own_settings
+from jounce.trajectory import JointTrajectory
+
+
+@under_own_settings
+def load_trajectory(
+    path: str | PathLike[str],
+    degree: int = 5,
+    allow: Iterable[str | PathLike[str]] = (),
+    joints: Iterable[str] | None = None,
+    *,
+    as_controller: bool = False,
+    topic: str | None = None,
+    robot: Robot | None = None,
+) -> JointTrajectory:
+    """Read the trajectory of a robot: laws, samples, or what controllers and other tools write.
+
+    A CSV file has a row of names, ``time, JOINT, JOINT, ...``, and below it numbers in s, m and rad; splines go through
+    them. The columns ``JOINT_d1, JOINT_d2, ...`` of derivatives, which files of results have, are not read, but
+    velocities ``JOINT_d1`` are compared with the positions. ``JOINT_vel`` and ``JOINT_acc`` beside ``JOINT`` (or
+    ``velocity``, ``acceleration``; positions ``JOINT_pos``) are: the spline has them at its samples. So are series of
+    PlotJuggler (``/joint_states/JOINT/position``), ``rostopic echo -p`` (``field.position0``), libfranka
+    (``state.q[0]``, whose times are in ms) and numbered columns (``q_0``, ``dq_0``).
+
+    A YAML, TOML or JSON file has either ``joints``, a law for each joint, or ``point_to_point`` with the keys
+    ``profile``, ``duration``, ``start_time``, ``from``, ``to`` and ``limits``. Laws are expressions of ``t`` and
+    of ``parameters``; ``time`` has the keys ``start``, ``stop`` and ``step`` or ``count``, and may be left out for
+    ``point_to_point``. A law may also go through samples, ``{samples: FILE.csv, value: COLUMN}``, of the coordinate or,
+    with ``derivative: 2``, of its acceleration; ``initial`` holds the coordinate and the velocity at the first sample.
+    In the place of ``joints``, ``motion: {samples: FILE.csv, derivative: 2}`` gives each column to the joint of its
+    name, ``initial`` then being a list for each joint, and ``time`` may be left out.
+
+    What controllers take (`export_trajectory`) is told by its content: tables with the columns ``q_d_0`` or
+    ``target_q_0``, and messages of ROS: JointTrajectory, FollowJointTrajectory goals, RobotTrajectory and
+    DisplayTrajectory of MoveIt, as YAML (also as ``ros2 topic echo`` prints them) or JSON. Polynomials go through their
+    positions with velocities and accelerations, where there are such. Joint states, echoed or in a bag (.bag, .db3,
+    .mcap, or the folder of a bag; needs rosbags), are samples.
+
+    Parameters
+    ----------
+    path
+        A file ending in .csv, .yaml, .yml, .toml or .json, or a bag.
+    degree : int, default 5
+        Degree of the splines through samples of positions alone, odd from 3 to 11.
+    allow
+        Folders besides its own that files named in it may be below.
+    joints
+        Names of the joints of a file that names none, in its order; ``joint_0``, ``joint_1``, ... or the names of the
+        columns unless given.
+    as_controller : bool, default False
+        Between the rows of a file what joint_trajectory_controller of ros2_control does: straight lines between
+        positions alone, cubics where velocities are given, quintics where accelerations are, too.
+    topic : str, optional
+        Of a bag; that of the joint states, or of the one trajectory, unless given.
+    robot : Robot, optional
+        Whose joints a file has that names none: all of its moving joints, or all that turn, in its order.
+
+    Returns
+    -------
+    JointTrajectory
+        Its `times` are those of the samples, or the instants of ``time``; from the first stamp where stamps are
+        counted from an epoch.
+
+    Raises
+    ------
+    TrajectoryError
+        The file cannot be read or something in it is wrong: the message names the file, the line, the column or entry,
+        and the value.
+
+    Warns
+    -----
+    RecordingWarning
+        What of a recording was not taken as it is: rows out of order, repeated stamps, stamps from an epoch.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> trajectory = jn.load_trajectory("examples/trajectories/panda_good.csv")
+    >>> trajectory.names[:2], trajectory.stop
+    (('panda_joint1', 'panda_joint2'), 4.0)
+    """
+    recording = load_recording(path, allow, joints, topic)
+    if isinstance(recording, LawFile):
+        if as_controller:
+            message = "holds laws, between whose instants no controller has to say anything; give points or samples"
+            raise TrajectoryError(message, path=str(fspath(path)), name="as_controller")
+        return recording.trajectory()
+    if robot is not None and recording.unnamed:
+        recording = _named_by(recording, robot)
+    if as_controller:
+        _check_taken(recording)
+    return trajectory_of(recording, degree, as_controller=as_controller)
+
+
+def load_recording(
+    path: str | PathLike[str],
+    allow: Iterable[str | PathLike[str]] = (),
+    joints: Iterable[str] | None = None,
+    topic: str | None = None,
+) -> Recording | LawFile:
+    """Return what `load_trajectory` makes a trajectory of: rows of a recording, or laws."""
+    name = str(fspath(path))
+    given = None if joints is None else tuple(joints)
+    if is_bag(name):
+        return read_bag(name, given, topic)
+    if topic is not None:
+        raise TrajectoryError("bags have topics, other files have none", path=name, name="topic", value=topic)
+    suffix = Path(name).suffix.lower()
+    if suffix not in (".csv", *DATA_FILES):
+        message = "the kind of a trajectory file is given by its extension"
+        raise TrajectoryError(f"{message}; valid: {', '.join(('.csv', *DATA_FILES, *SUFFIXES))}", path=name)
+    if suffix == ".csv":
+        return read_recording(name, given)
+    source = read_source(name, allow, kind="trajectory", error_type=TrajectoryError, many=True)
+    if is_message(source.data):
+        return read_messages(source, given)
+    if source.several:
+        second = source.lines.get((1,))
+        raise TrajectoryError("a second YAML document starts (---)", path=name, line=second)
+    if given is not None:
+        message = "this file names its joints; give names for what controllers take only"
+        raise TrajectoryError(message, path=name, name="joints")
+    return LawFile(source)
+
+
+def _named_by(recording: Recording, robot: Robot) -> Recording:
+    """Return a recording that names no joints with those of a robot, where their number tells which."""
+    if all(name in robot.joint_names for name in recording.names):
+        return recording
+    turning = [name for name in robot.joint_names if robot.joints[name].turning]
+    for names in (robot.joint_names, turning):
+        if len(names) == len(recording.names):
+            note = f"the columns name no joints: taken are {', '.join(names)}"
+            return dataclasses.replace(recording.renamed(names), notes=(*recording.notes, note))
+    message = (
+        f"the file has {len(recording.names)} joints without names, and the robot {len(robot.joint_names)} that move, "
+        f"{len(turning)} of which turn; name the columns after joints"
+    )
+    raise TrajectoryError(message, path=recording.path, name="joints")
+
+
+def _check_taken(recording: Recording) -> None:
+    """Check that a controller would take the points as they are."""
+    if recording.points and recording.notes:
+        message = f"the controller refuses such points: {'; '.join(recording.notes)}; correct them"
+        raise TrajectoryError(message, path=recording.path, name="as_controller")

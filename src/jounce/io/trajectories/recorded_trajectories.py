@@ -1,0 +1,102 @@
+"""The trajectory that a recording becomes: splines through samples, or what a controller does between points."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.errors import JounceError, RecordingWarning, TrajectoryError
+from jounce.io.trajectories.agreement import check_agreement
+from jounce.io.trajectories.recordings import Recording
+from jounce.trajectory import (
+    AbstractMotion,
+    HermiteMotion,
+    HermiteSplineMotion,
+    JointTrajectory,
+    SplineMotion,
+)  # fmt: skip
+from jounce.trajectory.joint_trajectory import check_odd
+
+
+def trajectory_of(recording: Recording, degree: int = 5, *, as_controller: bool = False) -> JointTrajectory:
+    """Return the trajectory of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of a file.
+    degree : int, default 5
+        Of splines through positions alone.
+    as_controller : bool, default False
+        Between the rows what joint_trajectory_controller of ros2_control does: straight lines between positions alone,
+        cubics with velocities, quintics with accelerations.
+
+    Raises
+    ------
+    TrajectoryError
+        If there are too few rows, or velocities and positions contradict each other: the message names the line.
+
+    Warns
+    -----
+    RecordingWarning
+        What of the file was not taken as it is.
+    """
+    if len(recording.times) < 2:
+        raise recording.error("at least two samples are needed", value=len(recording.times))
+    try:
+        check_odd(degree)
+    except TrajectoryError as error:
+        raise error.located(path=recording.path) from None
+    notes = list(recording.notes)
+    if not recording.points:
+        notes += check_agreement(recording)
+    if notes:
+        warnings.warn(RecordingWarning(f"{recording.path}: {'; '.join(notes)}"), stacklevel=4)
+    pointed = as_controller or recording.points
+    try:
+        laws = {
+            name: _as_points(recording, k) if pointed else _as_samples(recording, k, degree)
+            for k, name in enumerate(recording.names)
+        }
+        bounds = [(float(np.asarray(law.breakpoints)[0]), float(law.stop)) for law in laws.values()]  # type: ignore[attr-defined]
+        start, stop = max(first for first, _ in bounds), min(last for _, last in bounds)
+        inside = (recording.times >= start) & (recording.times <= stop)
+        times = recording.times[inside]
+        return JointTrajectory(laws, start, stop, times, dict(recording.measures))
+    except JounceError as error:
+        raise TrajectoryError(error.message, path=recording.path, name=error.name, value=error.value) from None
+
+
+def _as_points(recording: Recording, joint: int) -> AbstractMotion:
+    table = recording.values[:, :, joint]
+    known = ~np.isnan(table)
+    skipped = np.flatnonzero((known[:, 1:] & ~known[:, :-1]).any(axis=1))
+    if len(skipped):
+        message = "accelerations without velocities: the controller goes through such points by neither"
+        raise recording.error(message, int(skipped[0]), name=recording.names[joint])
+    rows = known[:, 0]
+    return HermiteMotion(recording.times[rows], _trimmed(table[rows]), incomplete=True)
+
+
+def _trimmed(table: Float[np.ndarray, "row level"]) -> Float[np.ndarray, "row level"]:
+    """Leave out levels that no two points beside each other know."""
+    known = ~np.isnan(table)
+    both = (known[1:] & known[:-1]).any(axis=0)
+    return table[:, : int(np.argmin(np.append(both, False)))]
+
+
+def _as_samples(recording: Recording, joint: int, degree: int) -> AbstractMotion:
+    table = recording.values[:, :, joint]
+    rows = ~np.isnan(table[:, 0])
+    times, table = recording.times[rows], table[rows]
+    levels = complete_levels(~np.isnan(table))
+    if levels == 1:
+        return SplineMotion(times, table[:, 0], degree)
+    return HermiteSplineMotion(times, table[:, :levels])
+
+
+def complete_levels(known: Bool[np.ndarray, "row level"]) -> int:
+    """Return how many levels all rows know."""
+    return int(np.argmin(np.append(known.all(axis=0), False)))

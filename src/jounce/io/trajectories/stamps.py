@@ -1,0 +1,185 @@
+"""Stamps of recordings: counted from an epoch, repeated, or out of order."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from decimal import Decimal, InvalidOperation
+
+import numpy as np
+from jaxtyping import Int
+
+from jounce.errors import TrajectoryError
+from jounce.io.trajectories.recordings import Recording
+
+EPOCH = 1e8
+"""s: no recording lasts so long; larger stamps are counted from an epoch, if need be in ms, us or ns."""
+SCALES = ((1e17, 9, "ns"), (1e14, 6, "us"), (1e11, 3, "ms"), (EPOCH, 0, "s"))
+"""From which stamp on they are whole parts of a second, and of which."""
+MOST_REPEATED = 0.5  # of the rows
+BACK = 40  # steps by which a row may be late
+ROUGHER = 1.5  # by which rows in the order of their stamps may go further than in that of the file
+SAME = 1.5  # times the largest step beside: positions at one stamp differ by no more
+
+
+def relative(texts: Sequence[str], fail: Callable[[str, int], TrajectoryError]) -> tuple[np.ndarray, str]:
+    """Return stamps counted from the first one where they are counted from an epoch, and words about that.
+
+    They are subtracted before they are rounded: a stamp of this century in double precision has 0.2 us.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        As the file has them.
+    fail : callable
+        Given a message and a row, returns the error.
+
+    Raises
+    ------
+    TrajectoryError
+        If one is no finite number.
+    """
+    values = np.empty(len(texts))
+    for k, text in enumerate(texts):
+        try:
+            values[k] = float(text) if "_" not in text else np.nan
+        except ValueError:
+            values[k] = np.nan
+    bad = np.flatnonzero(~np.isfinite(values))
+    if len(bad):
+        raise fail("must be a finite number", int(bad[0]))
+    try:
+        exact = [Decimal(text.strip()) for text in texts[:1]]
+        known = epoch(exact[0]) if exact else None
+        if known is None:
+            return values, ""
+        exact = [Decimal(text.strip()) for text in texts]
+    except InvalidOperation:  # what float alone can read
+        return values, ""
+    digits, words = known
+    return np.array([float((stamp - exact[0]).scaleb(-digits)) for stamp in exact]), words
+
+
+def epoch(first: Decimal) -> tuple[int, str] | None:
+    """Return of which power of ten of a second stamps are that are counted from an epoch, and words about that.
+
+    Parameters
+    ----------
+    first : Decimal
+        The first stamp.
+
+    Examples
+    --------
+    >>> from decimal import Decimal
+    >>> epoch(Decimal("1732686000123000000"))
+    (9, 'stamps are counted from an epoch, in ns: t = 0 is 1732686000.123000000 s')
+    >>> epoch(Decimal("12.5")) is None
+    True
+    """
+    known = next(((digits, unit) for least, digits, unit in SCALES if abs(first) >= least), None)
+    if known is None:
+        return None
+    digits, unit = known
+    return digits, f"stamps are counted from an epoch, in {unit}: t = 0 is {first.scaleb(-digits):f} s"
+
+
+def in_sequence(recording: Recording) -> Recording:
+    """Return a recording with increasing stamps: rows sorted, and repeated ones merged, which its notes tell.
+
+    Raises
+    ------
+    TrajectoryError
+        If most stamps repeat, the recording starts again, or positions at one stamp contradict each other.
+    """
+    steps = np.diff(recording.times)
+    if (steps > 0).all():
+        return recording
+    repeated = np.flatnonzero(steps == 0)
+    if len(repeated) > MOST_REPEATED * len(recording.times):
+        row = int(repeated[0]) + 1
+        message = (
+            f"{len(repeated)} of {len(recording.times)} stamps repeat the one before, as where they were written with "
+            "too few digits; write them in full"
+        )
+        raise recording.error(message, row, name="time")
+    if (steps < 0).any():
+        recording = _sorted(recording, steps)
+    return _merged(recording)
+
+
+def _sorted(recording: Recording, steps: np.ndarray) -> Recording:
+    late = np.flatnonzero(steps < 0) + 1
+    row, usual = int(late[0]), float(np.median(np.abs(steps[steps != 0])))
+    highest = np.maximum.accumulate(recording.times)
+    back = float((highest - recording.times).max())
+    order = np.argsort(recording.times, kind="stable")
+    message = (
+        f"comes before that of line {recording.lines[row - 1]}" if len(recording.lines) else "comes before another"
+    )
+    value = {"name": "time", "value": float(recording.times[row])}
+    if back > BACK * usual or _way(recording.values[order, 0]) > ROUGHER * _way(recording.values[:, 0]):
+        advice = "times start again, or stamps and rows do not belong together; give one recording"
+        raise recording.error(f"the stamp {message}: {advice}", row, **value)
+    note = f"{len(late)} rows were out of order, and are sorted by their stamps"
+    return _taken(recording, order, f"{note}{_at(recording, row)}")
+
+
+def _way(positions: np.ndarray) -> float:
+    steps = np.abs(np.diff(positions, axis=0))
+    return float(np.nansum(steps))
+
+
+def _merged(recording: Recording) -> Recording:
+    """Return a recording with one row for each stamp: the mean of rows that differ within a step."""
+    times, positions = recording.times, recording.values[:, 0]
+    again = np.flatnonzero(np.diff(times) == 0) + 1
+    if not len(again):
+        return recording
+    if recording.points:
+        same = np.array_equal(recording.values[again], recording.values[again - 1], equal_nan=True)
+        if not same:
+            unlike = [k for k in again if not np.array_equal(*recording.values[k - 1 : k + 1], equal_nan=True)]
+            message = "must come after that of the point before, which is another one"
+            raise recording.error(message, unlike[0], name="time", value=float(times[unlike[0]]))
+    apart = np.abs(positions[again] - positions[again - 1])
+    differ = np.nan_to_num(apart) > 0
+    if differ.any():
+        moved = np.abs(np.diff(positions, axis=0))
+        moved[again - 1] = 0.0
+        moved[again[again < len(moved)]] = 0.0  # from the second of the two on
+        usual = SAME * np.nan_to_num(moved).max(axis=0)
+        bad = np.argwhere(np.nan_to_num(apart) > usual)
+        if len(bad):
+            row, joint = int(again[bad[0][0]]), int(bad[0][1])
+            fact = f"{positions[row - 1, joint]:.9g} and {positions[row, joint]:.9g}"
+            message = f"times must increase; this one repeats the one before, and this joint is at {fact} then"
+            raise recording.error(message, row, name=recording.names[joint], value=float(times[row]))
+    group = np.cumsum(np.append(True, np.diff(times) > 0)) - 1
+    first = np.flatnonzero(np.append(True, np.diff(times) > 0))
+    values = np.zeros((len(first), *recording.values.shape[1:]))
+    counts = np.zeros_like(values)
+    known = ~np.isnan(recording.values)
+    np.add.at(values, group, np.where(known, recording.values, 0.0))
+    np.add.at(counts, group, known)
+    with np.errstate(invalid="ignore"):
+        values = np.where(counts > 0, values / counts, np.nan)
+    rows = int(differ.any(axis=1).sum())
+    how = "left out" if not rows else f"merged, {rows} of them by the mean of different values"
+    note = f"{len(again)} repeated stamps are {how}{_at(recording, int(again[0]))}"
+    whole = _taken(recording, first, note)
+    return dataclasses.replace(whole, values=values)
+
+
+def _at(recording: Recording, row: int) -> str:
+    return f" (the first in line {recording.lines[row]})" if len(recording.lines) else ""
+
+
+def _taken(recording: Recording, rows: Int[np.ndarray, " row"], note: str) -> Recording:
+    lines = np.asarray(recording.lines)[rows] if len(recording.lines) else ()
+    return dataclasses.replace(
+        recording,
+        times=recording.times[rows],
+        values=recording.values[rows],
+        lines=lines,
+        notes=(*recording.notes, note),
+    )

@@ -1,0 +1,181 @@
+"""Which column of a recording holds what of which joint, by the names that tools give them."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Mapping, Sequence
+
+from jounce.errors import TrajectoryError
+
+TIMES = ("time", "__time", "%time", "timestamp", "Time", "stamp", "t")
+"""Names of columns of times: of results, PlotJuggler, rostopic, controllers."""
+SPARE = ("seq", "frame_id", "success_rate", "control_command_success_rate", "robot_mode")
+POSITION, VELOCITY, ACCELERATION, OTHER = 0, 1, 2, 3
+WORDS = {
+    **dict.fromkeys(("position", "positions", "pos"), POSITION),
+    **dict.fromkeys(("velocity", "velocities", "vel"), VELOCITY),
+    **dict.fromkeys(("acceleration", "accelerations", "acc", "accel"), ACCELERATION),
+    **dict.fromkeys(("effort", "efforts", "eff", "torque", "tau"), OTHER),
+}
+_NUMBERED = {
+    POSITION: ("q", "position", "positions", "pos", "joint_positions", "actual_q"),
+    VELOCITY: ("dq", "qd", "velocity", "velocities", "vel", "joint_velocities", "actual_qd"),
+    ACCELERATION: ("ddq", "qdd", "acceleration", "accelerations", "acc"),
+}
+_WITH_NUMBER = re.compile(r"(?P<word>[A-Za-z_/.]*[A-Za-z])_?(?P<open>\[)?(?P<number>[0-9]+)(?(open)\])$")
+_SUFFIX = re.compile(rf"(?P<joint>.+)[_./ ](?P<word>{'|'.join(WORDS)})$")
+_RATE = re.compile(r"(?P<joint>.+)_d[0-9]+$")
+
+
+@dataclasses.dataclass(frozen=True)
+class Columns:
+    """The columns of a recording.
+
+    Parameters
+    ----------
+    time : int
+        Number of that of the times.
+    joints : dict of str to dict of int to int
+        By the name of a joint, the column of each level that there is.
+    unnamed : bool
+        Whether the names of the joints are made up.
+    checked : dict of str to int
+        Columns of velocities that results have beside positions: they are compared with these only.
+    names : dict of str to int, optional
+        Columns of text that hold the name of a joint, by the name that it has here.
+    per_second : int
+        Of which parts of a second the times are.
+    """
+
+    time: int
+    joints: Mapping[str, Mapping[int, int]]
+    unnamed: bool = False
+    checked: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    names: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    per_second: int = 1
+
+
+def columns_of(header: Sequence[str]) -> Columns | None:
+    """Return what the columns of a header hold; None where nothing tells it.
+
+    Raises
+    ------
+    TrajectoryError
+        If two columns may be the same of one joint.
+    """
+    for known in (_of_rostopic, _of_libfranka, _of_plotjuggler, _of_numbers, _of_names):
+        found = known(header)
+        if found is not None:
+            return found
+    return None
+
+
+def _time(header: Sequence[str]) -> int | None:
+    return next((header.index(name) for name in TIMES if name in header), None)
+
+
+def _of_rostopic(header: Sequence[str]) -> Columns | None:
+    """Tell columns of ``rostopic echo -p``: ``field.name0``, ``field.position0``, and stamps in ns."""
+    if "%time" not in header or not any(name.startswith("field.") for name in header):
+        return None
+    stamp = header.index("field.header.stamp") if "field.header.stamp" in header else header.index("%time")
+    joints: dict[str, dict[int, int]] = {}
+    names: dict[str, int] = {}
+    for column, name in enumerate(header):
+        if match := re.fullmatch(r"field\.(name|position|velocity)([0-9]+)", name):
+            joint = f"joint_{match[2]}"
+            if match[1] == "name":
+                names[joint] = column
+            else:
+                joints.setdefault(joint, {})[WORDS[match[1]]] = column
+    return Columns(stamp, joints, unnamed=not names, names=names) if joints else None
+
+
+def _of_plotjuggler(header: Sequence[str]) -> Columns | None:
+    """Tell series of PlotJuggler: ``/joint_states/JOINT/position``."""
+    time = _time(header)
+    joints: dict[str, dict[int, int]] = {}
+    topics: dict[tuple[str, int], str] = {}
+    for column, name in enumerate(header):
+        parts = name.strip("/").split("/")
+        if len(parts) < 3 or parts[-1] not in WORDS:
+            continue
+        joint, level = parts[-2], WORDS[parts[-1]]
+        if level == OTHER:
+            continue
+        if (joint, level) in topics:
+            message = f"two series are of this joint, {topics[joint, level]} and {name}; leave one of the topics out"
+            raise TrajectoryError(message, name=joint)
+        topics[joint, level] = name
+        joints.setdefault(joint, {})[level] = column
+    joints = {joint: levels for joint, levels in joints.items() if POSITION in levels}
+    return Columns(time, joints) if joints and time is not None else None
+
+
+def _of_libfranka(header: Sequence[str]) -> Columns | None:
+    """Tell columns of libfranka's ``logToCSV``: ``state.q[0]``, ``state.dq[0]``, and times in ms."""
+    time, joints = _time(header), {}
+    while (name := f"state.q[{len(joints)}]") in header:
+        rate = f"state.dq[{len(joints)}]"
+        levels = {POSITION: header.index(name)} | ({VELOCITY: header.index(rate)} if rate in header else {})
+        joints[name] = levels
+    return Columns(time, joints, unnamed=True, per_second=1000) if joints and time is not None else None
+
+
+def _of_numbers(header: Sequence[str]) -> Columns | None:
+    """Tell numbered columns: ``q_0``, ``dq_0``, ``q[0]``, ``position_0``; one without is a joint's name."""
+    time = _time(header)
+    found: dict[int, dict[int, int]] = {}
+    for column, name in enumerate(header):
+        match = _WITH_NUMBER.fullmatch(name)
+        if match is None and column != time and name not in SPARE:
+            return None
+        word = match["word"].strip("/").rpartition("/")[2] if match else ""
+        level = next((level for level, words in _NUMBERED.items() if word in words), None)
+        if match is None or level is None:
+            continue
+        levels = found.setdefault(int(match["number"]), {})
+        if level in levels:
+            message = f"two columns are of the same joint, {header[levels[level]]} and {name}; leave one of them out"
+            raise TrajectoryError(message, name=name)
+        levels[level] = column
+    numbers = sorted(number for number, levels in found.items() if POSITION in levels)
+    if time is None or not numbers or numbers[0] > 1 or numbers != list(range(numbers[0], numbers[0] + len(numbers))):
+        return None
+    return Columns(time, {header[found[number][POSITION]]: found[number] for number in numbers}, unnamed=True)
+
+
+def _of_names(header: Sequence[str]) -> Columns | None:
+    """Tell columns named after joints: ``elbow``, or ``elbow_pos``, with ``elbow_vel`` and ``elbow_acc`` beside."""
+    time = _time(header)
+    if time is None:
+        return None
+    joints: dict[str, dict[int, int]] = {}
+    suffixes = {column: match for column, name in enumerate(header) if (match := _SUFFIX.fullmatch(name))}
+    positioned = {match["joint"] for match in suffixes.values() if WORDS[match["word"]] == POSITION}
+    bases, checked = {*header, *positioned}, {}
+    for column, name in enumerate(header):
+        rate, match = _RATE.fullmatch(name), suffixes.get(column)
+        if column == time:
+            continue
+        if rate and rate["joint"] in bases:
+            if name == f"{rate['joint']}_d1":
+                checked[rate["joint"]] = column
+        elif match and match["joint"] in bases:
+            if (level := WORDS[match["word"]]) != OTHER:
+                _add(joints, match["joint"], level, column, header)
+        else:
+            _add(joints, name, POSITION, column, header)
+    joints = {name: levels for name, levels in joints.items() if POSITION in levels}
+    return Columns(time, joints, checked=checked) if joints else None
+
+
+def _add(joints: dict[str, dict[int, int]], joint: str, level: int, column: int, header: Sequence[str]) -> None:
+    levels = joints.setdefault(joint, {})
+    if level in levels:
+        message = (
+            f"two columns are of the same joint, {header[levels[level]]} and {header[column]}; leave one of them out"
+        )
+        raise TrajectoryError(message, name=joint)
+    levels[level] = column

@@ -1,0 +1,182 @@
+"""Tables of recordings: CSV files of results, PlotJuggler, rostopic, libfranka, and of columns named after joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import TrajectoryError
+from jounce.io.files.reading import fault_of_number
+from jounce.io.files.samples import Table, check_named, rates
+from jounce.io.trajectories.agreement import check_agreement
+from jounce.io.trajectories.controller_formats import ControllerFormat, format_of, joint_count
+from jounce.io.trajectories.recordings import Recording
+from jounce.io.trajectories.stamps import epoch, in_sequence, relative
+from jounce.io.trajectories.table_columns import Columns, columns_of
+from jounce.units.dimensions import TIME, Dimension
+
+NOTHING = ("", "nan", "NaN", "NAN")
+"""What stands where a series has no value."""
+
+
+def read_recording(path: str, joints: Iterable[str] | None = None) -> Recording:
+    """Read a recording from a CSV file.
+
+    Parameters
+    ----------
+    path : str
+        Of the file.
+    joints : iterable of str, optional
+        Names of the joints of a table that names none, in its order.
+
+    Raises
+    ------
+    TrajectoryError
+        If the file cannot be read or something in it is wrong: the message names the line, the column and the value.
+    """
+    table = Table(path, TrajectoryError)
+    line = check_named(table)
+    known = format_of(table.header)
+    try:
+        columns = _of_controller(table, known) if known else columns_of(table.header)
+    except TrajectoryError as error:
+        raise error.located(path=path, line=line) from None
+    if columns is None:
+        table.find("time")  # tells that there is none
+        raise table.error("there is no column besides 'time'; give one for each joint", line=line)
+    recording = in_sequence(_recording(table, columns, points=known is not None))
+    if joints is not None:
+        if not recording.unnamed:
+            message = "this file names its joints; give names for what controllers take only"
+            raise TrajectoryError(message, path=path, name="joints")
+        recording = recording.renamed(tuple(joints))
+    return recording
+
+
+def _of_controller(table: Table, known: ControllerFormat) -> Columns:
+    """Return the columns of a table that a controller takes; only what is commanded is read."""
+    levels = [level for level in known.levels if f"{level}_0" in table.header]
+    joints = {
+        f"joint_{j}": {k: table.find(f"{level}_{j}") for k, level in enumerate(levels)}
+        for j in range(joint_count(known, table.header))
+    }
+    return Columns(table.find(known.time), joints, unnamed=True)
+
+
+def _recording(table: Table, columns: Columns, *, points: bool) -> Recording:
+    if len(table) == 0:
+        raise TrajectoryError("at least two samples are needed", path=table.path, value=0)
+    levels = 1 + max(max(own) for own in columns.joints.values())
+    names = _names(table, columns)
+    values = np.full((len(table), levels, len(names)), np.nan)
+    dimensions: list[Dimension] = []
+    for k, (joint, own) in enumerate(columns.joints.items()):
+        for level, column in own.items():
+            values[:, level, k] = _numbers(table, column, level, empty=level > 0 or _is_series(table.header[column]))
+        dimensions.append(table.unit(own[0])[1])
+        if column := columns.checked.get(joint):
+            _check_rate(table, columns, joint, values[:, :1, k], _numbers(table, column, 1, empty=False))
+    times, words = _times(table, columns)
+    some = ~np.isnan(values[:, 0]).all(axis=1)
+    empty = int((~some).sum())
+    notes = [words] if words else []
+    if empty:
+        notes.append(f"{empty} rows without a position are left out")
+    if not some.any():
+        raise table.error("no row has a position", line=table.header_line)
+    lines = np.array([table.line(k) for k in range(len(table))])[some]
+    unknown = np.isnan(values[some]).all(axis=(0, 2))
+    kept = int(np.argmax(np.append(unknown, True)))
+    return Recording(
+        table.path,
+        names,
+        times[some],
+        values[some][:, :kept],
+        lines,
+        points=points,
+        notes=tuple(notes),
+        measures={name: measure for name, own in zip(names, dimensions, strict=True) if (measure := measured(own))},
+        unnamed=columns.unnamed,
+    )
+
+
+def measured(dimension: Dimension | None) -> str | None:
+    """Return which of an angle and a length a coordinate is whose value, or a rate of it, has a dimension."""
+    return next((base for base, _ in dimension or () if base in ("angle", "length")), None)
+
+
+def _is_series(name: str) -> bool:
+    return name.startswith("/")
+
+
+def _names(table: Table, columns: Columns) -> tuple[str, ...]:
+    """Return the names of the joints: those that a table holds as text are the same in all rows."""
+    names = []
+    for joint in columns.joints:
+        if (column := columns.names.get(joint)) is None:
+            names.append(joint)
+            continue
+        texts = [row[column] for _, row in table.rows]
+        for k, text in enumerate(texts):
+            if text != texts[0] or not text:
+                message = "the name of a joint changes from row to row; sort the columns first"
+                raise table.error(message, line=table.line(k), name=table.header[column], value=text)
+        names.append(texts[0])
+    if len(set(names)) < len(names):
+        twice = next(name for k, name in enumerate(names) if name in names[:k])
+        raise table.error("a joint is named twice", line=table.line(0), value=twice)
+    return tuple(names)
+
+
+def _numbers(table: Table, column: int, level: int, *, empty: bool) -> Float[np.ndarray, " row"]:
+    """Return the numbers of a column; where entries may be missing, NaN stands for them."""
+    allowed = rates(("angle", "length"), level)
+    if table.numbers is not None or not empty:
+        return np.array(table.column(column, allowed))
+    size, _ = table.unit(column, allowed)
+    values = np.full(len(table), np.nan)
+    for k, (line, row) in enumerate(table.rows):
+        if row[column] in NOTHING:
+            continue
+        try:
+            values[k] = float(row[column]) * size if "_" not in row[column] else np.nan
+        except ValueError:
+            values[k] = np.nan
+        if fault := fault_of_number(values[k]):
+            raise table.error(fault, line=line, name=table.header[column], value=row[column])
+    return values
+
+
+def _times(table: Table, columns: Columns) -> tuple[Float[np.ndarray, " row"], str]:
+    """Return the times, s, from the first one where they are counted from an epoch, and words about that."""
+    name = table.header[columns.time]
+    size, _ = table.unit(columns.time, (TIME,))
+    if table.units[columns.time] is not None:
+        return np.array(table.column(columns.time, (TIME,))), ""
+    if table.numbers is not None:
+        origin = table.numbers.offsets.get(columns.time)
+        known = None if origin is None else epoch(origin)
+        if known is None:
+            return np.array(table.column(columns.time)) / columns.per_second, ""
+        digits, words = known
+        return table.numbers.values[:, columns.time] / 10**digits, words
+
+    def fail(message: str, row: int) -> TrajectoryError:
+        return table.error(message, line=table.line(row), name=name, value=table.rows[row][1][columns.time])  # type: ignore[return-value]
+
+    values, words = relative([row[columns.time] for _, row in table.rows], fail)
+    return (values, words) if words else (values * size / columns.per_second, "")
+
+
+def _check_rate(
+    table: Table, columns: Columns, joint: str, positions: Float[np.ndarray, "row 1"], rate: Float[np.ndarray, " row"]
+) -> None:
+    """Check that velocities beside positions, which are not read otherwise, are theirs."""
+    times = np.array(table.column(columns.time))
+    if (np.diff(times) <= 0).any() or not np.isfinite(positions).all():
+        return
+    lines = [table.line(k) for k in range(len(table))]
+    values = np.stack([positions, rate[:, None]], axis=1)
+    check_agreement(Recording(table.path, (joint,), times, values, lines))

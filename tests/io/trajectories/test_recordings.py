@@ -1,0 +1,384 @@
+"""Recordings and messages that other tools write: read with right numbers, or refused by line."""
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+import yaml
+
+import jounce as jn
+from jounce.errors import TrajectoryError
+
+JOINTS = ("shoulder", "elbow")
+TIMES = np.arange(0.0, 1.0001, 0.02)
+
+
+def motion(times, order=0):
+    """Two sines, or a derivative of them."""
+    return np.stack([w**order * np.sin(w * times + order * np.pi / 2) for w in (2.0, 3.0)], axis=-1)
+
+
+def table(folder, header, columns, name="log.csv"):
+    path = folder / name
+    rows = [",".join(x if isinstance(x, str) else f"{x:.17g}" for x in row) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return path
+
+
+def check(trajectory, names=JOINTS, order=2, tolerance=1e-3, start=0.0):
+    """Positions and derivatives are those of the motion, between samples too."""
+    assert trajectory.names == tuple(names)
+    times = np.linspace(0.1, 0.9, 37)
+    found = trajectory.derivatives(times + start, order)
+    for k in range(order + 1):
+        assert np.abs(found[:, k] - motion(times, k)).max() <= tolerance * 3.0**k
+
+
+Q, V, A = (motion(TIMES, k).T for k in range(3))
+EPOCH = [f"1732686000.{round(t * 1e9):09d}" if t < 1 else "1732686001.000000000" for t in TIMES]
+NANO = [x.replace(".", "") for x in EPOCH]
+
+
+@pytest.mark.parametrize(
+    "header, columns, names",
+    [
+        ("__time,/joint_states/shoulder/position,/joint_states/elbow/position", [EPOCH, *Q], JOINTS),
+        (
+            "__time,/js/shoulder/position,/js/shoulder/velocity,/js/shoulder/effort,/js/elbow/position,"
+            "/js/elbow/velocity,/js/elbow/effort",
+            [EPOCH, Q[0], V[0], A[0], Q[1], V[1], A[1]],
+            JOINTS,
+        ),
+        (
+            "%time,field.header.seq,field.header.stamp,field.name0,field.name1,field.position0,field.position1,"
+            "field.velocity0,field.velocity1",
+            [NANO, TIMES, NANO, ["shoulder"] * 51, ["elbow"] * 51, *Q, *V],
+            JOINTS,
+        ),
+        ("time,q_0,q_1,dq_0,dq_1,tau_J_0,tau_J_1", [TIMES, *Q, *V, *A], ("q_0", "q_1")),
+        (
+            "time, success_rate, state.q[0], state.q[1],state.q_d[0], state.dq[0], state.dq[1]",
+            [1000 * TIMES, TIMES, *Q, Q[0], *V],
+            ("state.q[0]", "state.q[1]"),
+        ),
+        ("time,shoulder_pos,elbow_pos,shoulder_vel,elbow_vel", [TIMES, *Q, *V], JOINTS),
+        ("elbow,shoulder,time,elbow_velocity,shoulder_velocity,elbow_effort", [*Q[::-1], TIMES, *V[::-1], A[0]], None),
+        ("time,shoulder,elbow,shoulder_vel,elbow_vel,shoulder_acc,elbow_acc", [TIMES, *Q, *V, *A], JOINTS),
+        ("time [ms],shoulder [deg],elbow [deg]", [1000 * TIMES, *np.rad2deg(Q)], JOINTS),
+    ],
+)
+def test_tables_of_other_tools(tmp_path, header, columns, names):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", jn.errors.RecordingWarning)
+        trajectory = jn.load_trajectory(table(tmp_path, header, columns))
+    assert trajectory.start == 0.0
+    if names is None:
+        names = ("elbow", "shoulder")
+        trajectory = jn.JointTrajectory({k: trajectory.laws[k] for k in JOINTS}, trajectory.start, trajectory.stop)
+        names = JOINTS
+    check(trajectory, names)
+    if "_acc" in header:
+        assert all(law.degree == 7 for law in trajectory.laws.values())
+
+
+def test_epoch_stamps_lose_no_digits(tmp_path):
+    """In double precision 1732686000.123 s has 0.2 us: differences of the texts have none of that."""
+    path = table(tmp_path, "__time,/js/shoulder/position,/js/elbow/position", [EPOCH, *Q])
+    with pytest.warns(jn.errors.RecordingWarning, match=r"epoch, in s: t = 0 is 1732686000\.000000000 s"):
+        trajectory = jn.load_trajectory(path)
+    np.testing.assert_allclose(trajectory.times, TIMES, rtol=0, atol=1e-15)
+
+
+def test_series_at_stamps_of_their_own(tmp_path):
+    """PlotJuggler leaves cells empty where another series alone has a sample."""
+    rows = ["__time,/js/shoulder/position,/js/elbow/position"]
+    rows += [f"{t:.9g},{np.sin(2 * t):.17g},\n{t + 0.005:.9g},,{np.sin(3 * (t + 0.005)):.17g}" for t in TIMES]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(rows) + "\n")
+    trajectory = jn.load_trajectory(path)
+    assert (trajectory.start, trajectory.stop) == (0.005, 1.0)
+    check(trajectory)
+
+
+def test_rows_out_of_order_and_repeated_ones_are_told(tmp_path):
+    order = [*range(20), 21, 20, *range(22, 40), 39, *range(40, 51)]
+    path = table(tmp_path, "time,shoulder,elbow", [TIMES[order], *Q[:, order]])
+    with pytest.warns(jn.errors.RecordingWarning, match=r"1 rows were out of order.*\(the first in line 23\); 1 repeated"):
+        trajectory = jn.load_trajectory(path)
+    assert len(trajectory.times) == 51
+    check(trajectory)
+
+
+@pytest.mark.parametrize(
+    "header, columns, words",
+    [
+        ("time,a,b", [np.append(TIMES, TIMES), *np.hstack([Q, Q])], "line 53, time: .*times start again"),
+        ("time,a,b", [np.repeat(TIMES[::3], 3), *Q], "line 3, time: 34 of 51 stamps repeat"),
+        ("time,a,a_vel", [TIMES, Q[0], np.rad2deg(V[0])], "line 2, a: velocities say a change .* contradict"),
+        ("time,a,a_vel", [TIMES, Q[0], -V[0]], "a: velocities say a change of -.* contradict"),
+        ("time,a,a_vel", [TIMES, Q[0], 0 * V[0]], "a: velocities say a change of 0,"),
+        ("time,a,b,a_vel,b_vel", [TIMES, *Q, *V[::-1]], "line [0-9]+, [ab]: velocities .* contradict"),
+        ("time,a,a_vel,a_acc", [TIMES, Q[0], V[0], 2 * A[0]], "a: accelerations say a change"),
+        ("time,a,a_d1", [TIMES, Q[0], 2 * V[0]], "line [0-9]+, a: velocities .* contradict"),
+        ("__time,/a/j/position,/b/j/position", [TIMES, *Q], "line 1, j: two series are of this joint"),
+        ("time,q_0,position_0", [TIMES, *Q], "line 1, position_0: two columns are of the same joint"),
+        ("time,a,a_pos", [TIMES, *Q], "line 1, a: two columns are of the same joint"),
+        ("%time,field.name0,field.position0", [NANO, ["a"] * 50 + ["b"], Q[0]], "line 52, field.name0: .* changes"),
+        (
+            "__time,/js/j/position,/js/k/position",
+            [TIMES, Q[0], ["x"] * 51],
+            r"line 2, /js/k/position: must be a finite",
+        ),
+    ],
+)
+def test_what_does_not_agree_is_refused(tmp_path, header, columns, words):
+    path = table(tmp_path, header, columns)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", jn.errors.RecordingWarning)
+        with pytest.raises(TrajectoryError, match=words):
+            jn.load_trajectory(path)
+
+
+def test_two_positions_at_one_stamp(tmp_path):
+    times = np.insert(TIMES, 25, TIMES[25])
+    path = table(tmp_path, "time,shoulder,elbow", [times, *np.insert(Q, 25, Q[:, 25] + 1e-4, axis=1)])
+    with pytest.warns(jn.errors.RecordingWarning, match="1 of them by the mean of different values"):
+        check(jn.load_trajectory(path), order=0)
+    path = table(tmp_path, "time,shoulder,elbow", [times, *np.insert(Q, 25, Q[:, 25] + 1.0, axis=1)])
+    with pytest.raises(TrajectoryError, match=r"line 28, shoulder: times must increase, .* is at .* then"):
+        jn.load_trajectory(path)
+
+
+def test_slow_and_noisy_velocities_are_read(tmp_path):
+    """A filtered velocity lags by some ms, and noise of 1 percent is no contradiction."""
+    generator = np.random.default_rng(5)
+    late = motion(TIMES - 0.004, 1).T + 0.02 * generator.normal(size=V.shape)
+    path = table(tmp_path, "time,shoulder,elbow,shoulder_vel,elbow_vel", [TIMES, *Q, *late])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        trajectory = jn.load_trajectory(path)
+        check(trajectory, order=0)
+    with pytest.warns(jn.SampleWarning, match="do not support"):
+        trajectory.derivatives([0.5], 3)
+
+
+def message(points, **more):
+    return {"joint_names": list(JOINTS), "points": points} | more
+
+
+def point(t, levels=3, **change):
+    keys = ("positions", "velocities", "accelerations")
+    own = {key: motion(np.array(t), k).tolist() if k < levels else [] for k, key in enumerate(keys)}
+    whole = round(t * 1e9)
+    return own | {"effort": [], "time_from_start": {"sec": whole // 10**9, "nanosec": whole % 10**9}} | change
+
+
+POINTS = [point(t) for t in np.arange(0.0, 1.01, 0.1)]
+HEADER = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+MULTI = {"header": HEADER, "joint_names": [], "points": []}
+
+
+@pytest.mark.parametrize("suffix", [".yaml", ".json"])
+@pytest.mark.parametrize(
+    "data",
+    [
+        message(POINTS, header=HEADER),
+        {"joint_trajectory": message(POINTS, header=HEADER), "multi_dof_joint_trajectory": MULTI},
+        {"trajectory": message(POINTS), "goal_tolerance": [], "goal_time_tolerance": {"sec": 0, "nanosec": 0}},
+        {"header": HEADER, "goal_id": {"id": ""}, "goal": {"trajectory": message(POINTS), "path_tolerance": []}},
+        {
+            "model_id": "arm",
+            "trajectory": [{"joint_trajectory": message(POINTS), "multi_dof_joint_trajectory": MULTI}],
+            "trajectory_start": {"joint_state": {"name": ["elbow", "shoulder"], "position": [0.0, 0.0]}},
+        },
+        {
+            "model_id": "arm",
+            "trajectory": [{"joint_trajectory": message(POINTS[:6])}, {"joint_trajectory": message(POINTS[5:])}],
+        },
+    ],
+)
+def test_messages_and_goals(tmp_path, data, suffix):
+    path = tmp_path / f"message{suffix}"
+    path.write_text(json.dumps(data) if suffix == ".json" else plain_yaml(data))
+    check(jn.load_trajectory(path), tolerance=1e-4)
+
+
+def plain_yaml(data):
+    """YAML without aliases, which no tool of ROS writes."""
+    return yaml.safe_dump(json.loads(json.dumps(data)))
+
+
+def test_messages_as_they_are_echoed(tmp_path):
+    path = tmp_path / "echo.yaml"
+    path.write_text(yaml.safe_dump(message(POINTS)) + "---\n")
+    check(jn.load_trajectory(path), tolerance=1e-4)
+    path.write_text("---\n" + yaml.safe_dump(message(POINTS)))
+    check(jn.load_trajectory(path), tolerance=1e-4)
+    path.write_text(2 * (yaml.safe_dump(message(POINTS)) + "---\n"))
+    with pytest.raises(TrajectoryError, match=r"line [0-9]+, \[1\]: the file has 2 messages"):
+        jn.load_trajectory(path)
+
+
+def states(times, stamp=("sec", "nanosec"), origin=1732686000):
+    for k, t in enumerate(times):
+        whole = origin * 10**9 + round(t * 1e9)
+        names = JOINTS[:: 1 if k % 2 else -1]
+        values = {"position": motion(np.array(t)), "velocity": motion(np.array(t), 1)}
+        yield {
+            "header": {"stamp": {stamp[0]: whole // 10**9, stamp[1]: whole % 10**9}, "frame_id": ""},
+            "name": list(names),
+            **{key: x.tolist()[:: 1 if k % 2 else -1] for key, x in values.items()},
+            "effort": [],
+        }
+
+
+@pytest.mark.parametrize("stamp", [("sec", "nanosec"), ("secs", "nsecs")])
+def test_joint_states_as_they_are_echoed(tmp_path, stamp):
+    """Joints in any sequence in each message, stamps since an epoch."""
+    path = tmp_path / "echo.yaml"
+    path.write_text("".join(yaml.safe_dump(state) + "---\n" for state in states(TIMES, stamp)))
+    with pytest.warns(jn.errors.RecordingWarning, match="epoch"):
+        trajectory = jn.load_trajectory(path)
+    np.testing.assert_allclose(trajectory.times, TIMES, rtol=0, atol=1e-12)
+    check(jn.JointTrajectory({k: trajectory.laws[k] for k in JOINTS}, 0.0, trajectory.stop))
+
+
+@pytest.mark.parametrize(
+    "points, words",
+    [
+        ([point(0), point(1, accelerations=[])], None),
+        ([point(0, velocities=[]), point(1)], r"points\[0\]|accelerations without velocities"),
+        ([point(0), point(1, positions=[1.0, "..."])], r"points\[1\]\.positions: was cut .* --full-length"),
+        ([point(0), point(0, positions=[1.0, 2.0])], "must come after that of the point before, which is another"),
+        ([point(0.5), point(0)], r"points\[1\]\.time_from_start: must come after"),
+        ([point(0), "..."], "points: was cut"),
+    ],
+)
+def test_points_that_no_controller_takes(tmp_path, points, words):
+    path = tmp_path / "message.json"
+    path.write_text(json.dumps(message(points)))
+    if words is None:  # the last one has no accelerations: a cubic
+        law = jn.load_trajectory(path).laws["shoulder"]
+        assert law.degree == 3
+        return
+    with pytest.raises(TrajectoryError, match=words):
+        jn.load_trajectory(path)
+
+
+def test_a_robot_that_is_not_where_its_trajectory_starts(tmp_path):
+    start = {"joint_state": {"name": list(JOINTS), "position": [0.0, 0.2]}}
+    data = {"model_id": "arm", "trajectory": [{"joint_trajectory": message(POINTS)}], "trajectory_start": start}
+    path = tmp_path / "message.json"
+    path.write_text(json.dumps(data))
+    with pytest.raises(TrajectoryError, match=r"robot starts at 0\.2, and the trajectory of elbow at 0: it would jump"):
+        jn.load_trajectory(path)
+
+
+def test_as_the_controller_goes(tmp_path):
+    """Closed forms of joint_trajectory_controller: lines, cubics and quintics between points, part by part."""
+    points = [point(0.0, 1), point(0.5, 1), point(0.7, 2), point(0.9, 3), point(1.0, 3)]
+    path = tmp_path / "message.json"
+    path.write_text(json.dumps(message(points)))
+    trajectory = jn.load_trajectory(path, as_controller=True)
+    q = [motion(np.array(t)) for t in (0.0, 0.5, 0.7, 0.9, 1.0)]
+    found = trajectory.derivatives([0.25, 0.6, 0.8, 0.95], 2)
+    np.testing.assert_allclose(found[0], [(q[0] + q[1]) / 2, (q[1] - q[0]) / 0.5, [0, 0]], atol=1e-13)
+    np.testing.assert_allclose(found[1, 1], (q[2] - q[1]) / 0.2, atol=1e-13)
+    v = [motion(np.array(t), 1) for t in (0.7, 0.9, 1.0)]
+    middle = (q[2] + q[3]) / 2 + 0.2 / 8 * (v[0] - v[1])  # of a cubic
+    np.testing.assert_allclose(found[2, 0], middle, atol=1e-13)
+    a = [motion(np.array(t), 2) for t in (0.9, 1.0)]
+    middle = (q[3] + q[4]) / 2 + 0.1 * 5 / 32 * (v[1] - v[2]) + 0.01 / 64 * (a[0] + a[1])  # of a quintic
+    np.testing.assert_allclose(found[3, 0], middle, atol=1e-13)
+
+
+def test_as_the_controller_goes_through_samples(tmp_path):
+    path = table(tmp_path, "time,shoulder,elbow", [TIMES, *Q])
+    trajectory = jn.load_trajectory(path, as_controller=True)
+    found = trajectory.derivatives([0.21], 2)[0]
+    np.testing.assert_allclose(found, [(Q[:, 10] + Q[:, 11]) / 2, (Q[:, 11] - Q[:, 10]) / 0.02, [0, 0]], atol=1e-12)
+    path = table(tmp_path, "time,shoulder,elbow,shoulder_vel,elbow_vel", [TIMES, *Q, *V])
+    assert all(law.degree == 3 for law in jn.load_trajectory(path, as_controller=True).laws.values())
+    law = tmp_path / "law.yaml"
+    law.write_text("joints: {a: t}\ntime: {stop: 1, step: 0.1}\n")
+    with pytest.raises(TrajectoryError, match="as_controller: holds laws"):
+        jn.load_trajectory(law, as_controller=True)
+    twice = tmp_path / "twice.json"
+    twice.write_text(json.dumps(message([POINTS[0], *POINTS])))
+    with pytest.warns(jn.errors.RecordingWarning, match="1 repeated stamps are left out"):
+        check(jn.load_trajectory(twice), tolerance=1e-4)
+    with pytest.raises(TrajectoryError, match="as_controller: the controller refuses such points"):
+        jn.load_trajectory(twice, as_controller=True)
+
+
+@pytest.mark.parametrize("version", [8, 9])
+def test_bags_of_ros_2(tmp_path, version):
+    rosbags = pytest.importorskip("rosbags.rosbag2")
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kinds = store.types
+    state, head = kinds["sensor_msgs/msg/JointState"], kinds["std_msgs/msg/Header"]
+    stamp, duration = kinds["builtin_interfaces/msg/Time"], kinds["builtin_interfaces/msg/Duration"]
+    row, whole = kinds["trajectory_msgs/msg/JointTrajectoryPoint"], kinds["trajectory_msgs/msg/JointTrajectory"]
+    folder = tmp_path / "bag"
+    with rosbags.Writer(folder, version=version) as writer:
+        for topic, kind in (("/joint_states", state), ("/plan", whole), ("/gripper", state)):
+            connection = writer.add_connection(topic, kind.__msgtype__, typestore=store)
+            if kind is state:
+                for t in TIMES if topic != "/gripper" else []:
+                    header = head(stamp(1732686000, round(t * 1e9)) if t < 1 else stamp(1732686001, 0), "")
+                    values = [motion(np.array(t), k) for k in (0, 1)]
+                    raw = store.serialize_cdr(state(header, list(JOINTS), *values, np.zeros(0)), kind.__msgtype__)
+                    writer.write(connection, int((1732686000 + t) * 1e9), raw)
+            else:
+                points = [
+                    row(*(np.array(x[key]) for key in ("positions", "velocities", "accelerations")), np.zeros(0),
+                        duration(**x["time_from_start"]))
+                    for x in POINTS
+                ]  # fmt: skip
+                raw = store.serialize_cdr(whole(head(stamp(0, 0), ""), list(JOINTS), points), kind.__msgtype__)
+                writer.write(connection, 1732686000 * 10**9, raw)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", jn.errors.RecordingWarning)
+        with pytest.raises(TrajectoryError, match=r"topic: .*several topics .* /joint_states, /plan, /gripper"):
+            jn.load_trajectory(folder)
+        log = jn.load_trajectory(folder, topic="/joint_states")
+        check(log)
+        assert abs(log.stop - 1.0) < 1e-12
+        check(jn.load_trajectory(next(folder.glob("*.db3")), topic="/plan"), tolerance=1e-4)
+        with pytest.raises(TrajectoryError, match="at least two samples are needed"):
+            jn.load_trajectory(folder, topic="/gripper")
+    with pytest.raises(TrajectoryError, match="no topic of joint states or trajectories has this name"):
+        jn.load_trajectory(folder, topic="/none")
+    next(folder.glob("*.db3")).write_bytes(b"nothing of a bag")
+    with pytest.raises(TrajectoryError, match="the bag cannot be read"):
+        jn.load_trajectory(folder, topic="/plan")
+
+
+def test_a_long_table_is_read_as_the_same_table_in_parts(tmp_path, monkeypatch):
+    """Numbers without a text for each entry, stamps since an epoch exactly; a fault is told by its line."""
+    epoch = table(tmp_path, "time,shoulder,elbow", [EPOCH, *Q])
+    monkeypatch.setattr("jounce.io.files.long_tables.LONG", 10)
+    with pytest.warns(jn.errors.RecordingWarning, match=r"t = 0 is 1732686000\.0"):
+        trajectory = jn.load_trajectory(epoch)
+    np.testing.assert_allclose(trajectory.times, TIMES, rtol=0, atol=1e-15)
+    check(trajectory)
+    bad = table(tmp_path, "time,shoulder,elbow", [TIMES, *Q], "bad.csv")
+    bad.write_text(bad.read_text().replace("\n0.5,", "\nx,"))
+    with pytest.raises(TrajectoryError, match="line 27, time: must be a finite number, got 'x'"):
+        jn.load_trajectory(bad)
+    monkeypatch.setattr("jounce.io.files.long_tables.MAX_SAMPLES", 10)
+    with pytest.raises(TrajectoryError, match="line 27: from so long a file numbers alone are read"):
+        jn.load_trajectory(bad)
+
+
+def test_joints_of_a_robot_for_a_table_that_names_none(tmp_path):
+    robot = jn.load_robot("examples/robots/ur5.urdf")
+    path = table(tmp_path, "time," + ",".join(f"q_{k}" for k in range(6)), [TIMES, *np.repeat(Q, 3, axis=0)])
+    with pytest.warns(jn.errors.RecordingWarning, match="the columns name no joints: taken are shoulder_pan_joint, "):
+        assert jn.load_trajectory(path, robot=robot).names == robot.joint_names
+    path = table(tmp_path, "time,q_0,q_1", [TIMES, *Q])
+    with pytest.raises(TrajectoryError, match="2 joints without names, and the robot 6 that move"):
+        jn.load_trajectory(path, robot=robot)
