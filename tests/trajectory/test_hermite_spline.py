@@ -72,4 +72,4 @@ def test_points_that_know_fewer_derivatives_than_others():
         HermiteMotion([0, 1], [[0, nan], [1, 0]])
     with pytest.raises(TrajectoryError, match="finite"):
         HermiteMotion([0, 1], [[0, np.inf], [1, 0]], incomplete=True)
-    assert isinstance(jn.HermiteMotion([0.0, 1.0], [[0.0], [1.0]]), HermiteMotion)
+    assert isinstance(jn.laws.HermiteMotion([0.0, 1.0], [[0.0], [1.0]]), HermiteMotion)

@@ -104,7 +104,9 @@ def test_series_at_stamps_of_their_own(tmp_path):
 def test_rows_out_of_order_and_repeated_ones_are_told(tmp_path):
     order = [*range(20), 21, 20, *range(22, 40), 39, *range(40, 51)]
     path = table(tmp_path, "time,shoulder,elbow", [TIMES[order], *Q[:, order]])
-    with pytest.warns(jn.errors.RecordingWarning, match=r"1 rows were out of order.*\(the first in line 23\); 1 repeated"):
+    with pytest.warns(
+        jn.errors.RecordingWarning, match=r"1 rows were out of order.*\(the first in line 23\); 1 repeated"
+    ):
         trajectory = jn.load_trajectory(path)
     assert len(trajectory.times) == 51
     check(trajectory)
@@ -159,7 +161,7 @@ def test_slow_and_noisy_velocities_are_read(tmp_path):
         warnings.simplefilter("error")
         trajectory = jn.load_trajectory(path)
         check(trajectory, order=0)
-    with pytest.warns(jn.SampleWarning, match="do not support"):
+    with pytest.warns(jn.errors.SampleWarning, match="do not support"):
         trajectory.derivatives([0.5], 3)
 
 
