@@ -53,12 +53,12 @@ class HermiteMotion(SplineMotion):
         instants = finite_row("times", times, seconds)
         shape = np.shape(derivatives)
         columns = shape[1] if len(shape) == 2 and shape[1] else 1
-        table = np.array(derivatives, float) if incomplete else derivatives
-        known = ~np.isnan(table) if incomplete else np.ones(shape, bool)
+        given = np.array(derivatives, float) if incomplete else np.zeros(shape)
+        known = ~np.isnan(given)
         if (known[:, 1:] & ~known[:, :-1]).any() or not known[:, :1].all():
             message = "a derivative is known only where those below it are"
-            raise TrajectoryError(message, name="derivatives", value=table[~known.all(axis=1)][0].tolist())
-        filled = np.where(known, table, 0.0) if incomplete else table
+            raise TrajectoryError(message, name="derivatives", value=given[~known.all(axis=1)][0].tolist())
+        filled = np.where(known, given, 0.0) if incomplete else derivatives
         table = finite_numbers("derivatives", filled, (len(instants), columns))
         steps = np.diff(instants)
         twice = steps == 0

@@ -60,7 +60,7 @@ def trajectory_of(recording: Recording, degree: int = 5, *, as_controller: bool 
             name: _as_points(recording, k) if pointed else _as_samples(recording, k, degree)
             for k, name in enumerate(recording.names)
         }
-        bounds = [(float(np.asarray(law.breakpoints)[0]), float(law.stop)) for law in laws.values()]  # type: ignore[attr-defined]
+        bounds = [(float(np.asarray(law.breakpoints)[0]), float(law.stop)) for law in laws.values()]
         start, stop = max(first for first, _ in bounds), min(last for _, last in bounds)
         inside = (recording.times >= start) & (recording.times <= stop)
         times = recording.times[inside]
