@@ -55,7 +55,7 @@ class HermiteMotion(SplineMotion):
         columns = shape[1] if len(shape) == 2 and shape[1] else 1
         given = np.array(derivatives, float) if incomplete else np.zeros(shape)
         known = ~np.isnan(given)
-        if (known[:, 1:] & ~known[:, :-1]).any() or not known[:, :1].all():
+        if known.ndim == 2 and ((known[:, 1:] & ~known[:, :-1]).any() or not known[:, :1].all()):
             message = "a derivative is known only where those below it are"
             raise TrajectoryError(message, name="derivatives", value=given[~known.all(axis=1)][0].tolist())
         filled = np.where(known, given, 0.0) if incomplete else derivatives
