@@ -145,8 +145,8 @@ def _merged(recording: Recording) -> Recording:
     differ = np.nan_to_num(apart) > 0
     if differ.any():
         moved = np.abs(np.diff(positions, axis=0))
-        moved[again - 1] = 0.0
-        moved[again[again < len(moved)]] = 0.0  # from the second of the two on
+        beside = np.concatenate([again - 2, again - 1, again])  # steps to and from the two do not tell what is usual
+        moved[beside[(beside >= 0) & (beside < len(moved))]] = 0.0
         usual = SAME * np.nan_to_num(moved).max(axis=0)
         bad = np.argwhere(np.nan_to_num(apart) > usual)
         if len(bad):
