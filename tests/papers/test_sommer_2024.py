@@ -24,6 +24,7 @@ from jounce.papers.sommer_2024 import (
 )
 from jounce.papers.sommer_2024.cases import STEPS, TOLERANCES, stencil_instants
 from jounce.papers.sommer_2024.phase_lag import STEPS as LAG_STEPS
+from jounce.papers.sommer_2024.residual_stop import ResidualStop
 
 reproduction = importlib.import_module("jounce.papers.sommer_2024.reproduce")
 ROOT = pathlib.Path(__file__).parents[2]
@@ -134,7 +135,9 @@ def small_run(tmp_path_factory):
         patch.setattr(reproduction, "VALIDATION_CASES", {"four_bar": VALIDATION_CASES["four_bar"]})
         patch.setattr(figures, "FIGURES", {k: figures.FIGURES[k] for k in DRAWN})
         measure = reproduction.measure
-        patch.setattr(reproduction, "measure", lambda s, advanced: kept.setdefault(s.name, measure(s, advanced)))
+        patch.setattr(
+            reproduction, "measure", lambda s, advanced, stop: kept.setdefault(s.name, measure(s, advanced, stop=stop))
+        )
         paths = reproduction.reproduce(directory, lambda done, total: calls.append((done, total)))
     return directory, paths, calls, kept["four_bar"]
 
@@ -247,6 +250,36 @@ def test_the_floor_of_the_paper_is_that_of_residuals_in_centimeters(small_run):
 
     assert error(1e-11, 100.0) < 1e-15 < error(1e-10, 100.0)
     assert error(1e-14, 1.0) > 1e-15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name, figure, floor", [("four_bar", 4, 1e-11), ("rsur", 10, 1e-12)])
+def test_stopped_by_the_largest_residual_in_centimeters_the_floor_is_where_the_paper_has_it(
+    small_run, name, figure, floor
+):
+    sweep = ResidualStop(VALIDATION_CASES[name])
+    errors = np.stack([sweep.error(tolerance) for tolerance in TOLERANCES])
+    at = TOLERANCES.index(floor)
+    assert (errors[: at + 1] <= FLOOR).all()
+    assert errors[at + 1].max() > FLOOR
+    assert (errors[at + 2] > 5 * errors[at]).all()
+    result = dataclasses.replace(small_run[3], stop="residual", by_tolerance=errors)
+    page = comparison.comparison(dict.fromkeys(cases.TOLERANCE_SWEEPS[figure], result))
+    row = next(line for line in page.splitlines() if line.startswith(f"| {figure} |"))
+    assert "| reproduced" in row
+    assert f"{floor:.0e}" in row
+    assert "each instant starts from the position at the instant before" in page
+    worse = dataclasses.replace(result, by_tolerance=10 * errors[[*range(1, len(errors)), -1]])
+    page = comparison.comparison(dict.fromkeys(cases.TOLERANCE_SWEEPS[figure], worse))
+    assert "NOT reproduced" in next(line for line in page.splitlines() if line.startswith(f"| {figure} |"))
+
+
+def test_a_rule_that_is_none_is_refused_before_any_computing(tmp_path, run):
+    for paper, words in (("sommer-2024", ("residuals", "residual")), ("negrean-2025", ("--stop", "sommer-2024"))):
+        status, _, complaint = run("reproduce", paper, "--out", tmp_path / "out", "--stop", "residuals")
+        assert status == 2
+        assert all(word in complaint for word in words), complaint
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow

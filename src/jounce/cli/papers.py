@@ -19,6 +19,7 @@ def reproduce(
     samples: Path | None = None,
     masses: Path | None = None,
     remove_gravity: bool = False,
+    stop: str | None = None,
 ) -> int:
     """Reproduce the figures and tables of a paper.
 
@@ -36,10 +37,14 @@ def reproduce(
         samples); negrean-2025 only.
     remove_gravity
         Take gravity off tangential samples, as an accelerometer on an arm with a level axis reads it too.
+    stop
+        What the assembly tolerances of sommer-2024's figures 4, 6, 10 and 12 bound: correction (the next one of
+        Newton-Raphson, the default) or residual (the largest one, with lengths in cm, as in the paper).
 
     Examples
     --------
       jounce reproduce sommer-2024 --out out
+      jounce reproduce sommer-2024 --out out --stop residual
       jounce reproduce negrean-2025 --out out
       jounce reproduce negrean-2025 --out out --samples a.csv --masses link.yaml
     """
@@ -52,6 +57,10 @@ def reproduce(
         message = f"{paper} needs no data of yours; negrean-2025 takes samples and masses"
         name, value = next(iter(given.items()))
         raise JounceError(message, name=f"--{name.replace('_', '-')}", value=str(value))
+    if stop is not None and paper != "sommer-2024":
+        raise JounceError(f"{paper} has no assembly tolerance; sommer-2024 has", name="--stop", value=stop)
+    if stop is not None:
+        given["stop"] = stop
     if paper == "negrean-2025":
         from jounce.papers import negrean_2025 as home
     else:

@@ -66,6 +66,12 @@ def time_history(results: Mapping[str, Results], *, name: str, quantity: str, nu
     return figure
 
 
+TOLERANCE_OF = {
+    "correction": "assembly tolerance (rad, or mechanism sizes)",
+    "residual": "assembly tolerance (largest residual, in cm)",
+}
+
+
 def tolerance_sweep(results: Mapping[str, Results], *, names: Sequence[str], number: int) -> Figure:
     """Draw the errors against the assembly tolerance, one panel per simulation (figures 4, 6, 10 and 12)."""
     title = f"Error against assembly tolerance (figure {number} of Sommer 2024)"
@@ -78,7 +84,7 @@ def tolerance_sweep(results: Mapping[str, Results], *, names: Sequence[str], num
             cases.TOLERANCES, cases.TOLERANCES, color=GRAY, linewidth=0.8, zorder=1, label="the tolerance itself"
         )
         panel.set_title(cases.VALIDATION_CASES[name].title)
-        panel.set_xlabel("assembly tolerance (rad, or mechanism sizes)")
+        panel.set_xlabel(TOLERANCE_OF[results[name].stop])
         _decades(panel.xaxis, 2)
         _decades(panel.yaxis, 2)
     axes[0, 0].set_ylabel("normalized RMSE")

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.errors import JounceError, check_choice
 from jounce.papers.sommer_2024.cases import (
     STEPS,
     TOLERANCES,
@@ -17,7 +18,9 @@ from jounce.papers.sommer_2024.cases import (
     tolerance_error,
 )
 from jounce.papers.sommer_2024.phase_lag import STEPS as LAG_STEPS, Lag, lags
+from jounce.papers.sommer_2024.residual_stop import ResidualStop
 
+STOPS = ("correction", "residual")
 RUNS = 1 + len(TOLERANCES) + len(STEPS) + len(LAG_STEPS)  # of each simulation
 
 
@@ -36,15 +39,18 @@ class Results:
         and fourth order of its acceleration.
     lags : list of Lag
         Jerk and jounce by backward differences, for each of the steps of `lag`.
+    stop : {"correction", "residual"}
+        What the tolerances of `by_tolerance` bound.
     """
 
     cycle: Cycle
     by_tolerance: Float[np.ndarray, "tolerances 4"]
     by_step: dict[str, Float[np.ndarray, "steps 2"]]
     lags: list[Lag]
+    stop: str = "correction"
 
 
-def measure(case: ValidationCase, advanced: Callable[[], None] = lambda: None) -> Results:
+def measure(case: ValidationCase, advanced: Callable[[], None] = lambda: None, *, stop: str = "correction") -> Results:
     """Run a simulation at nominal settings, over all tolerances, over all time steps, and for the lag of differences.
 
     Parameters
@@ -53,7 +59,16 @@ def measure(case: ValidationCase, advanced: Callable[[], None] = lambda: None) -
         What to run.
     advanced : callable, optional
         Called after each of the `RUNS` runs.
+    stop : {"correction", "residual"}, default "correction"
+        What the assembly tolerance bounds in the sweep of it: the next Newton-Raphson correction, as in `jounce.solve`
+        with ``refine=False``, or the largest residual with lengths in cm.
+
+    Raises
+    ------
+    JounceError
+        If there is no such rule.
     """
+    check_choice("rule", stop, STOPS, JounceError, name="stop")
     mechanism = case.load()
 
     def each(run: Callable[..., Any], settings: Iterable[float]) -> list[Any]:
@@ -65,7 +80,11 @@ def measure(case: ValidationCase, advanced: Callable[[], None] = lambda: None) -
 
     cycle = nominal_cycle(case, mechanism)
     advanced()
-    by_tolerance, by_step = each(tolerance_error, TOLERANCES), each(step_errors, STEPS)
+    stopped = tolerance_error
+    if stop == "residual":
+        sweep = ResidualStop(case)
+        stopped = lambda *run: sweep.error(run[-1])  # noqa: E731 - the case and its mechanism are known to it
+    by_tolerance, by_step = each(stopped, TOLERANCES), each(step_errors, STEPS)
     methods = {name: np.stack([errors[name] for errors in by_step]) for name in by_step[0]}
     late = each(lags, LAG_STEPS)
-    return Results(cycle, np.stack(by_tolerance), methods, [lag for pair in late for lag in pair])
+    return Results(cycle, np.stack(by_tolerance), methods, [lag for pair in late for lag in pair], stop)

@@ -4,13 +4,16 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
+from jounce.errors import JounceError, check_choice
 from jounce.papers.output import Progress, counter, csv_table, writable, write_figures, write_texts
 from jounce.papers.sommer_2024.cases import QUANTITIES, STEPS, TOLERANCES, VALIDATION_CASES, Cycle
 from jounce.papers.sommer_2024.comparison import comparison
-from jounce.papers.sommer_2024.measure import RUNS, Results, measure
+from jounce.papers.sommer_2024.measure import RUNS, STOPS, Results, measure
 
 
-def reproduce(out_directory: str | os.PathLike[str], progress: Progress | None = None) -> list[Path]:
+def reproduce(
+    out_directory: str | os.PathLike[str], progress: Progress | None = None, *, stop: str = "correction"
+) -> list[Path]:
     """Run the seven simulations of Sommer 2024 and write figures 1-13, one of the phase lag of section 7,
     the errors as CSV, and `comparison.md`.
 
@@ -20,6 +23,9 @@ def reproduce(out_directory: str | os.PathLike[str], progress: Progress | None =
         Where to write; made if it does not exist. Files of the same names are replaced.
     progress : callable, optional
         Called with the number of runs and figures done and their total.
+    stop : {"correction", "residual"}, default "correction"
+        What the tolerances of figures 4, 6, 10 and 12 bound: the next Newton-Raphson correction, or the largest
+        residual with lengths in cm, which puts the floor where the paper has it.
 
     Returns
     -------
@@ -31,17 +37,20 @@ def reproduce(out_directory: str | os.PathLike[str], progress: Progress | None =
     ------
     OutputError
         If the directory cannot be made or written to; raised before any computing.
+    JounceError
+        If there is no such rule.
 
     Examples
     --------
     >>> from jounce.papers.sommer_2024 import reproduce
     >>> paths = reproduce("out")  # doctest: +SKIP
     """
+    check_choice("rule", stop, STOPS, JounceError, name="stop")
     directory = writable(Path(out_directory))
     from jounce.papers.sommer_2024 import figures  # imports matplotlib
 
     advanced = counter(RUNS * len(VALIDATION_CASES) + len(figures.FIGURES), progress)
-    results = {name: measure(case, advanced) for name, case in VALIDATION_CASES.items()}
+    results = {name: measure(case, advanced, stop=stop) for name, case in VALIDATION_CASES.items()}
     texts = {
         "comparison.md": comparison(results),
         "errors.csv": errors_csv({name: result.cycle for name, result in results.items()}),
