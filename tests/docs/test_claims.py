@@ -30,7 +30,7 @@ def test_energy_and_power_of_a_disc():
     disc = jn.robot.from_screws([jn.robot.JointAxis([0, 0, 1], inertia=jn.Inertia(1.0, tensor=[1.0, 1.0, 1.0]))])
     for motion, words in (([2.0, 3.0, 0.5], ("12.5 J/s^2", "10 J/s^2")), ([2.0, 0.0, 0.0], ("8 J/s^2", "0 J/s^2"))):
         q = np.array([0.0, *motion])[:, None]
-        values = jn.acceleration_energy(disc, q[:3]).total[0], jn.kinetic_energy(disc, q).total[2]
+        values = jn.energy.acceleration_energy(disc, q[:3]).total[0], jn.energy.kinetic_energy(disc, q).total[2]
         for value, word in zip(values, words, strict=True):
             assert f"{value:.10g} J/s^2" == word
             assert word in text

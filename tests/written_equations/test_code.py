@@ -75,16 +75,16 @@ def own_joints():
     """Return three joints as users write them: with a root and an angle, with a choice, in space with exponentials."""
     with taken_back():
 
-        class Bearing(jn.AbstractConstraint, type="own_bearing", space="planar"):
-            point_j: jn.Vector
-            gain: jn.Scalar
+        class Bearing(jn.joints.AbstractConstraint, type="own_bearing", space="planar"):
+            point_j: jn.joints.Vector
+            gain: jn.joints.Scalar
 
             def residual(self, body_i, body_j, time):
                 d = body_j.point(self.point_j) - body_i.position
                 return jn.jet.atan2(d[1], d[0]) - self.gain * jn.jet.sqrt(d.dot(d)) - body_i.angle
 
-        class Stop(jn.AbstractConstraint, type="own_stop", space="planar"):
-            point_j: jn.Vector
+        class Stop(jn.joints.AbstractConstraint, type="own_stop", space="planar"):
+            point_j: jn.joints.Vector
 
             def residual(self, body_i, body_j, time):
                 d = body_j.point(self.point_j) - body_i.position
@@ -94,15 +94,17 @@ def own_joints():
                     for a, b in zip((d[1] ** 3).coefficients, jn.jet.sin(d[0]).coefficients, strict=True)
                 )
 
-        class Decay(jn.AbstractConstraint, type="own_decay", space="spatial"):
-            point_i: jn.Vector
-            axis_i: jn.Vector
-            rate: jn.Scalar
+        class Decay(jn.joints.AbstractConstraint, type="own_decay", space="spatial"):
+            point_i: jn.joints.Vector
+            axis_i: jn.joints.Vector
+            rate: jn.joints.Scalar
 
             def residual(self, body_i, body_j, time):
                 d = body_j.position - body_i.point(self.point_i)
                 along = body_i.direction(self.axis_i).dot(d)
-                return jn.rows(jn.jet.exp(-self.rate * along) - d.dot(d), jn.jet.tanh(along) / (1.5 + along**2) - time)
+                return jn.joints.rows(
+                    jn.jet.exp(-self.rate * along) - d.dot(d), jn.jet.tanh(along) / (1.5 + along**2) - time
+                )
 
         bodies = ("one", "two")
         return {
@@ -122,9 +124,9 @@ def test_joints_of_ones_own(space):
 
 
 LAWS = {
-    "samples": jn.SplineMotion(np.linspace(0, 2, 30), np.sin(3 * np.linspace(0, 2, 30))),
-    "repeated": jn.SplineMotion(np.linspace(0, 1, 30), np.sin(2 * np.pi * np.linspace(0, 1, 30)), 5, "repeat"),
-    "pieces": jn.PiecewiseMotion(["t**4", "2*t - 1", "0.4*cos(t)"], until=[0.5, 1.1]),
+    "samples": jn.laws.SplineMotion(np.linspace(0, 2, 30), np.sin(3 * np.linspace(0, 2, 30))),
+    "repeated": jn.laws.SplineMotion(np.linspace(0, 1, 30), np.sin(2 * np.pi * np.linspace(0, 1, 30)), 5, "repeat"),
+    "pieces": jn.laws.PiecewiseMotion(["t**4", "2*t - 1", "0.4*cos(t)"], until=[0.5, 1.1]),
     "function": lambda t: jnp.where(t < 0.7, jnp.sin(t) ** 3, jnp.abs(t - 2) * jnp.exp(-t)),
     "formula": "0.3*atan2(sin(t), 2 + cos(t)) + abs(t - 1)**2.5 + sign(t - 1) - sqrt(1 + t)*tanh(t)",
 }
@@ -215,7 +217,7 @@ def test_names_that_no_language_allows():
     assert differences(code, equations).max() < ROUNDING
 
 
-class Endless(jn.AbstractConstraint):
+class Endless(jn.joints.AbstractConstraint):
     def residual(self, body_i, body_j, time):
         import jax
 

@@ -25,7 +25,7 @@ from jounce.kinematics import Motion, solve
 from jounce.kinematics.continuation.jacobian_factors import factored
 from jounce.mechanism import Mechanism
 from jounce.mechanism.system import System
-from jounce.papers.sommer_2024.cases import MECHANISMS, QUANTITIES, ValidationCase, nominal_time, normalised_rmse
+from jounce.papers.sommer_2024.cases import MECHANISMS, QUANTITIES, ValidationCase, nominal_time, normalized_rmse
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
@@ -57,7 +57,7 @@ class ResidualStop:
         self.right = case.explicit(mechanism, self.time)
 
     def error(self, tolerance: float) -> Float[np.ndarray, "4"]:
-        """Return the normalised RMSE of velocity to jounce, with the largest residual within a tolerance.
+        """Return the normalized RMSE of velocity to jounce, with the largest residual within a tolerance.
 
         Parameters
         ----------
@@ -65,7 +65,7 @@ class ResidualStop:
             Of residuals in the paper's units: cm, cm^2, rad and products of unit vectors.
         """
         computed = self.angle(tolerance)
-        return normalised_rmse(computed, self.right)[1:]
+        return normalized_rmse(computed, self.right)[1:]
 
     def angle(self, tolerance: float) -> Float[np.ndarray, "time 5"]:
         """Return the output angle and its derivatives to jounce, rad by s."""
