@@ -19,7 +19,7 @@ from jounce.cli import main
 from jounce.cli.compiled_programs import keep_programs
 from jounce.constraints import base
 from jounce.errors import OutputError
-from jounce.execution.rehearsal import NAME
+from jounce.execution.background import NAME
 from jounce.private_folder import PrivateFolder
 from tests.precision import watched
 from tests.shares_of_tests import pytest_addoption, pytest_collection_modifyitems  # noqa: F401 - found here by pytest
@@ -40,7 +40,7 @@ _as_users = os.environ.get("JOUNCE_TESTS_AS_USERS") == "1"
 if not _as_users:
     os.environ.setdefault("XLA_FLAGS", " ".join(_QUICK_TO_COMPILE))
 # There is a worker for each core: threads beside it take a sixth more time of the processor, as two work on the same
-# memory and ask for the same lock. Tests of threads and of rehearsals ask for two; the examples run with all cores.
+# memory and ask for the same lock. Tests of threads ask for two; the examples run with all cores.
 if not _as_users:
     os.environ.setdefault("JOUNCE_THREADS", "1")
 os.environ["JOUNCE_CACHE_DIR"] = ""  # tests leave the folder of the user alone

@@ -397,13 +397,13 @@ def test_a_cache_that_cannot_be_made_does_no_harm(tmp_path):
     assert error == "error: none.yaml: file not found"
 
 
-@pytest.mark.parametrize("rehearsing", [False, True])
-def test_a_command_that_fails_waits_for_no_program_that_is_compiled_beside(monkeypatch, rehearsing):
+@pytest.mark.parametrize("compiling", [False, True])
+def test_a_command_that_fails_waits_for_no_program_that_is_compiled_beside(monkeypatch, compiling):
     ended = []
     monkeypatch.setattr("sys.argv", ["jounce", "run", "examples/no_such_file.yaml"])
-    monkeypatch.setattr("jounce.execution.rehearsal.is_rehearsing", lambda: rehearsing)
+    monkeypatch.setattr("jounce.execution.background.is_compiling", lambda: compiling)
     monkeypatch.setattr("jounce.cli.end_on_signals", lambda: None)
     monkeypatch.setattr("jounce.cli.gc", SimpleNamespace(freeze=lambda: None, set_threshold=lambda _: None))
     monkeypatch.setattr("jounce.cli.os._exit", ended.append)
     assert main() == 2
-    assert ended == [2] * rehearsing
+    assert ended == [2] * compiling

@@ -140,11 +140,11 @@ def _settings() -> AbstractContextManager[Any]:
 
 def _end_at_once(status: int) -> None:
     """End the process without waiting for programs that threads still compile, which nobody wants any more."""
-    if "jounce.execution.rehearsal" not in sys.modules:
+    if "jounce.execution.background" not in sys.modules:
         return
-    from jounce.execution.rehearsal import is_rehearsing
+    from jounce.execution.background import is_compiling
 
-    if is_rehearsing():
+    if is_compiling():
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)

@@ -19,10 +19,11 @@ import numpy as np
 from jax.core import Tracer
 from jax.experimental import serialize_executable
 
+from jounce.execution.background import ByKey
 from jounce.execution.device import on_processor
 from jounce.execution.store import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
 from jounce.execution.structure import UndescribedError, program_key, settings
-from jounce.execution.translated import Translated
+from jounce.execution.translated import Translated, shaped
 from jounce.jax_internals import description_reader, runs_at_once, without_sources
 from jounce.settings import check_process, under_own_settings
 
@@ -61,26 +62,6 @@ def _store_of_xla() -> Store | None:
     config: Any = jax.config
     elsewhere = config.jax_compilation_cache_dir is not None and not _asked
     return None if elsewhere or config.jax_default_device is not None else current_store()
-
-
-class StoppedError(Exception):
-    """What this thread compiles is of no use any more."""
-
-
-def check_wanted() -> None:
-    """Raise StoppedError where what this thread compiles is of no use any more."""
-    if (enough := getattr(_thread, "enough", None)) is not None and enough.is_set():
-        raise StoppedError
-
-
-@contextmanager
-def stopped_by(event: threading.Event) -> Iterator[None]:
-    """Have this thread raise StoppedError in the place of a program that it wants after an event."""
-    _thread.enough = event
-    try:
-        yield
-    finally:
-        del _thread.enough
 
 
 UNENDING = ("simplify-while-loops", "while-loop-invariant-code-motion", "while-loop-constant-sinking", "reshape-mover")
@@ -165,7 +146,7 @@ class Compiled:
     ):
         self.function, self.static, self.made_of = function, static, made_of or (function,)
         self.narrow, self.brief = narrow, brief
-        self._programs: dict[Any, Callable[..., Any]] = {}
+        self._programs = ByKey()
         self._suits_alone, self._otherwise = alone, dict(otherwise or {})
         self.machine_code = Translated(function, self.made_of, alone=True)
         self._names = tuple(inspect.signature(function).parameters)
@@ -187,67 +168,113 @@ class Compiled:
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
         """Call the compiled function."""
         check_process()
-        check_wanted()
-        keywords |= zip(self._names[self._traced :], arguments[self._traced :], strict=False)
-        arguments = arguments[: self._traced]
-        static = {name: keywords.pop(name) for name in self.static if name in keywords}
-        leaves, tree = jax.tree.flatten((arguments, keywords))
+        arguments, keywords, static, leaves, tree = self._parts(arguments, keywords)
         traced = [leaf for leaf in leaves if isinstance(leaf, Tracer)]
-        suits = self._suits_alone if not traced else False
-        suits = suits if isinstance(suits, bool) else suits(*arguments, **keywords, **static)
-        if suits:
-            arrays = [np.asarray(leaf) for leaf in leaves]
-            hasty = is_wanted_soon()
-            code = self.machine_code.program((arrays, tree), ((), _NOTHING), static, large=LARGE, hasty=hasty)
-            if code is not None:
-                return code(arrays)
+        if not traced and (code := self._code(arguments, keywords, static, leaves, tree)) is not None:
+            return code([np.asarray(leaf) for leaf in leaves])
         static |= self._otherwise
         if traced:
             whole = self.jitted if all(map(runs_at_once, traced)) else self._within
             return whole(*arguments, **keywords, **static)
-        if (store := _store_of_xla()) is None:
+        if (program := self._by_xla(arguments, keywords, static, leaves, tree)) is None:
             return self.jitted(*arguments, **keywords, **static)
-        kinds = tuple(map(_kind, leaves))
-        if None in kinds:
-            return self.jitted(*arguments, **keywords, **static)
+        return program(*arguments, **keywords)
+
+    @under_own_settings
+    def prepare(self, *arguments: Any, **keywords: Any) -> None:
+        """Make the program for arrays of these shapes, or `jax.ShapeDtypeStruct` in their places, unless it is there.
+
+        Where `jax.jit` does everything, it compiles when it is called.
+        """
+        arguments, keywords, static, leaves, tree = self._parts(arguments, keywords)
+        if self._code(arguments, keywords, static, leaves, tree) is None:
+            self._by_xla(arguments, keywords, static | self._otherwise, leaves, tree)
+
+    def _parts(self, arguments: tuple[Any, ...], keywords: dict[str, Any]) -> tuple[Any, Any, dict[str, Any], Any, Any]:
+        """Return the arguments without static ones, these, and the leaves and the structure of the others."""
+        keywords |= zip(self._names[self._traced :], arguments[self._traced :], strict=False)
+        arguments = arguments[: self._traced]
+        static = {name: keywords.pop(name) for name in self.static if name in keywords}
+        return arguments, keywords, static, *jax.tree.flatten((arguments, keywords))
+
+    def _code(self, arguments: Any, keywords: Any, static: Mapping[str, Any], leaves: list[Any], tree: Any) -> Any:
+        """Return machine code for arguments, None where there is none, or it does not suit them."""
+        suits = self._suits_alone
+        if not (suits if isinstance(suits, bool) else suits(*arguments, **keywords, **static)):
+            return None
+        given, hasty = (list(map(shaped, leaves)), tree), is_wanted_soon()
+        return self.machine_code.program(given, ((), _NOTHING), static, large=LARGE, hasty=hasty)
+
+    def _by_xla(
+        self, arguments: Any, keywords: Any, static: Mapping[str, Any], leaves: list[Any], tree: Any
+    ) -> Callable[..., Any] | None:
+        """Return the program of XLA for arguments, None where `jax.jit` has it."""
+        store, kinds = _store_of_xla(), tuple(map(_kind, leaves))
+        if store is None or None in kinds:
+            return None
         told = tuple((name, type(value), value) for name, value in static.items())
         key = tree, kinds, told, self._level(), settings()
-        if (program := self._programs.get(key)) is not None:
-            return program(*arguments, **keywords)
-        self._programs[key], results = self._begun(store, tree, kinds, arguments, keywords, static)
-        return results
+        return self._programs.get(key, lambda: self._made(store, tree, kinds, arguments, keywords, static))
 
     def _level(self) -> int | None:
         """Return how much LLVM is to optimize, where that is less than it does otherwise."""
         hasty = self.brief and is_wanted_soon() and on_processor() and not _level_is_set()
         return 0 if hasty and "xla_backend_optimization_level" in _known_options() else None
 
-    def _begun(
+    def _made(
         self, store: Store, tree: Any, kinds: tuple[Any, ...], arguments: Any, keywords: Any, static: Mapping[str, Any]
-    ) -> tuple[Callable[..., Any], Any]:
-        """Return a program from the store, or one that is compiled, and kept there if it has a name; and its results.
-
-        A program from the store has run to its end before it is trusted.
-        """
+    ) -> Callable[..., Any]:
+        """Return a program from the store, or one that is compiled, and kept there if it has a name."""
         level = self._level()
         try:
             key = program_key(self.made_of, tree, (*kinds, level), static)
         except UndescribedError:
-            program = partial(self.jitted, **static)
-            return program, program(*arguments, **keywords)
-        if (kept := store.get(key)) is not None:
-            try:
-                program = _unpacked(kept, tree)
-                return program, jax.block_until_ready(program(*arguments, **keywords))
-            except Exception:  # noqa: BLE001 - whatever is wrong with it, it is compiled again
-                store.drop(key)
-        with compiling_anew():
-            lowered = self.jitted.lower(*arguments, **keywords, **static)
-            without_sources(lowered.compiler_ir())
-            program = lowered.compile(None if level is None else {"xla_backend_optimization_level": level})
-        if (content := _packed(program, tree)) is not None:
-            store.put(key, content)
-        return program, program(*arguments, **keywords)
+            return partial(self.jitted, **static)
+
+        def compiled_anew() -> Callable[..., Any]:
+            with compiling_anew():
+                lowered = self.jitted.lower(*arguments, **keywords, **static)
+                without_sources(lowered.compiler_ir())
+                program = lowered.compile(None if level is None else {"xla_backend_optimization_level": level})
+            if (content := _packed(program, tree)) is not None:
+                store.put(key, content)
+            return program
+
+        def replaced() -> Callable[..., Any]:
+            store.drop(key)
+            return compiled_anew()
+
+        if (kept := store.get(key)) is None:
+            return compiled_anew()
+        try:
+            return _OnTrial(_unpacked(kept, tree), replaced)
+        except Exception:  # noqa: BLE001 - whatever is wrong with it, it is compiled again
+            return replaced()
+
+
+class _OnTrial:
+    """A program from a store, which has run to its end before it is trusted.
+
+    Parameters
+    ----------
+    program : callable
+    replaced : callable
+        Returns the same, compiled again, whatever is wrong with that one.
+    """
+
+    def __init__(self, program: Callable[..., Any], replaced: Callable[[], Callable[..., Any]]):
+        self._program, self._replaced = program, replaced
+
+    def __call__(self, *arguments: Any, **keywords: Any) -> Any:
+        if self._replaced is None:
+            return self._program(*arguments, **keywords)
+        try:
+            results = jax.block_until_ready(self._program(*arguments, **keywords))
+        except Exception:  # noqa: BLE001 - see there
+            self._program = self._replaced()
+            results = self._program(*arguments, **keywords)
+        self._replaced = None
+        return results
 
 
 def _packed(program: Any, tree: Any) -> bytes | None:
@@ -273,7 +300,7 @@ def _unpacked(content: bytes, tree: Any) -> Callable[..., Any]:
 
 def _kind(leaf: Any) -> tuple[Any, ...] | None:
     """Return what JAX compiles for in place of a value; None for what it traces, or what is on another device."""
-    if type(leaf) is np.ndarray or isinstance(leaf, np.generic):
+    if type(leaf) is np.ndarray or isinstance(leaf, np.generic | jax.ShapeDtypeStruct):
         return leaf.shape, str(leaf.dtype), False
     if type(leaf) in (bool, int, float):
         return (type(leaf).__name__,)

@@ -22,7 +22,7 @@ from jounce.execution.device import on_processor
 from jounce.execution.llvm.programs import Program
 from jounce.execution.llvm.text.scalars import MOST_LINES
 from jounce.execution.threads import Threads
-from jounce.execution.translated import Translated
+from jounce.execution.translated import Translated, shaped
 from jounce.settings import under_own_settings
 from jounce.shapes import is_traced
 
@@ -54,6 +54,9 @@ class OnLlvm:
         with Threads(threads, compiled=True) as pool:
             parts = 4 * threads  # none is to wait long for another
             return self.machine_code(self.shared, leaves, parts, pool.map)
+
+    def prepare(self, lanes: Any, count: int) -> None:
+        """Do nothing: the code serves any number of instants."""
 
     def rounds(self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"]) -> Rounds:
         """Return what solves instants in rounds, of which later ones start from the results of earlier ones.
@@ -125,9 +128,7 @@ class OnXla:
         axis = 0 if self.mapped.rows else -1
         lanes = jax.tree.map(np.asarray, lanes)
         count = jax.tree.leaves(lanes)[0].shape[axis]
-        small, *middle, large = self.mapped.widths if on_processor() else (SIDE_BY_SIDE, GPU_WIDTH)
-        # half of a large block at least is in use, so that no more than twice is computed
-        width = small if count <= small else middle[0] if middle and count <= large // 2 else large
+        width = self._block_width(count)
 
         def computed(first: int) -> Any:
             places = np.minimum(np.arange(first, first + width), count - 1)
@@ -142,6 +143,22 @@ class OnXla:
             return joined[:count] if axis == 0 else joined[..., :count]
 
         return jax.tree.map(whole, *parts)
+
+    def prepare(self, lanes: Any, count: int) -> None:
+        """Make the program for so many instants, of which some are given, or their shapes and types."""
+
+        def block(leaf: Any) -> jax.ShapeDtypeStruct:
+            one = leaf.shape[1:] if self.mapped.rows else leaf.shape[:-1]
+            return jax.ShapeDtypeStruct((width, *one) if self.mapped.rows else (*one, width), leaf.dtype)
+
+        width = self._block_width(count)
+        self.mapped.on_xla.prepare(self.shared, jax.tree.map(block, lanes), self.how)
+
+    def _block_width(self, count: int) -> int:
+        """Return how many instants of so many are computed in one call."""
+        small, *middle, large = self.mapped.widths if on_processor() else (SIDE_BY_SIDE, GPU_WIDTH)
+        # half of a large block at least is in use, so that no more than twice is computed
+        return small if count <= small else middle[0] if middle and count <= large // 2 else large
 
     def rounds(self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"]) -> Rounds:
         """Return what solves instants in rounds, as that of `OnLlvm`; the arrays are written when all are solved."""
@@ -239,7 +256,7 @@ class Mapped:
         Parameters
         ----------
         shared, lanes : pytree
-            Of arrays, as the function has them.
+            Of arrays, or of their shapes and types, as the function has them.
         large : int, optional
             Arrays of more numbers are in memory in machine code, as `object_file` has it.
         hasty : bool, default False
@@ -252,7 +269,7 @@ class Mapped:
         leaves, structure = jax.tree.flatten(shared)
         few, form = jax.tree.flatten(lanes)
         if not is_traced([*leaves, *few]):
-            arrays, parts = [np.asarray(leaf) for leaf in leaves], [np.asarray(leaf) for leaf in few]
+            arrays, parts = list(map(shaped, leaves)), list(map(shaped, few))
             code = self.machine_code.program((arrays, structure), (parts, form), static, large=large, hasty=hasty)
             if code is not None:
                 return OnLlvm(code, arrays)

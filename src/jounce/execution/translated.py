@@ -15,6 +15,7 @@ import jax
 import numpy as np
 
 from jounce.execution.backends import is_wanted, tell_missing
+from jounce.execution.background import ByKey
 from jounce.execution.llvm.modules import object_file
 from jounce.execution.llvm.programs import Program, Single
 from jounce.execution.llvm.text.scalars import MOST_LINES
@@ -22,8 +23,13 @@ from jounce.execution.llvm.text.values import NoRuleError, UnsupportedOperationE
 from jounce.execution.store import current_store, made_or_kept
 from jounce.execution.structure import UndescribedError, program_key, settings
 
-Group = tuple[Sequence[np.ndarray], Any]  # the leaves of a tree, and its structure
+Group = tuple[Sequence[np.ndarray | jax.ShapeDtypeStruct], Any]  # leaves of a tree, or their forms, and its structure
 _thread = threading.local()
+
+
+def shaped(leaf: Any) -> Any:
+    """Return an array of NumPy, or what tells the shape and the type of one as it is."""
+    return leaf if isinstance(leaf, jax.ShapeDtypeStruct) else np.asarray(leaf)
 
 
 def is_traced_alone() -> bool:
@@ -60,8 +66,7 @@ class Translated:
     ):
         self.function, self.made_of = function, made_of
         self._alone, self._rows, self._most_lines = alone, rows, most_lines
-        self._programs: dict[Any, Single | Program | str | None] = {}
-        self._lock = threading.Lock()
+        self._programs = ByKey()
 
     def __len__(self) -> int:
         """How many programs were wanted, those that there is no code for included."""
@@ -77,7 +82,7 @@ class Translated:
         Parameters
         ----------
         shared, lanes : tuple
-            The leaves of what is given, and its structure.
+            The leaves of what is given, or their shapes and types, and its structure.
         static : mapping
             Further arguments of the function.
         large : int, optional
@@ -90,18 +95,17 @@ class Translated:
         (arrays, structure), (few, form) = shared, lanes
         kinds = tuple([(x.shape, x.dtype) for x in arrays])
         ones = tuple([(self._one(x.shape), x.dtype) for x in few])
-        places = {} if self._alone else {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
+        places: Any = {} if self._alone else {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
         known = tuple([x.tobytes() for x in places.values()])
         told = tuple([(name, type(value), value) for name, value in static.items()])
         key = structure, form, kinds, ones, known, large, hasty, told, settings()
-        if key not in self._programs:
-            with self._lock:
-                if key not in self._programs:
-                    parts = zip((structure, form), (kinds, ones), strict=True)
-                    given = [jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(*x) for x in its]) for tree, its in parts]
-                    how = {"large": large, "hasty": hasty}
-                    self._programs[key] = self._made((given[0], given[1]), places, how, static)
-        program = self._programs[key]
+
+        def make() -> Any:
+            parts = zip((structure, form), (kinds, ones), strict=True)
+            given = [jax.tree.unflatten(tree, [jax.ShapeDtypeStruct(*x) for x in its]) for tree, its in parts]
+            return self._made((given[0], given[1]), places, {"large": large, "hasty": hasty}, static)
+
+        program = self._programs.get(key, make)
         if isinstance(program, str):
             tell_missing(program)
             return None

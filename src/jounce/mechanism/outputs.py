@@ -61,6 +61,10 @@ class AbstractMotionOutput(AbstractQuantity):
     def coefficients(self, motion: Any) -> Any:
         """Return the Taylor coefficients of the quantity at all instants, shape (order + 1, components, time)."""
 
+    def prepare(self, motion: Any) -> None:
+        """Make programs that any motion of such a form needs, unless they are there; none in general."""
+        del motion
+
     def remark(self, motion: Any, values: Any) -> str:
         """Return what is to be said of plain derivatives, time first, such as why they are NaN; nothing in general."""
         del motion, values

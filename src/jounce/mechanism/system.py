@@ -221,6 +221,12 @@ class System(Module):
         """Number of rows and columns of the Jacobian."""
         return self.pattern.shape
 
+    @property
+    def rank_is_open(self) -> bool:
+        """Whether constraints are redundant by a number that only the assembled bodies show; programs depend on it."""
+        rows, columns = self.shape
+        return rows > columns and self.rank is None
+
     def residual(self, pose: Pose, time: Jet) -> Float[Jet, "row batch"]:
         """Return the residuals of all constraints, shape (rows, batch), scaled."""
         if not self.groups:  # bodies that fly freely

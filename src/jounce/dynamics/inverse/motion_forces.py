@@ -96,45 +96,60 @@ class MotionForces:
         self.flanks = known
         return found
 
+    def prepare(self) -> None:
+        """Make machine code that balances loads, of any motion of this form."""
+        cases, rows = 1 + self._looks_for_open, len(self.model.rows)
+        choice = np.zeros(rows), np.zeros(cases), np.zeros((cases, rows))
+        self._balancing_code(None if self.model.system.rank is None else choice)
+
     def _balanced(self, flanks: teeth.Flanks) -> Float[Numbers, "case level row time"]:
         """Return what balances the loads, and balances none, with flanks that teeth press on."""
         self.flanks = flanks
-        system = dataclasses.replace(self._bare, outputs=())
-        nothing = Pattern.of((), (), system.pattern.width, system.body_count)
-        unjoined = dataclasses.replace(
-            system, groups=(), pattern=nothing, row_scale=np.zeros((0, 1)), rank=None, fronts=None
-        )
-        square = system.shape[0] == system.shape[1]
-        choice = None if system.rank is None else self._choice
-        angles = [group.element.datum.near for group in self.forces if measures_angle(group)]
-
-        def lanes_of(lanes: np.ndarray) -> Any:
-            bodies = self.coordinates_at(None, lanes, self.levels + 2)
-            turned, pressed = (tuple(x[..., lanes] for x in each) for each in (angles, flanks.values()))
-            return bodies, turned, pressed, self.motion.time[lanes]
-
-        first = np.zeros(1, int)
-        loaded = dataclasses.replace(unjoined, forces=at_lanes(self.forces, first))  # angles come with each instant
-        shared, one = (system, loaded, self.masses, self.gravity, choice), lanes_of(first)
-        code = programs.balance_of_instant(shared, one, self.pose_type)
+        square = self.model.system.shape[0] == self.model.system.shape[1]
+        choice = None if self.model.system.rank is None else self._choice
+        code = self._balancing_code(choice)
 
         def chunk(lanes: np.ndarray) -> Any:
             if code is not None:
-                found, finite = code(lanes_of(lanes))
+                found, finite = code(self._lanes(lanes))
                 self._check_finite(finite, lanes)
                 return found
-            blocks, (bodies, *_, instants) = self._blocks(lanes), lanes_of(lanes)
-            forces = dataclasses.replace(unjoined, forces=at_lanes(self.forces, lanes))
+            blocks, (bodies, *_, instants) = self._blocks(lanes), self._lanes(lanes)
+            forces = self._loaded(lanes)
             load, finite = programs.body_loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
             self._check_finite(finite, lanes)
             if choice is not None:
-                return programs.least_multipliers(system, blocks, load, *choice)
+                return programs.least_multipliers(self._joined, blocks, load, *choice)
             still = None if square else self.coordinates_at(None, lanes, 1)
-            return programs.multipliers(system, blocks, load, still, self.masses, self.pose_type)[None]
+            return programs.multipliers(self._joined, blocks, load, still, self.masses, self.pose_type)[None]
 
         found = self.in_chunks(chunk)
         self.check_finite(found[0])
         return found
+
+    def _balancing_code(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
+        """Return what `balance_of_instant` does, for a choice among multipliers of redundant rows."""
+        first = np.zeros(1, int)
+        shared = self._joined, self._loaded(first), self.masses, self.gravity, choice
+        return programs.balance_of_instant(shared, self._lanes(first), self.pose_type)
+
+    def _lanes(self, lanes: np.ndarray) -> Any:
+        """Return what a balance takes of some instants."""
+        bodies = self.coordinates_at(None, lanes, self.levels + 2)
+        angles = [group.element.datum.near for group in self.forces if measures_angle(group)]
+        turned, pressed = (tuple(x[..., lanes] for x in each) for each in (angles, self.flanks.values()))
+        return bodies, turned, pressed, self.motion.time[lanes]
+
+    @property
+    def _joined(self) -> Any:
+        """The system with joints and drivers, without their laws."""
+        return dataclasses.replace(self._bare, outputs=())
+
+    def _loaded(self, lanes: np.ndarray) -> Any:
+        """Return the system with forces at some instants, whose angles are given with each, and nothing that joins."""
+        nothing = Pattern.of((), (), self._bare.pattern.width, self._bare.body_count)
+        free = {"groups": (), "pattern": nothing, "row_scale": np.zeros((0, 1)), "rank": None, "fronts": None}
+        return dataclasses.replace(self._joined, forces=at_lanes(self.forces, lanes), **free)
 
     @property
     def _choice(self) -> tuple[Numbers, Numbers, Numbers]:

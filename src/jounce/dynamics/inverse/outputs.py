@@ -43,6 +43,10 @@ class AbstractForceOutput(AbstractMotionOutput):
         check_loads(mechanism, self.source)
         self._check_named(known[name])
 
+    def prepare(self, motion: Motion) -> None:
+        """Make the program of the balance of forces."""
+        MotionForces.of(motion).prepare()
+
     def _check_named(self, element: Any) -> None:
         """Raise MechanismError unless the quantity is one of what is named."""
 

@@ -1,8 +1,6 @@
 """The module of LLVM that computes a function of JAX: its text, and its machine code."""
 
-import threading
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import jax
@@ -22,7 +20,6 @@ from jounce.jax_internals import in_plain_operations, is_tried
 
 MOST_MEMORY = 2**20  # bytes of the stack: threads have little
 MOST_HEAP = 2**30  # bytes elsewhere
-_thread = threading.local()
 ATTRIBUTES = """attributes #0 = { nounwind willreturn memory(none) }
 attributes #2 = { nounwind willreturn memory(none) "min-legal-vector-width"="512" "prefer-vector-width"="512" }
 attributes #1 = { nounwind "min-legal-vector-width"="512" "prefer-vector-width"="512" }
@@ -78,18 +75,7 @@ def object_file(
         if is_tried():
             raise
         raise UnsupportedOperationError(f"JAX {jax.__version__}, which was not tried: {failure!r}") from failure
-    getattr(_thread, "written", lambda: None)()
     return compiled(text, hasty=hasty), results
-
-
-@contextmanager
-def telling(written: Callable[[], None]) -> Iterator[None]:
-    """Call a function whenever this thread has written a module, which LLVM then compiles without Python's lock."""
-    _thread.written = written
-    try:
-        yield
-    finally:
-        del _thread.written
 
 
 def _text(

@@ -148,7 +148,7 @@ def begin_march(equations: Equations, state: State, time: Lanes, *, order: int) 
 
 def _is_one(_: Equations, current: IntegratorState, *__: Any, **___: Any) -> bool:
     """Tell whether there is one run."""
-    return len(current.time) == 1
+    return current.time.shape[0] == 1
 
 
 @compiled("count", "keep", alone=_is_one)
@@ -275,12 +275,12 @@ def march(
             previous = jax.tree.map(lambda k, s: jax.lax.dynamic_update_index_in_dim(k, s, tried, 0), previous, steps)
         return current, previous, tried + 1
 
-    previous = _blank(method, current, count) if keep else None
+    previous = room_for_steps(method, current, count) if keep else None
     start = (current, previous, 0)
     return jax.lax.while_loop(unfinished, iterate, start)
 
 
-def _blank(
+def room_for_steps(
     method: AbstractMethod, current: IntegratorState, count: int
 ) -> tuple[DenseOutput, Bool[Numbers, "steps batch"]]:
     """Return room for steps and whether they were taken."""

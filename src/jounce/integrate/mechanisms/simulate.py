@@ -17,8 +17,7 @@ from jounce.execution.backends import backend_of, joined
 from jounce.execution.compilation import compiled
 from jounce.execution.store import expect
 from jounce.integrate.marching.marching import MOVING, STUCK, DenseOutput, IntegratorState, Outcome, march, unexpanded
-from jounce.integrate.marching.user_methods import integrator
-from jounce.integrate.mechanisms.programs_ahead import STEPS, ProgramsAhead
+from jounce.integrate.mechanisms.programs_ahead import march_arguments, prepare_run
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.results.sensitivities import traced_simulation
 from jounce.integrate.results.simulation import Simulation
@@ -31,7 +30,7 @@ from jounce.jet import Jet
 from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.position_analysis.curve_ends import beyond_end, ends_of
 from jounce.kinematics.results.motion import check_output, output_group
-from jounce.mechanism import Mechanism, ParameterOutput, ParametersOutput, check_mechanism
+from jounce.mechanism import Mechanism, Model, ParameterOutput, ParametersOutput, check_mechanism
 from jounce.mechanism.element_indices import force_names
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete_or
@@ -187,14 +186,18 @@ def simulate(
     for event in events:
         _check_event(event, mechanism)
     first = float(instants[0])
-    with ProgramsAhead(mechanism, instants, order, method, float(tolerance), float(longest_step)) as ahead:
-        start = consistent_start(mechanism, first, ahead.begin)
-        _check_forces(start, first)
-        _check_ends(start, first)
-        watched = [*events, *_events_at_ends(start)]
-        detectors = [_detector_of(event, mechanism, start) for event in watched]
-        ahead.go_on(start)
-    run = _Run(start, method, float(tolerance), float(longest_step), detectors)
+    limits = float(tolerance), float(longest_step)
+
+    def prepare(model: Model) -> None:
+        prepare_run(mechanism, model, instants, order, method, limits)
+
+    start = consistent_start(mechanism, first, prepare)
+    _check_forces(start, first)
+    _check_ends(start, first)
+    watched = [*events, *_events_at_ends(start)]
+    detectors = [_detector_of(event, mechanism, start) for event in watched]
+    prepare(start.model)
+    run = _Run(start, method, limits, detectors)
     run.go(instants, progress)
     run.note_ends(len(events))
     outcome = run.ending, run.events.happened[: len(events)], joined(run.backends)
@@ -313,11 +316,10 @@ class _Run:
         self,
         start: ConsistentStart,
         method: AbstractMethod,
-        tolerance: float,
-        longest: float,
+        limits: tuple[float, float],
         detectors: Sequence[EventDetector],
     ):
-        self.start, self.method, self.tolerance, self.longest = start, method, tolerance, longest
+        self.start, self.method, self.limits = start, method, limits
         self.events = EventLog(detectors)
         self.parts: list[DenseOutput] = []
         self.ending = (Status.OK, "")
@@ -333,10 +335,9 @@ class _Run:
         """March from the first to the last instant."""
         equations, stop = self.start.equations, instants[-1]
         self.direction = direction = np.sign(instants[-1] - instants[0])
-        order = self.method.expansion_order(self.tolerance)
+        order = self.method.expansion_order(self.limits[0])
         current = unexpanded(equations, self.start.state, instants[:1], order=order)
-        method = integrator(self.method, equations, current)
-        how, options = (stop, self.tolerance, self.longest), {"method": method, "count": STEPS}
+        (_, _, *how), options = march_arguments(equations, current, stop, self.limits, self.method)
         while current.outcome.item() in GOING and self.events.stopped_at is None:
             current, steps, attempts = march(equations, current, *how, **options)
             output, taken = steps

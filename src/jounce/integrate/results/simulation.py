@@ -3,6 +3,7 @@
 from functools import cached_property
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -15,7 +16,7 @@ from jounce.errors import MechanismError
 from jounce.execution.backends import joined
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
-from jounce.execution.mapped import mapped
+from jounce.execution.mapped import OnLlvm, OnXla, mapped
 from jounce.execution.store import is_wanted_soon
 from jounce.integrate.marching.marching import DenseOutput
 from jounce.integrate.marching.smoothness_breaks import breaks
@@ -266,17 +267,29 @@ def motion_at(
     order: int,
 ) -> tuple[Any, str]:
     """Return what `expanded` does at instants in chosen steps, all of them, and what computes it."""
-    shared = equations, outputs
 
     def lanes_of(lanes: np.ndarray) -> Any:
         steps, now = chosen[lanes], instants[lanes]
         polynomial = dense.polynomial.map(lambda part: part[steps].transpose(1, 2, 3, 0))
         return tuple(part[steps].T for part in dense.angles), polynomial, now - dense.start[steps], now
 
-    example = lanes_of(np.zeros(1, int))
-    program = expanded.program(shared, example, large=LARGE, hasty=is_wanted_soon(), order=order)
+    program, _ = expansion_program(equations, outputs, dense, order)
     values = in_chunks(lambda lanes: program(lanes_of(lanes)), len(instants), (FEW_INSTANTS, *WIDTHS))
     return values, program.backend
+
+
+def expansion_program(
+    equations: Equations, outputs: tuple[Group, ...], dense: DenseOutput, order: int
+) -> tuple[OnLlvm | OnXla, Any]:
+    """Return what runs `expanded` at instants within steps of a form, and the form of the arguments of an instant."""
+
+    def one(part: Any, axes: slice) -> jax.ShapeDtypeStruct:
+        return jax.ShapeDtypeStruct((*part.shape[axes], 1), float)
+
+    polynomial, now = dense.polynomial.map(lambda part: one(part, slice(1, 4))), jax.ShapeDtypeStruct((1,), float)
+    lanes = tuple(one(part, slice(1, 2)) for part in dense.angles), polynomial, now, now
+    how: Any = {"large": LARGE, "hasty": is_wanted_soon(), "order": order}
+    return expanded.program((equations, outputs), lanes, **how), lanes
 
 
 @mapped(widths=(FEW_INSTANTS, *WIDTHS), narrow=True)

@@ -114,9 +114,10 @@ class Solver:
         way = way._replace(next_up=np.zeros((), int))
         return self._take_steps(way, grid, _limits(stop, smallest), self._batches, survey=True)
 
-    def prepare(self, guess: SolvedState, instant: float) -> None:
-        """Have the program of runs compiled; nothing is solved."""
-        self._take_steps(self.beginning(guess, instant), NO_GRID, _limits(instant, 0.0), 0, survey=True)
+    def prepare(self) -> None:
+        """Make the program of runs, unless it is there; nothing is solved."""
+        way = self.beginning(self.still(self.model.guess), 0.0)
+        self._take_steps(way, NO_GRID, _limits(0.0, 0.0), 0, survey=True, only_made=True)
 
     def way(self, solved: SolvedState, place: Sequence[float], largest: float, crawled: int = 0) -> StepState:
         """Return the way that begins at a solved instant, the place of an anchor, with a largest first step, s."""
@@ -187,13 +188,21 @@ class Solver:
         return Settings(*map(np.asarray, (self.tolerance, self.refine, True, self.wanted)))
 
     def _take_steps(
-        self, way: StepState, grid: Float[np.ndarray, " time"], limits: StepLimits, most: int, *, survey: bool
-    ) -> TakenSteps:
+        self,
+        way: StepState,
+        grid: Float[np.ndarray, " time"],
+        limits: StepLimits,
+        most: int,
+        *,
+        survey: bool,
+        only_made: bool = False,
+    ) -> Any:
         room = (self._batches + 1) * (SMALL_BATCH - 1)
         window = np.full(room, np.inf)
         window[: len(grid)] = grid[:room]
         settings, kind = self._settings._replace(survey=np.asarray(survey)), self.model.pose_type
-        return take_steps(
+        run = take_steps.prepare if only_made else take_steps
+        return run(
             self.model.system,
             way,
             window,

@@ -15,8 +15,6 @@ import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from jounce.execution.buffer_pool import release
-from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.path_following import Anchor, FollowedPath
 from jounce.kinematics.continuation.solver import SMALL_BATCH, Solver
 from jounce.kinematics.position_analysis.rooms import Room, solve_in_rooms
@@ -127,19 +125,6 @@ def _begin(room: Room, time: Float[np.ndarray, " time"], anchors: Sequence[Ancho
     near = known & (np.abs(to_neighbor) <= np.abs(to_anchor))
     sources = np.where(near, neighbor, room.size + nearest), np.where(near, to_neighbor, to_anchor)
     room.take_up(time, sources, rounds(len(time), stride, room.width))
-
-
-def prepare_blocks(solver: Solver, like: SolvedState, count: int) -> None:
-    """Compile what solves a grid of so many instants, unless it is there already, and solve one again and again."""
-    if solver.is_compiled:
-        return
-    stride = stride_of(solver, count, count, SMALL_BATCH)  # anchors, which are not known yet
-    size = min(count, stride * solver.program.width)
-    room, nothing = Room(solver, like, size, 1), np.zeros(size)
-    room.put_anchors([leaf] for leaf in jax.tree.leaves(like))
-    room.take_up(nothing, (np.full(size, size), nothing), rounds(size, stride, room.width))
-    room.solve()
-    release(room.block)
 
 
 def solve_blocks(

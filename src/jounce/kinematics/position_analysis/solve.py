@@ -3,7 +3,6 @@
 import dataclasses
 import numbers
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,23 +10,21 @@ from jax.errors import ConcretizationTypeError
 
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
 from jounce.execution.backends import joined
-from jounce.execution.device import resident
-from jounce.execution.rehearsal import first_time, rehearsed, tried
+from jounce.execution.background import prepare_later
 from jounce.execution.store import expect, is_wanted_soon
 from jounce.execution.threads import thread_count
 from jounce.kinematics.assembly.assemble import assemble
-from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.path_following import FollowedPath, follow
 from jounce.kinematics.continuation.solver import NO_GRID, Solver
 from jounce.kinematics.curves.choice import chosen
 from jounce.kinematics.position_analysis.chunked_motion import Stretches
 from jounce.kinematics.position_analysis.curve_ends import beyond_end, cut_at_ends
-from jounce.kinematics.position_analysis.forces_at_rest import ask_forces_at_rest
-from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, prepare_blocks
+from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID
 from jounce.kinematics.position_analysis.grid_storage import solve_grid
 from jounce.kinematics.position_analysis.limit_position_messages import dead_end_words
 from jounce.kinematics.results.actuation import actuated
 from jounce.kinematics.results.motion import Motion
+from jounce.kinematics.results.output_programs import prepare_outputs
 from jounce.kinematics.sensitivity.sensitivities import differentiable_motion
 from jounce.kinematics.sensitivity.traced_motion import TracedMotion
 from jounce.kinematics.status import Status
@@ -234,25 +231,20 @@ def _followed(
     guessed = build(chosen(with_outputs_held(mechanism), first))
     expect(len(instants))
     solver = Solver(guessed, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order, is_wanted_soon())
-    new = first_time("take_steps", guessed.system, solver.order, len(instants) > LONG_GRID)
-    beside = new and thread_count() > 1
-    with rehearsed(partial(_prepare, solver, first), wanted=beside):
-        try:
-            model, coordinates = assemble(guessed, first, tolerance)
-        except (AssemblyError, MobilityError) as error:
-            for name, motion in led_outputs(mechanism).items():
-                error.message += f"; the driver {name} follows from the output {motion.output}, which must determine it"
-            raise
-        if beyond := beyond_end(model, coordinates):
-            message = f"t = {first:g} s, {beyond}: end of curve: {Status.END_OF_CURVE.advice}"
-            raise SolveError(message, status=Status.END_OF_CURVE)
-        solver = dataclasses.replace(solver, model=model)
-        still = solver.still(coordinates)
-        with rehearsed(partial(_prepare, solver, first), wanted=beside and _rank_is_open(guessed)):
-            if beside:
-                with tried():
-                    _rehearse(mechanism, solver, still, instants)
-    start = solver.beginning(still, first)
+    if not guessed.system.rank_is_open:  # else its program depends on the assembled bodies
+        prepare_later(solver.prepare, "take_steps", guessed.system, solver.order)
+    try:
+        model, coordinates = assemble(guessed, first, tolerance)
+    except (AssemblyError, MobilityError) as error:
+        for name, motion in led_outputs(mechanism).items():
+            error.message += f"; the driver {name} follows from the output {motion.output}, which must determine it"
+        raise
+    if beyond := beyond_end(model, coordinates):
+        message = f"t = {first:g} s, {beyond}: end of curve: {Status.END_OF_CURVE.advice}"
+        raise SolveError(message, status=Status.END_OF_CURVE)
+    prepare_outputs(mechanism, model, solver.order)
+    solver = dataclasses.replace(solver, model=model)
+    start = solver.beginning(solver.still(coordinates), first)
     on_the_way = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
     path = follow(solver, start, last, last - first, grid=on_the_way)
     if path.anchors:
@@ -278,30 +270,6 @@ def _check_count(model: Model, history: AttitudeHistory | None) -> None:
 def _backend(solver: Solver, path: FollowedPath, instants: Instants) -> str:
     """Return what has computed a motion: what followed it, and what solves the instants of a long grid."""
     return joined({*path.backends, *([solver.backend] if len(instants) > LONG_GRID else [])})
-
-
-def _rank_is_open(model: Model) -> bool:
-    """Tell whether constraints are redundant by a number that only the assembled bodies show; programs depend on it."""
-    rows, columns = model.system.shape
-    return rows > columns and model.system.rank is None
-
-
-def _prepare(solver: Solver, instant: float) -> None:
-    """Compile the program that follows a motion, if all that it depends on is known already."""
-    if _rank_is_open(solver.model):
-        return
-    model = dataclasses.replace(solver.model, system=resident(solver.model.system))
-    solver = dataclasses.replace(solver, model=model)
-    solver.prepare(solver.still(model.guess), instant)
-
-
-def _rehearse(mechanism: Mechanism, solver: Solver, still: SolvedState, instants: Instants) -> None:
-    """Use the programs of long grids, and those of outputs that are forces, with the bodies at rest."""
-    if len(instants) > LONG_GRID:
-        prepare_blocks(solver, still, len(instants))
-    pose = {name: part[0] for name, part in still[0].items()}
-    order = solver.order - lost_orders(mechanism)
-    ask_forces_at_rest(mechanism, solver.model, pose, instants, order, solver.order + 1)
 
 
 def raise_for_status(motion: Any) -> None:

@@ -1,0 +1,41 @@
+"""The programs of outputs that follow from a motion, made while it is solved."""
+
+import numpy as np
+
+from jounce.execution.background import prepare_later
+from jounce.kinematics.results.motion import Motion
+from jounce.mechanism import AbstractMotionOutput, Mechanism, Model
+from jounce.mechanism.axis_angles import AttitudeHistory
+from jounce.mechanism.held_outputs import led_outputs
+
+
+def prepare_outputs(mechanism: Mechanism, model: Model, order: int) -> None:
+    """Have the programs made in another thread that outputs of a mechanism need of any motion of a model.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Drivers that follow from its outputs are not known before its motion: there is nothing to be done then.
+    model : Model
+        Of its bodies.
+    order : int
+        Highest Taylor coefficient of the motion.
+    """
+    outputs = [x for x in mechanism.outputs.values() if isinstance(x, AbstractMotionOutput)]
+    if not outputs or led_outputs(mechanism):
+        return
+
+    def prepare() -> None:
+        coordinates = {name: np.zeros((order + 1, *np.shape(x)[:-1], 1)) for name, x in model.guess.items()}
+        history = None
+        if "quaternion" in coordinates:
+            coordinates["angular_velocity"] = np.zeros_like(coordinates["position"][1:])
+            history = AttitudeHistory(np.asarray(model.guess["quaternion"]), np.zeros(1))
+        groups = tuple(np.zeros((order + 1, 1, group.instances, 1)) for group in model.system.outputs)
+        like = Motion(
+            mechanism, model, np.zeros(1), order, (coordinates, groups), np.zeros(1, int), {}, history=history
+        )
+        for output in outputs:
+            output.prepare(like)
+
+    prepare_later(prepare, "outputs", (model.system, outputs), order)
