@@ -15,7 +15,7 @@ from tests.problems.small import four_bar
 @pytest.fixture
 def kept(monkeypatch):
     blocks = []
-    monkeypatch.setattr(buffer_pool, "_kept", blocks)
+    monkeypatch.setattr(buffer_pool, "_free", blocks)
     return blocks
 
 

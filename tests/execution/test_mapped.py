@@ -100,7 +100,7 @@ def test_what_has_no_rule_is_left_to_xla_and_told_once(monkeypatch):
     def transformed(shared, lanes):
         return jax.lax.digamma(lanes[0]) * shared[0][:, None]
 
-    monkeypatch.setattr(backends, "_told", set())
+    monkeypatch.setattr(backends, "_warned", set())
     given, x = (np.arange(3.0),), np.random.default_rng(1).uniform(1.0, 2.0, (3, 5))
     function = Mapped(transformed)
     with pytest.warns(jn.errors.MachineCodeWarning, match="operation 'digamma'"):

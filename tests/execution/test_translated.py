@@ -78,7 +78,7 @@ def test_xla_computes_the_rest(reason, monkeypatch):
 
 
 def test_an_operation_without_code_is_left_to_xla(monkeypatch):
-    monkeypatch.setattr(backends, "_told", set())
+    monkeypatch.setattr(backends, "_warned", set())
 
     @compiled(alone=lambda x: True)
     def transformed(x):

@@ -14,7 +14,7 @@ from jounce.execution.llvm import self_test
 
 VARIABLE = "JOUNCE_NATIVE"  # 0 leaves everything to XLA
 LLVM, XLA = "llvm", "xla"
-_told: set[str] = set()
+_warned: set[str] = set()
 
 
 def is_wanted() -> bool:
@@ -53,9 +53,9 @@ def joined(backends: Iterable[str]) -> str:
 
 def tell_missing(operation: str) -> None:
     """Warn, once for each operation, that XLA computes what has it, since there is no machine code for it."""
-    if operation in _told:
+    if operation in _warned:
         return
-    _told.add(operation)
+    _warned.add(operation)
     message = (
         f"there is no machine code for the operation {operation!r} of JAX: XLA computes what has it, with the same "
         "results in two to six times the time; another form of that operation may be faster"

@@ -12,13 +12,13 @@ import numpy as np
 MOST = 2**26  # bytes that are kept
 LINE = 64  # bytes of the cache's lines, at which arrays begin
 ENTRY = 8  # bytes of a number
-_kept: list[np.ndarray] = []
+_free: list[np.ndarray] = []
 
 
 def acquire(size: int) -> np.ndarray:
     """Return a block of so many bytes or more, whatever is in it."""
     try:
-        block = _kept.pop()
+        block = _free.pop()
     except IndexError:
         block = np.empty(0, np.uint8)
     return block if len(block) >= size else np.empty(size, np.uint8)
@@ -26,8 +26,8 @@ def acquire(size: int) -> np.ndarray:
 
 def release(block: np.ndarray) -> None:
     """Keep a block for the next who borrows, unless there is enough; nobody may use it any more."""
-    if sum(map(len, _kept)) + len(block) <= MOST:
-        _kept.append(block)
+    if sum(map(len, _free)) + len(block) <= MOST:
+        _free.append(block)
 
 
 def room_of(shapes: Sequence[Sequence[int]]) -> int:

@@ -212,8 +212,8 @@ class Compiled:
         store, kinds = _store_of_xla(), tuple(map(_kind, leaves))
         if store is None or None in kinds:
             return None
-        told = tuple((name, type(value), value) for name, value in static.items())
-        key = tree, kinds, told, self._level(), settings()
+        static_key = tuple((name, type(value), value) for name, value in static.items())
+        key = tree, kinds, static_key, self._level(), settings()
         return self._programs.get(key, lambda: self._made(store, tree, kinds, arguments, keywords, static))
 
     def _level(self) -> int | None:
@@ -244,10 +244,10 @@ class Compiled:
             store.drop(key)
             return compiled_anew()
 
-        if (kept := store.get(key)) is None:
+        if (stored := store.get(key)) is None:
             return compiled_anew()
         try:
-            return _OnTrial(_unpacked(kept, tree), replaced)
+            return _OnTrial(_unpacked(stored, tree), replaced)
         except Exception:  # noqa: BLE001 - whatever is wrong with it, it is compiled again
             return replaced()
 

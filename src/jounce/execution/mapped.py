@@ -72,8 +72,8 @@ class OnLlvm:
             Index of the source of each instant.
         """
         leaves: Any = [[np.asarray(leaf) for leaf in jax.tree.leaves(group)] for group in lanes]
-        kept = jax.tree.leaves(results, is_leaf=lambda x: x is None)
-        return self.machine_code.relay(self.shared, leaves, kept, sources)
+        stored = jax.tree.leaves(results, is_leaf=lambda x: x is None)
+        return self.machine_code.rounds(self.shared, leaves, stored, sources)
 
     @property
     def width(self) -> int:
@@ -163,9 +163,9 @@ class OnXla:
     def rounds(self, lanes: tuple[Any, Any, Any], results: Any, sources: Int[np.ndarray, " time"]) -> Rounds:
         """Return what solves instants in rounds, as that of `OnLlvm`; the arrays are written when all are solved."""
         linked, own, held = map(jax.tree.leaves, lanes)
-        kept = jax.tree.leaves(results, is_leaf=lambda x: x is None)
-        wanted = tuple(k for k, whole in enumerate(kept) if whole is not None)
-        wholes = [kept[k] for k in wanted]
+        stored = jax.tree.leaves(results, is_leaf=lambda x: x is None)
+        recorded = tuple(k for k, whole in enumerate(stored) if whole is not None)
+        wholes = [stored[k] for k in recorded]
         links = tuple(next(k for k, whole in enumerate(wholes) if whole is part) for part in linked)
 
         def run(targets: Int[np.ndarray, "round lane"]) -> None:
@@ -178,7 +178,7 @@ class OnXla:
             starts = [_filled(wholes[k][..., before], STARTS * _power(-(-len(before) // STARTS))) for k in links]
             given = [_filled(x[..., order], total) for x in own]
             order_of_rounds = _filled(source, total), np.asarray(len(targets))
-            how = links, wanted, self.width, self.form, self.how
+            how = links, recorded, self.width, self.form, self.how
             found = self.mapped.in_rounds(self.shared, starts, (given, held), order_of_rounds, how)
             for whole, part in zip(wholes, found, strict=True):
                 whole[..., order] = np.asarray(part)[..., : len(order)]
@@ -296,30 +296,30 @@ class Mapped:
 
         Each round is written in one piece, for which XLA has fast code: it has none for numbers put here and there.
         """
-        (own, held), (sources, turns), (links, wanted, width, form, static) = others, order, how
+        (own, held), (sources, turns), (links, recorded, width, form, static) = others, order, how
         total = len(sources)
 
         def solved(linked: Sequence[Any], own: Sequence[Any]) -> list[Any]:
             same = [jnp.broadcast_to(jnp.asarray(x), (*x.shape[:-1], width)) for x in held]
             given = jax.tree.unflatten(form, [*linked, *own, *same])
             found = jax.tree.leaves(self._many(shared, given, **dict(static)))
-            return [found[k] for k in wanted]
+            return [found[k] for k in recorded]
 
         def some(x: Any, turn: Any) -> Any:
             return jax.lax.dynamic_slice_in_dim(x, turn * width, width, axis=-1)
 
-        def go_on(turn: Any, kept: list[Any]) -> list[Any]:
+        def go_on(turn: Any, stored: list[Any]) -> list[Any]:
             source = some(sources, turn)
-            parts = solved([jnp.take(kept[k], source, axis=-1) for k in links], [some(x, turn) for x in own])
+            parts = solved([jnp.take(stored[k], source, axis=-1) for k in links], [some(x, turn) for x in own])
             put = jax.lax.dynamic_update_slice_in_dim
-            return [put(whole, part, turn * width, -1) for whole, part in zip(kept, parts, strict=True)]
+            return [put(whole, part, turn * width, -1) for whole, part in zip(stored, parts, strict=True)]
 
         one = [[jax.ShapeDtypeStruct((*x.shape[:-1], width), x.dtype) for x in group] for group in (starts, own)]
         shapes = jax.eval_shape(solved, *one)
-        kept = [jnp.zeros((*x.shape[:-1], total), x.dtype) for x in shapes]
+        stored = [jnp.zeros((*x.shape[:-1], total), x.dtype) for x in shapes]
         for k, start in zip(links, starts, strict=True):
-            kept[k] = jnp.concatenate([kept[k], start], axis=-1)
-        found = jax.lax.fori_loop(0, turns, go_on, kept)
+            stored[k] = jnp.concatenate([stored[k], start], axis=-1)
+        found = jax.lax.fori_loop(0, turns, go_on, stored)
         return [x[..., :total] for x in found]
 
 

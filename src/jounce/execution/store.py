@@ -169,9 +169,9 @@ def made_or_kept(key: str | None, make: Callable[[], tuple[Any, ...]], load: Cal
         Of the parts.
     """
     store = None if key is None else current_store()
-    if store is not None and key is not None and (kept := store.get(key)) is not None:
+    if store is not None and key is not None and (stored := store.get(key)) is not None:
         try:
-            return load(*unpacked(kept))
+            return load(*unpacked(stored))
         except Exception:  # noqa: BLE001 - whatever is wrong with it, it is made again
             store.drop(key)
     made = make()

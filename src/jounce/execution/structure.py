@@ -127,7 +127,7 @@ def program_key(
     """
     if (changed := altered() or _changed_file()) is not None:
         raise UndescribedError(changed)
-    told = [
+    parts = [
         description(functions),
         tree_description(tree),
         description(tuple(leaves)),
@@ -135,15 +135,15 @@ def program_key(
         _described_settings(),
         _surroundings(),
     ]
-    return hashlib.sha256("\n".join(told).encode()).hexdigest()
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
 def _described_settings() -> str:
-    told = [repr(x) for x in settings() if type(x).__name__ != "AxisEnv"]  # of arrays that JAX traces: there are none
-    told += [repr(getattr(jax.config, name, None)) for name in OPTIONS]
-    if any(" at 0x" in x for x in told):
+    parts = [repr(x) for x in settings() if type(x).__name__ != "AxisEnv"]  # of arrays that JAX traces: there are none
+    parts += [repr(getattr(jax.config, name, None)) for name in OPTIONS]
+    if any(" at 0x" in x for x in parts):
         raise UndescribedError("a setting of JAX")
-    return ", ".join(told)
+    return ", ".join(parts)
 
 
 def _files() -> list[Path]:
@@ -175,14 +175,14 @@ def _surroundings() -> str:
 
 def _processor() -> str:
     """Return what tells this kind of processor from others: code is compiled for all that it can do."""
-    told = [platform.machine(), platform.processor(), platform.system(), str(os.cpu_count())]
+    parts = [platform.machine(), platform.processor(), platform.system(), str(os.cpu_count())]
     listing = Path("/proc/cpuinfo")
     if listing.exists():
         first, _, _ = listing.read_text(encoding="utf-8", errors="replace").partition("\n\n")
         kinds = ("vendor_id", "cpu family", "model", "flags", "Features", "CPU")
-        told += [line for line in first.splitlines() if line.startswith(kinds)]
+        parts += [line for line in first.splitlines() if line.startswith(kinds)]
     elif sys.platform == "darwin":
         import subprocess
 
-        told.append(subprocess.check_output(["/usr/sbin/sysctl", "-n", "machdep.cpu.brand_string"], text=True))
-    return "\n".join(told)
+        parts.append(subprocess.check_output(["/usr/sbin/sysctl", "-n", "machdep.cpu.brand_string"], text=True))
+    return "\n".join(parts)

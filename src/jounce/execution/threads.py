@@ -28,12 +28,12 @@ def thread_count(given: int | Refused | None = None) -> int:
     MechanismError
         If it is not a whole number above zero.
     """
-    told = os.environ.get(VARIABLE, "") if given is None else ""
-    if given is None and not told:
+    setting = os.environ.get(VARIABLE, "") if given is None else ""
+    if given is None and not setting:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    count: Any = int(told) if told.isdecimal() else told or given
+    count: Any = int(setting) if setting.isdecimal() else setting or given
     if not isinstance(count, numbers.Integral) or isinstance(count, bool) or count < 1:
-        name = VARIABLE if told else "threads"
+        name = VARIABLE if setting else "threads"
         raise MechanismError("the number of threads must be a whole number above zero", name=name, value=count)
     return int(count)
 

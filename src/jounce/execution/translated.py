@@ -97,8 +97,8 @@ class Translated:
         ones = tuple([(self._one(x.shape), x.dtype) for x in few])
         places: Any = {} if self._alone else {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
         known = tuple([x.tobytes() for x in places.values()])
-        told = tuple([(name, type(value), value) for name, value in static.items()])
-        key = structure, form, kinds, ones, known, large, hasty, told, settings()
+        static_key = tuple([(name, type(value), value) for name, value in static.items()])
+        key = structure, form, kinds, ones, known, large, hasty, static_key, settings()
 
         def make() -> Any:
             parts = zip((structure, form), (kinds, ones), strict=True)

@@ -93,7 +93,7 @@ def is_published(name: str) -> bool:
 
 
 class MachineCode:
-    """The functions `run` and `relay` of an object file, in memory.
+    """The functions `run` and `rounds` of an object file, in memory.
 
     Parameters
     ----------
@@ -108,11 +108,11 @@ class MachineCode:
             self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _target())
             self._engine.add_object_file(binding.object_file.ObjectFileRef.from_data(binary))
             self._engine.finalize_object()
-            address, relay = map(self._engine.get_function_address, ("run", "relay"))
+            address, rounds = map(self._engine.get_function_address, ("run", "rounds"))
         self._address = address
         self._run = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int64)(address)
         addresses, numbers = [ctypes.c_void_p] * 2, [ctypes.c_int64] * 3
-        self.relay = ctypes.CFUNCTYPE(None, *addresses, *numbers, *addresses, ctypes.c_int64)(relay)
+        self.rounds = ctypes.CFUNCTYPE(None, *addresses, *numbers, *addresses, ctypes.c_int64)(rounds)
 
     def publish(self, name: str) -> None:
         """Let machine code that is loaded from here on call `run` by a name, as long as this one is kept."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from jounce.execution.llvm import rows as rows_
 from jounce.execution.llvm.machine import compiled, vector_width
-from jounce.execution.llvm.relays import relay_text
+from jounce.execution.llvm.rounds import rounds_text
 from jounce.execution.llvm.text.arrays import constants
 from jounce.execution.llvm.text.code import Code, flat
 from jounce.execution.llvm.text.scalars import MOST_LINES
@@ -154,7 +154,7 @@ def _text(
     for name, count in sorted(code.functions):
         lines += [f"declare double @{name}({', '.join(['double'] * count)}) #0", _lane_by_lane(name, count, width)]
     if not alone:
-        lines.append(relay_text(width))
+        lines.append(rounds_text(width))
     return "\n".join([*lines, ATTRIBUTES])
 
 

@@ -11,7 +11,7 @@ import jax
 import numpy as np
 
 from jounce.execution.llvm.machine import MachineCode, vector_width
-from jounce.execution.llvm.relays import Column, Relay
+from jounce.execution.llvm.rounds import Column, RoundRunner
 
 
 class Layout:
@@ -148,13 +148,13 @@ class Program:
             list(each(run, range(parts)))
         return jax.tree.unflatten(self._structure, [x[:count] if self._rows else x[..., :count] for x in found])
 
-    def relay(
+    def rounds(
         self,
         shared: Sequence[np.ndarray],
         lanes: Sequence[Sequence[np.ndarray]],
         results: Sequence[np.ndarray | None],
         sources: np.ndarray,
-    ) -> Relay:
+    ) -> RoundRunner:
         """Return what solves instants in rounds, of which later ones start from the results of earlier ones.
 
         Parameters
@@ -163,7 +163,7 @@ class Program:
             Leaves of what all instants share.
         lanes : three sequences of array
             Leaves of the arguments of an instant: those that it takes from its source, those that are its own, and
-            those that all have the same; see `Relay`.
+            those that all have the same; see `RoundRunner`.
         results : sequence of array
             Where the leaves of the results go; None for those that nobody wants.
         sources : array of int
@@ -174,9 +174,9 @@ class Program:
         _agree(shared, self._shared)
         columns = [Column(*kind, x) for kind, x in zip(self._lanes, itertools.chain(*lanes), strict=True)]
         first, second = itertools.accumulate(map(len, lanes[:2]))
-        kept = [Column(*kind, x) for kind, x in zip(self._results, results, strict=True)]
-        groups = columns[:first], columns[first:second], columns[second:], kept
-        return Relay(self._run.relay, shared, *groups, sources, self.width)
+        outputs = [Column(*kind, x) for kind, x in zip(self._results, results, strict=True)]
+        groups = columns[:first], columns[first:second], columns[second:], outputs
+        return RoundRunner(self._run.rounds, shared, *groups, sources, self.width)
 
     def publish(self) -> None:
         """Make it known by its name to machine code, for `in_program`."""

@@ -11,7 +11,7 @@ import numpy as np
 from jax.extend.core import Literal, jaxprs_in_params
 
 from jounce.execution.llvm.calls import call
-from jounce.execution.llvm.carried import Carried
+from jounce.execution.llvm.loop_variables import LoopVariables
 from jounce.execution.llvm.plans import plan_of
 from jounce.execution.llvm.rules.loops import DEFERRED, READING, STORED
 from jounce.execution.llvm.rules.operations import RULES
@@ -108,9 +108,9 @@ def _give_back(code: Code, arrays: Sequence[Array]) -> None:
 
 def _give_back_but(code: Code, taken: Sequence[Region], arrays: Sequence[Array]) -> None:
     """Give back memory that was taken, but that of arrays."""
-    wanted = _regions(arrays)
+    live = _regions(arrays)
     for region in dict.fromkeys(taken):
-        if region not in wanted:
+        if region not in live:
             code.release(region)
 
 
@@ -220,7 +220,7 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     asked, needed, start = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
 
     def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
-        carried = Carried(code, [variable.aval for variable in equation.outvars], lanes)
+        carried = LoopVariables(code, [variable.aval for variable in equation.outvars], lanes)
         carried.store(start)
         head, body, end = code.label(), code.label(), code.label()
         code.jump(head)
@@ -233,8 +233,8 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
                 return [True] * len(lanes), []
             code.branch(code.anywhere(goes), body, end)
             code.begin(body)
-            kept = [*asked, *needed, *(before if goes.lanes else ())]
-            with code.scope(goes if goes.lanes else None), code.used(_among(kept)):
+            live = [*asked, *needed, *(before if goes.lanes else ())]
+            with code.scope(goes if goes.lanes else None), code.used(_among(live)):
                 after = _closed(code, p["body_jaxpr"], needed, before, late=True)
                 if goes.lanes:
                     after = _chosen(code, goes, after, before)
@@ -303,8 +303,8 @@ def _rolled(
     last = code.constant(p["length"] - 1, "l")
 
     def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
-        carried = Carried(code, [variable.aval for variable in equation.outvars[:size]], lanes[:size])
-        written, counter = Carried(code, made, lanes[size:]), code.room(1, "l", lanes=False)
+        carried = LoopVariables(code, [variable.aval for variable in equation.outvars[:size]], lanes[:size])
+        written, counter = LoopVariables(code, made, lanes[size:]), code.room(1, "l", lanes=False)
         carried.store(start)
         code.store(counter, 0, code.constant(0, "l"))
         homes = [stored(code, array) if array.size else array for array in rows]
@@ -338,12 +338,12 @@ def _unrolled(
     It is given up early where the turns so far, of which the first are longer than the others, leave no hope.
     """
     p, mark, before = equation.params, code.mark(), len(code.lines)
-    size, found, kept = len(start), {}, _regions([*needed, *rows])
+    size, found, live = len(start), {}, _regions([*needed, *rows])
     for k in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
-        with code.used(kept.__contains__):
+        with code.used(live.__contains__):
             results = _closed(code, p["jaxpr"], needed, start, [row(code, array, k) for array in rows])
         start, found[k] = results[:size], results[size:]
-        kept |= _regions(found[k])
+        live |= _regions(found[k])
         lines, left = len(code.lines) - before, p["length"] - len(found)
         if p["length"] > 1 and lines + lines / len(found) / HOPE * left > most:
             code.back_to(mark)
@@ -370,7 +370,7 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
         return _closed(code, ways[min(max(int(which.constant or 0), 0), len(ways) - 1)], inputs)
 
     def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
-        results, found = Carried(code, [variable.aval for variable in equation.outvars], lanes), lanes
+        results, found = LoopVariables(code, [variable.aval for variable in equation.outvars], lanes), lanes
         for k, way in enumerate(ways):
             word = "le" if k == 0 else "ge" if k == len(ways) - 1 else "eq"
             here = code.among_here(code.compare(word, which, code.constant(k, which.kind)))

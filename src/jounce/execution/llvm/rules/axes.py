@@ -43,9 +43,9 @@ def reduction(operation: str) -> Rule:
 
     def rule(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
         axes, array = equation.params["axes"], given[0]
-        kept = [axis for axis in range(array.ndim) if axis not in axes]
+        remaining = [axis for axis in range(array.ndim) if axis not in axes]
         together = int(np.prod([array.shape[axis] for axis in axes]))
-        rows = array.transpose(*kept, *axes).reshape(*(array.shape[axis] for axis in kept), together)
+        rows = array.transpose(*remaining, *axes).reshape(*(array.shape[axis] for axis in remaining), together)
         found, kind = np.empty(rows.shape[:-1], object), kind_of(equation.outvars[0].aval.dtype)
         for place in np.ndindex(found.shape):
             found[place] = _combined(code, operation, flat(rows[place]), kind)

@@ -8,9 +8,9 @@ from typing import Any
 
 from jax.lax import GatherScatterMode
 
+from jounce.execution.llvm.rules.indexing import filler, kept_inside, within
 from jounce.execution.llvm.rules.loops_along_axes import REDUCTIONS, StoredRule, dot, extreme
 from jounce.execution.llvm.rules.operations import ELEMENTWISE, RULES
-from jounce.execution.llvm.rules.places import filler, kept_inside, within
 from jounce.execution.llvm.text.arrays import filled
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.stored import (

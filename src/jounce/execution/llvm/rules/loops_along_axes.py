@@ -21,14 +21,14 @@ def reduction(operation: str) -> StoredRule:
         array, axes = given[0], equation.params["axes"]
         if not isinstance(array, Deferred):
             array = as_read(stored(code, array))
-        kept = [axis for axis in range(array.ndim) if axis not in axes]
+        remaining = [axis for axis in range(array.ndim) if axis not in axes]
         found = room_of(code, equation, [array])
         fill(code, found, code.constant(nothing(operation, found.kind), found.kind))
         if code.alone and operation in ORDERLESS and found.size == 1:
             for part in _in_vectors(code, operation, array):
                 _gathered(code, operation, spread(replace(found, shape=(), strides=()), part.shape, ()), part)
             return [found]
-        _gathered(code, operation, spread(found, array.shape, kept), array)
+        _gathered(code, operation, spread(found, array.shape, remaining), array)
         return [found]
 
     return rule

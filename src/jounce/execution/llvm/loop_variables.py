@@ -12,7 +12,7 @@ from jounce.execution.llvm.text.values import Region, kind_of
 from jounce.execution.llvm.text.views import Array, Deferred, InMemory, Stored, contiguous
 
 
-class Carried:
+class LoopVariables:
     """Arrays that a loop or a branch changes, in memory."""
 
     def __init__(self, code: Code, avals: Sequence[Any], lanes: Sequence[bool]):

@@ -293,8 +293,8 @@ def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
     numbers, windows, batches = p["dimension_numbers"], p["dimension_numbers"].update_window_dims, indices.ndim - 1
     beside = dict(zip(numbers.operand_batching_dims, numbers.scatter_indices_batching_dims, strict=True))
     left_out = (*numbers.inserted_window_dims, *numbers.operand_batching_dims)
-    kept = dict(zip((axis for axis in range(array.ndim) if axis not in left_out), windows, strict=True))
-    sizes = [updates.shape[kept[axis]] if axis in kept else 1 for axis in range(array.ndim)]
+    remaining = dict(zip((axis for axis in range(array.ndim) if axis not in left_out), windows, strict=True))
+    sizes = [updates.shape[remaining[axis]] if axis in remaining else 1 for axis in range(array.ndim)]
     table = np.vectorize(lambda value: int(value.constant), otypes=[int])(indices)
     drop = p["mode"] == GatherScatterMode.FILL_OR_DROP
     places = _places(table, array.shape, numbers.scatter_dims_to_operand_dims, beside, sizes, drop=drop)

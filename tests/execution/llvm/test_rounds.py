@@ -31,7 +31,7 @@ def arrays(behind=1):
     return position, label, generator.normal(size=COUNT), sources
 
 
-def relay(position, label, time, sources, found=None, late=None):
+def in_rounds(position, label, time, sources, found=None, late=None):
     """Return what solves all instants, straight into the arrays unless others are given."""
     lanes = (position, label), time, np.array([True])
     program = STEP.program(np.float64(0.5), ((np.zeros((3, 2, 1)), np.zeros(1, np.int64)), np.zeros(1), lanes[2]))
@@ -56,15 +56,15 @@ def rounds(count=COUNT):
 def test_later_rounds_start_from_earlier_ones():
     given = arrays()
     expected = in_turn(*given)
-    relay(*given)(rounds())
+    in_rounds(*given)(rounds())
     np.testing.assert_allclose(given[0], expected[0], atol=1e-14)
     np.testing.assert_array_equal(given[1], expected[1])
 
 
 def test_rounds_may_be_run_in_parts_and_in_any_order_within_them():
     given, again = arrays(), arrays()
-    relay(*given)(rounds())
-    parts, width = relay(*again), vector_width()
+    in_rounds(*given)(rounds())
+    parts, width = in_rounds(*again), vector_width()
     parts(rounds()[:1, ::-1])
     parts(rounds()[1:0])
     parts(np.repeat(rounds()[1:], 2, axis=0)[:, np.arange(width) - 1])
@@ -77,8 +77,8 @@ def test_arrays_may_be_parts_of_others():
     whole = np.full((3, 4, COUNT + 9), 7.0)
     position = whole[:, 1:3, 5 : 5 + COUNT + 1]
     position[...] = given[0]
-    relay(*given)(rounds())
-    relay(position, *arrays()[1:])(rounds())
+    in_rounds(*given)(rounds())
+    in_rounds(position, *arrays()[1:])(rounds())
     np.testing.assert_array_equal(position, given[0])
     position[...] = 7.0
     assert np.all(whole == 7.0)
@@ -87,7 +87,7 @@ def test_arrays_may_be_parts_of_others():
 def test_results_may_be_put_elsewhere():
     position, label, time, _ = arrays()
     found, before = np.zeros((3, 2, COUNT)), position.copy()
-    relay(position, label, time, np.arange(COUNT), found)(rounds())
+    in_rounds(position, label, time, np.arange(COUNT), found)(rounds())
     np.testing.assert_array_equal(position, before)
     np.testing.assert_allclose(found, (1.5 * before)[..., :COUNT] + time, rtol=1e-14)
 
@@ -107,18 +107,18 @@ def test_results_may_be_put_elsewhere():
 def test_what_would_be_read_or_written_elsewhere_is_refused(change):
     given = dict(zip(("position", "label", "time", "sources"), arrays(), strict=True)) | change
     with pytest.raises(ValueError, match=r"array of|sources"):
-        relay(**given)
+        in_rounds(**given)
 
 
 @pytest.mark.parametrize("targets", [rounds() + 1, rounds() - 1, rounds()[:, 1:], rounds().astype(np.int32)])
 def test_targets_beyond_the_grid_are_refused(targets):
     with pytest.raises(ValueError, match="targets"):
-        relay(*arrays())(targets)
+        in_rounds(*arrays())(targets)
 
 
 def test_truth_values_have_no_place_of_their_own():
     with pytest.raises(ValueError, match="bool"):
-        relay(*arrays(), late=np.zeros(COUNT, bool))
+        in_rounds(*arrays(), late=np.zeros(COUNT, bool))
 
 
 def test_programs_with_instants_along_the_first_axis_have_no_rounds():

@@ -51,8 +51,8 @@ class Column(NamedTuple):
         return -(-math.prod(self.shape) * width * self.dtype.itemsize // LINE) * LINE
 
 
-def relay_text(width: int) -> str:
-    """Return the text of a function `relay`, which calls `run` for one round after another.
+def rounds_text(width: int) -> str:
+    """Return the text of a function `rounds`, which calls `run` for one round after another.
 
     Its arguments: the addresses for `run`; pairs of addresses, of a number of the first instant and of that of the
     first lane, in the order in which they are copied; how many of these are read at sources, read at targets, and
@@ -64,7 +64,7 @@ def relay_text(width: int) -> str:
         Lanes of a vector.
     """
     lines = [
-        "define void @relay(ptr %addresses, ptr %pairs, i64 %linked, i64 %own, i64 %kept, "
+        "define void @rounds(ptr %addresses, ptr %pairs, i64 %linked, i64 %own, i64 %kept, "
         "ptr %sources, ptr %targets, i64 %rounds) #1 {",
         "start:",
         "%begun = icmp sgt i64 %rounds, 0",
@@ -149,13 +149,13 @@ def _scattered(name: str, width: int) -> list[str]:
     return lines
 
 
-class Relay:
+class RoundRunner:
     """Machine code that solves instants in rounds, straight from and into arrays of all of them.
 
     Parameters
     ----------
     run : callable
-        The function `relay` of machine code.
+        The function `rounds` of machine code.
     shared : sequence of array
         What all instants share.
     linked, own, held, results : sequence of Column
