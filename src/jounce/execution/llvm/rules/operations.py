@@ -6,7 +6,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from jounce.execution.llvm.rules import axes, places
+from jounce.execution.llvm.rules import axes, indexing
 from jounce.execution.llvm.text.arrays import Rule, Values, each
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.values import UnsupportedOperationError, Value, kind_of
@@ -153,23 +153,23 @@ RULES: Mapping[str, Rule] = {
     "cummax": axes.cumulative("max"),
     "cummin": axes.cumulative("min"),
     "dot_general": axes.dot,
-    "slice": places.part,
-    "broadcast_in_dim": places.broadcast,
-    "tile": places.tile,
-    "reshape": places.reshape,
-    "squeeze": places.reshape,
-    "expand_dims": places.reshape,
-    "concatenate": places.concatenate,
-    "stack": places.stack,
-    "unstack": places.unstack,
-    "transpose": places.transpose,
-    "rev": places.reverse,
-    "pad": places.pad,
-    "iota": places.iota,
-    "split": places.split,
-    "dynamic_slice": places.dynamic_slice,
-    "dynamic_update_slice": places.dynamic_update_slice,
-    "gather": places.gather,
-    "scatter": places.scatter,
-    "scatter-add": places.scatter,
+    "slice": indexing.part,
+    "broadcast_in_dim": indexing.broadcast,
+    "tile": indexing.tile,
+    "reshape": indexing.reshape,
+    "squeeze": indexing.reshape,
+    "expand_dims": indexing.reshape,
+    "concatenate": indexing.concatenate,
+    "stack": indexing.stack,
+    "unstack": indexing.unstack,
+    "transpose": indexing.transpose,
+    "rev": indexing.reverse,
+    "pad": indexing.pad,
+    "iota": indexing.iota,
+    "split": indexing.split,
+    "dynamic_slice": indexing.dynamic_slice,
+    "dynamic_update_slice": indexing.dynamic_update_slice,
+    "gather": indexing.gather,
+    "scatter": indexing.scatter,
+    "scatter-add": indexing.scatter,
 }
