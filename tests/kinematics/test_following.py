@@ -50,13 +50,13 @@ def test_two_loops_that_miss_their_dead_points_together(count):
     assert not motion.change_points.size
 
 
-def turnover_of(mechanism, instant):
+def det_rate_of(mechanism, instant):
     """What `advance` finds for a solved instant, and all eigenvalues of J^-1 J' by differences, from NumPy."""
     model, coordinates = assemble(build(mechanism), instant, 1e-12)
     solver = Solver(model, 4, 1e-12)
     known = {name: np.stack([x, *[np.zeros_like(x)] * 4]) for name, x in coordinates.items()}
     angles = tuple(np.zeros((5, 1, group.instances, 1)) for group in model.system.outputs)
-    arrival = solver(solver.needed((known, angles, np.zeros(1))), np.zeros(1), np.array([instant]), survey=True)
+    arrival = solver(solver.needed((known, angles, np.zeros(1))), np.zeros(1), np.array([instant]), search=True)
     jets = {name: Jet(tuple(map(jnp.asarray, c))) for name, c in arrival.coordinates.items()}
 
     def jacobian(step):
@@ -65,14 +65,14 @@ def turnover_of(mechanism, instant):
 
     step = 1e-5
     slope = (jacobian(step) - jacobian(-step)) / (2 * step)
-    return float(arrival.turnover[0]), np.linalg.eigvals(np.linalg.solve(jacobian(0.0), slope))
+    return float(arrival.det_rate[0]), np.linalg.eigvals(np.linalg.solve(jacobian(0.0), slope))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("instant", [2.0, 3.0, 3.5])
 def test_turnover_is_the_largest_eigenvalue(instant):
     mechanism = four_bar("t0", "t0", "t", AB=0.1, CD=0.1, AD=0.2, BC=0.2, t0=instant)
-    found, eigenvalues = turnover_of(mechanism, instant)
+    found, eigenvalues = det_rate_of(mechanism, instant)
     largest = eigenvalues[np.argmax(np.abs(eigenvalues))]
     assert np.abs(largest) <= abs(found) * (1 + 1e-6)
     assert abs(found) < 1.4 * np.abs(largest)

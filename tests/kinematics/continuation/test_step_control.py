@@ -20,9 +20,9 @@ from jounce.kinematics.status import Status
 LIMITS = StepLimits(np.asarray(1.0), np.asarray(1e-10))
 
 
-def placed(instant: Any, safe_step: Any, turnover: Any = 0.0):
+def placed(instant: Any, safe_step: Any, det_rate: Any = 0.0):
     """Return the control of designs that have come to some places."""
-    place = Place(*(np.array(x, float) for x in np.broadcast_arrays(instant, safe_step, 1.0, turnover)))
+    place = Place(*(np.array(x, float) for x in np.broadcast_arrays(instant, safe_step, 1.0, det_rate)))
     return steps_begin(place, np.array(place.instant))
 
 
@@ -33,8 +33,8 @@ def decided(control, status, there):
 
 
 def test_the_shortest_limit_makes_the_step_and_the_last_takes_a_sliver():
-    safe, turnover = np.array([0.2, 0.5, 0.95, 2.0]), np.array([-1.0, -4.0, 0.0, 0.0])
-    found = planned(placed(0.0, safe, turnover=turnover), LIMITS)
+    safe, det_rate = np.array([0.2, 0.5, 0.95, 2.0]), np.array([-1.0, -4.0, 0.0, 0.0])
+    found = planned(placed(0.0, safe, det_rate=det_rate), LIMITS)
     np.testing.assert_allclose(found.step, [0.2, 0.4 / 4, 1.0, 1.0], rtol=1e-15)
     np.testing.assert_allclose(found.target, [0.2, 0.1, 1.0, 1.0], rtol=1e-15)
     assert set(np.asarray(found.ending).tolist()) == {StopReason.UNFINISHED}
@@ -48,9 +48,9 @@ def test_each_design_has_an_outcome_of_its_own():
     status = np.full(count, int(Status.OK))
     status[[1, 4]] = int(Status.NOT_CONVERGED)
     # one goes on, one is halved, one turns over too fast, one is beside a singular position, one is stuck
-    turnover = np.array([0.0, 0.0, -11.0, -1e4, 0.0])
-    there = Place(control.target, np.full(count, 0.5), np.full(count, 1.0), turnover)
-    there.turnover[3], there.radius[3] = -9.0, 100.0
+    det_rate = np.array([0.0, 0.0, -11.0, -1e4, 0.0])
+    there = Place(control.target, np.full(count, 0.5), np.full(count, 1.0), det_rate)
+    there.det_rate[3], there.radius[3] = -9.0, 100.0
     after, taken = decided(control, status, there)
     np.testing.assert_array_equal(taken, [True, False, False, True, False])
     np.testing.assert_allclose(after.step[:3], [GROWTH * 0.1, 0.05, 0.05], rtol=1e-15)
@@ -63,8 +63,8 @@ def test_each_design_has_an_outcome_of_its_own():
 def test_a_design_among_many_is_decided_as_alone(status):
     random = np.random.default_rng(1)
     count = 9
-    safe, turnover = random.uniform(0.01, 0.5, count), random.normal(size=count) * 5
-    control = jax.tree.map(np.asarray, planned(placed(random.uniform(0, 1, count), safe, turnover=turnover), LIMITS))
+    safe, det_rate = random.uniform(0.01, 0.5, count), random.normal(size=count) * 5
+    control = jax.tree.map(np.asarray, planned(placed(random.uniform(0, 1, count), safe, det_rate=det_rate), LIMITS))
     there = Place(control.target, random.uniform(0.01, 0.5, count), np.ones(count), random.normal(size=count) * 5)
     outcome = np.full(count, int(status))
     many = decided(control, outcome, there)

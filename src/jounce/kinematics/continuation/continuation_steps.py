@@ -15,8 +15,8 @@ from jaxtyping import Bool, Float, Int
 from jounce.execution.compilation import compiled
 from jounce.execution.mapped import called
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult, advance, predictor
-from jounce.kinematics.continuation.instant_program import finds_turnover
-from jounce.kinematics.continuation.singularity_distance import turnover_at
+from jounce.kinematics.continuation.instant_program import finds_det_rate
+from jounce.kinematics.continuation.singularity_distance import det_rate_at
 from jounce.kinematics.continuation.step_control import (
     Place,
     StepControl,
@@ -38,7 +38,7 @@ class Settings(NamedTuple):
 
     tolerance: Number
     refine: Bool[Numbers, ""]
-    survey: Bool[Numbers, ""]
+    search: Bool[Numbers, ""]
     wanted: Int[Numbers, ""]
 
 
@@ -68,7 +68,7 @@ class Records(NamedTuple):
 class TakenSteps(NamedTuple):
     """What came of a run."""
 
-    way: StepState
+    run: StepState
     records: Records
     last: StepResult  # the last batch
     count: Int[Numbers, ""]  # of batches solved
@@ -90,7 +90,7 @@ def _calls_code(*_: Any, native: str | None, **__: Any) -> bool:
 )
 def take_steps(
     system: System,
-    way: StepState,
+    run: StepState,
     grid: Float[Numbers, " time"],
     limits: StepLimits,
     settings: Settings,
@@ -101,13 +101,13 @@ def take_steps(
     batches: int,
     native: str | None = None,
 ) -> TakenSteps:
-    """Go on along a way until it arrives, something is out of the ordinary, or enough batches are solved.
+    """Go on with a run until it arrives, something is out of the ordinary, or enough batches are solved.
 
     Parameters
     ----------
     system : System
         The mechanism.
-    way : StepState
+    run : StepState
         Where to go on from.
     grid : array of shape (time,)
         The next instants of the grid, s; infinite beyond the last. At least one batch more than can be solved.
@@ -123,37 +123,37 @@ def take_steps(
         Name of the machine code that solves a batch, see `advance_instant`; unless it is given, the run does.
     """
 
-    def solved(way: StepState) -> Any:
+    def solved(run: StepState) -> Any:
         if native is not None:
-            tolerance, refine, survey, wanted = settings
-            first = np.arange(len(way.instant)) == 0
-            lanes = way.known, way.away, way.instant, None, survey & first
+            tolerance, refine, search, wanted = settings
+            first = np.arange(len(run.instant)) == 0
+            lanes = run.known, run.away, run.instant, None, search & first
             arrival = called(native, (system, tolerance, refine, wanted), lanes)
-            if finds_turnover(system):
-                return arrival._replace(turnover=arrival.turnover[:1])
-            there = partial(turnover_at, system, pose_type, arrival.coordinates, way.instant)
-            return arrival._replace(turnover=jax.lax.cond(survey, there, lambda: jnp.zeros(1)))
-        return _batch(system, *way.known, way.away, way.instant, *settings, pose_type=pose_type, order=order)
+            if finds_det_rate(system):
+                return arrival._replace(det_rate=arrival.det_rate[:1])
+            there = partial(det_rate_at, system, pose_type, arrival.coordinates, run.instant)
+            return arrival._replace(det_rate=jax.lax.cond(search, there, lambda: jnp.zeros(1)))
+        return _batch(system, *run.known, run.away, run.instant, *settings, pose_type=pose_type, order=order)
 
     def going(state: TakenSteps) -> Any:
-        return (state.way.control.ending == int(StopReason.UNFINISHED)) & (state.count < most)
+        return (state.run.control.ending == int(StopReason.UNFINISHED)) & (state.count < most)
 
     def go_on(state: TakenSteps) -> TakenSteps:
-        arrival = _typed(solved(state.way), blank)
+        arrival = _typed(solved(state.run), blank)
         known = predictor(system, pose_type, (arrival.coordinates, arrival.outputs, arrival.sign))
-        way, found = _after(state.way, arrival, known, grid, limits)
+        run, found = _after(state.run, arrival, known, grid, limits)
         put = jax.lax.dynamic_update_index_in_dim
         records = jax.tree.map(lambda xs, x: put(xs, x, state.count, 0), state.records, _typed(found, state.records))
-        return TakenSteps(_typed(way, state.way), records, arrival, state.count + 1)
+        return TakenSteps(_typed(run, state.run), records, arrival, state.count + 1)
 
-    shapes = jax.eval_shape(solved, way)
+    shapes = jax.eval_shape(solved, run)
     blank = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes)
-    yes, lanes, place = np.zeros((), bool), np.zeros(len(way.instant), int), Place(*map(np.asarray, np.zeros(4)))
+    yes, lanes, place = np.zeros((), bool), np.zeros(len(run.instant), int), Place(*map(np.asarray, np.zeros(4)))
     once = Records(shapes.coordinates, shapes.outputs, shapes.sign, shapes.status, lanes, place, yes)
     records = jax.tree.map(lambda x: jnp.zeros((batches, *x.shape), x.dtype), once)
-    way = _typed(way, way)
-    way = jax.lax.cond(way.planned, lambda: way, lambda: _typed(_planned(way, grid, limits), way))
-    return jax.lax.while_loop(going, go_on, TakenSteps(way, records, blank, jnp.zeros((), int)))
+    run = _typed(run, run)
+    run = jax.lax.cond(run.planned, lambda: run, lambda: _typed(_planned(run, grid, limits), run))
+    return jax.lax.while_loop(going, go_on, TakenSteps(run, records, blank, jnp.zeros((), int)))
 
 
 def _typed(values: Any, like: Any) -> Any:
@@ -161,40 +161,40 @@ def _typed(values: Any, like: Any) -> Any:
     return jax.tree.map(lambda x, y: jax.lax.convert_element_type(x, np.result_type(y)), values, like)
 
 
-def _planned(way: StepState, grid: Float[Numbers, " time"], limits: StepLimits) -> StepState:
-    """Return the way with its next step, or why there is none."""
-    return _aimed(way, planned(way.control, limits), grid)
+def _planned(run: StepState, grid: Float[Numbers, " time"], limits: StepLimits) -> StepState:
+    """Return the run with its next step, or why there is none."""
+    return _aimed(run, planned(run.control, limits), grid)
 
 
-def _aimed(way: StepState, control: StepControl, grid: Float[Numbers, " time"]) -> StepState:
-    """Return the way with a step to try, and in the other lanes the next instants of the grid within it."""
-    instant = jnp.concatenate([control.target[None], jnp.minimum(_next_up(way, grid), control.target)])
+def _aimed(run: StepState, control: StepControl, grid: Float[Numbers, " time"]) -> StepState:
+    """Return the run with a step to try, and in the other lanes the next instants of the grid within it."""
+    instant = jnp.concatenate([control.target[None], jnp.minimum(_next_up(run, grid), control.target)])
     away = instant - control.place.instant
-    return way._replace(control=control, instant=instant, away=away, planned=jnp.ones((), bool))
+    return run._replace(control=control, instant=instant, away=away, planned=jnp.ones((), bool))
 
 
-def _next_up(way: StepState, grid: Float[Numbers, " time"]) -> Float[Numbers, " lane"]:
-    return jax.lax.dynamic_slice_in_dim(grid, way.next_up, len(way.instant) - 1)
+def _next_up(run: StepState, grid: Float[Numbers, " time"]) -> Float[Numbers, " lane"]:
+    return jax.lax.dynamic_slice_in_dim(grid, run.next_up, len(run.instant) - 1)
 
 
 def _after(
-    way: StepState,
+    run: StepState,
     arrival: StepResult,
     known: SolvedState,
     grid: Float[Numbers, " time"],
     limits: StepLimits,
 ) -> tuple[StepState, Records]:
-    """Return how the way stands after a batch, and what is recorded of it; `known` is of the arrival."""
-    control, status, lanes = way.control, arrival.status[0], len(way.instant) - 1
+    """Return how the run stands after a batch, and what is recorded of it; `known` is of the arrival."""
+    control, status, lanes = run.control, arrival.status[0], len(run.instant) - 1
     target = control.target
-    there = Place(target, arrival.safe_step[0], arrival.radius[0], arrival.turnover[0])
+    there = Place(target, arrival.safe_step[0], arrival.radius[0], arrival.det_rate[0])
     good = accepted(control, status, there)
-    within = good & (_next_up(way, grid) <= target)
-    lane = jnp.where(within, way.next_up + np.arange(lanes), -1)
-    way = way._replace(next_up=way.next_up + jnp.sum(within))
-    behind = jnp.sum(_next_up(way, grid) <= target)  # a few are solved from the next anchor, which is near them
+    within = good & (_next_up(run, grid) <= target)
+    lane = jnp.where(within, run.next_up + np.arange(lanes), -1)
+    run = run._replace(next_up=run.next_up + jnp.sum(within))
+    behind = jnp.sum(_next_up(run, grid) <= target)  # a few are solved from the next anchor, which is near them
     taken = good & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else the same step with those left
-    known = jax.tree.map(lambda new, old: jnp.where(taken, new[..., :1], old), known, way.known)
-    way = _aimed(way._replace(known=known), after(control, status, there, limits, (good, taken)), grid)
+    known = jax.tree.map(lambda new, old: jnp.where(taken, new[..., :1], old), known, run.known)
+    run = _aimed(run._replace(known=known), after(control, status, there, limits, (good, taken)), grid)
     solved = (arrival.coordinates, arrival.outputs, arrival.sign, arrival.status)
-    return way, Records(*solved, jnp.concatenate([jnp.full(1, -1), lane]), there, taken)
+    return run, Records(*solved, jnp.concatenate([jnp.full(1, -1), lane]), there, taken)

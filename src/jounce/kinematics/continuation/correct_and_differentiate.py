@@ -3,7 +3,7 @@
 Each lane of the batch is predicted by the Taylor series of a neighbor, corrected by Newton-Raphson, and
 differentiated order after order with the last factorization of its Jacobian (Sommer 2024, equations 1-8). That it is on
 the branch of its neighbor is not judged by how near the prediction was: the simplified Newton iteration must contract
-(Deuflhard 2011, chapter 5), the determinant of the Jacobian must keep its sign, and where an instant is surveyed, the
+(Deuflhard 2011, chapter 5), the determinant of the Jacobian must keep its sign, and where one is searched for, the
 nearest zero of that determinant is told, real or complex, beyond which no step may go.
 """
 
@@ -26,7 +26,7 @@ from jounce.kinematics.continuation.predictor import (
     near_prediction,
     travel_of,
 )
-from jounce.kinematics.continuation.singularity_distance import turnover_of
+from jounce.kinematics.continuation.singularity_distance import det_rate_of
 from jounce.kinematics.status import Status
 from jounce.linear_algebra.least_squares import LeastSquaresFactor
 from jounce.mechanism.axis_angles import measures_angle
@@ -58,7 +58,7 @@ class StepResult(NamedTuple):
     radius: Lanes  # s, the same by the first three Taylor terms only, which rounding spoils least
     deviation: Lanes  # departure from the prediction, over how far that moves
     sign: Lanes  # of the determinant of the Jacobian
-    turnover: Lanes  # 1/s, how fast the first lane nears (< 0) or leaves a singular position; 0 unless surveyed; (1,)
+    det_rate: Lanes  # 1/s, how fast the first lane nears (< 0) or leaves a singular position; 0 unless searched; (1,)
     pivot_ratio: Lanes  # smallest pivot of the Jacobian over the largest
     admissible: Bool[Numbers, "driver batch"]  # whether each driver has a permitted value
     finite: Bool[Numbers, "result batch"]  # whether all derivatives wanted are, of the pose and of each output
@@ -226,12 +226,12 @@ def advance(
     instant: Lanes,
     tolerance: Float[Numbers, ""],
     refine: Bool[Numbers, ""],
-    survey: Bool[Numbers, ""],
+    search: Bool[Numbers, ""],
     wanted: Int[Numbers, ""],
     *,
     pose_type: type[Pose],
     order: int,
-    with_turnover: bool = True,
+    with_det_rate: bool = True,
 ) -> StepResult:
     """Solve a batch of instants, each from a neighbor solved before.
 
@@ -250,25 +250,25 @@ def advance(
         Largest correction of an accepted pose, rad or sizes of the mechanism.
     refine : bool
         Whether to correct accepted poses to rounding.
-    survey : bool
+    search : bool
         Whether to look for the nearest singular position.
     wanted : int
         Highest derivative that must be finite.
     pose_type, order
         PlanarPose or SpatialPose; derivatives wanted.
-    with_turnover : bool, default True
-        Whether the turnover is looked for here, too; else it is left at zero.
+    with_det_rate : bool, default True
+        Whether the rate of the determinant is looked for here, too; else it is left at zero.
     """
     given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
     arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order)
     first = arrival.status[:1]
 
-    def surveyed() -> Any:
+    def searched() -> Any:
         hidden = hidden_by_laws(system, first, instant[:1], step[:1], order)
-        return turnover_of(system, pose_type, reached, factor, instant) if with_turnover else np.zeros(1), hidden
+        return det_rate_of(system, pose_type, reached, factor, instant) if with_det_rate else np.zeros(1), hidden
 
-    turnover, first = jax.lax.cond(survey, surveyed, lambda: (np.zeros(1), first))
-    return arrival._replace(turnover=turnover, status=jnp.concatenate([first, arrival.status[1:]]))
+    det_rate, first = jax.lax.cond(search, searched, lambda: (np.zeros(1), first))
+    return arrival._replace(det_rate=det_rate, status=jnp.concatenate([first, arrival.status[1:]]))
 
 
 def solved_batch(
@@ -285,7 +285,7 @@ def solved_batch(
     pose_type: type[Pose],
     order: int,
 ) -> tuple[StepResult, Factor, dict[str, Jet]]:
-    """Return what `advance` does but for the turnover, with the factored Jacobian and the jets of the pose."""
+    """Return what `advance` does but for that rate, with the factored Jacobian and the jets of the pose."""
     # what a law makes infinite, such as the third derivative of t**2.5 at t = 0, is of no use to a prediction
     moving = {name: Jet(tuple(jnp.where(jnp.isfinite(c), c, 0.0))) for name, c in coordinates.items()}
     predicted = pose_type.predicted_from(moving, step)

@@ -11,7 +11,7 @@ from jounce.execution.device import on_processor
 from jounce.execution.mapped import GPU_WIDTH, mapped
 from jounce.kinematics.continuation.correct_and_differentiate import StepResult, advance, solved_batch
 from jounce.kinematics.continuation.predictor import hidden_by_laws
-from jounce.kinematics.continuation.singularity_distance import turnovers_of
+from jounce.kinematics.continuation.singularity_distance import det_rates_of
 from jounce.mechanism.system import System
 from jounce.modules import with_fields
 from jounce.rigid.pose import Pose
@@ -33,21 +33,21 @@ def round_width(system: System) -> int:
 
 
 def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
-    """Solve many instants as `advance_instant` does one; those of one motion are not surveyed."""
-    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, own, survey) = shared, instants
+    """Solve many instants as `advance_instant` does one; those of one motion are not searched."""
+    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, own, search) = shared, instants
     system = of_design(system, own)
     given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
     arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order)
     nothing = jnp.zeros_like(step)
     if own is None:
-        return arrival._replace(turnover=nothing)
+        return arrival._replace(det_rate=nothing)
 
-    def surveyed() -> Any:
+    def searched() -> Any:
         hidden = hidden_by_laws(system, arrival.status, instant, step, order)
-        return turnovers_of(system, pose_type, reached, factor, instant), hidden
+        return det_rates_of(system, pose_type, reached, factor, instant), hidden
 
-    turnover, status = jax.lax.cond(jnp.any(survey), surveyed, lambda: (nothing, arrival.status))
-    return arrival._replace(turnover=turnover, status=status)
+    det_rate, status = jax.lax.cond(jnp.any(search), searched, lambda: (nothing, arrival.status))
+    return arrival._replace(det_rate=det_rate, status=status)
 
 
 @mapped(by_xla=_of_many)
@@ -65,7 +65,7 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
     pose_type, order
         As those of `advance`.
     """
-    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, own, survey) = shared, instants
+    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, own, search) = shared, instants
     return advance(
         with_fields(of_design(system, own), reflected=True),
         coordinates,
@@ -75,11 +75,11 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
         instant,
         tolerance,
         refine,
-        survey[0],
+        search[0],
         wanted,
         pose_type=pose_type,
         order=order,
-        with_turnover=own is not None or finds_turnover(system),
+        with_det_rate=own is not None or finds_det_rate(system),
     )
 
 
@@ -91,6 +91,6 @@ def of_design(system: System, own: Mapping[int, Any] | None) -> System:
     return jax.tree.unflatten(structure, [own.get(k, leaf) for k, leaf in enumerate(leaves)])
 
 
-def finds_turnover(system: System) -> bool:
-    """Tell whether the turnover of an instant of one motion is found with it; of many bodies it takes vectors."""
+def finds_det_rate(system: System) -> bool:
+    """Tell whether the rate of the determinant is found with an instant of one motion; many bodies take vectors."""
     return system.fronts is None

@@ -46,7 +46,7 @@ class Anchor:
         Jets of the coordinates and of the outputs, and the sign of the determinant of the Jacobian.
     safe_step, radius : float
         How far the Taylor series carries, s: with all its terms, and with the first three where its terms grow to one.
-    turnover : float
+    det_rate : float
         Rate at which the Jacobian nears a singular one (below zero) or leaves it, 1/s.
     status : Status
         OK, or UNDEFINED, where an output has no finite value: the motion goes on there.
@@ -56,24 +56,24 @@ class Anchor:
     state: SolvedState
     safe_step: float
     radius: float
-    turnover: float
+    det_rate: float
     status: Status
 
     @classmethod
     def of(cls, arrival: StepResult, instant: float) -> "Anchor":
-        """Build the anchor from the first lane of a batch that was surveyed."""
-        safe_step, radius, turnover = (float(x[0]) for x in (arrival.safe_step, arrival.radius, arrival.turnover))
-        return cls(float(instant), arrival.state(slice(1)), safe_step, radius, turnover, Status(int(arrival.status[0])))
+        """Build the anchor from the first lane of a batch that was searched for singular positions."""
+        safe_step, radius, det_rate = (float(x[0]) for x in (arrival.safe_step, arrival.radius, arrival.det_rate))
+        return cls(float(instant), arrival.state(slice(1)), safe_step, radius, det_rate, Status(int(arrival.status[0])))
 
     @property
     def place(self) -> tuple[float, float, float, float]:
-        """Instant, safe step, radius and turnover, as a run wants them."""
-        return self.instant, self.safe_step, self.radius, self.turnover
+        """Instant, safe step, radius and rate of the determinant, as a run takes them."""
+        return self.instant, self.safe_step, self.radius, self.det_rate
 
     @property
     def reach(self) -> float:
         """Time to or from the nearest singular position, to first order, s."""
-        return 1 / abs(self.turnover) if abs(self.turnover) > 0 else np.inf
+        return 1 / abs(self.det_rate) if abs(self.det_rate) > 0 else np.inf
 
 
 def _instant(anchor: Anchor) -> float:
@@ -112,9 +112,9 @@ class FollowedPath:
         steps = np.flatnonzero(records.taken)
         taken = [x[steps, ..., :1] for x in leaves]  # copies: an anchor is kept for long, the other lanes are not
         places = zip(*(x[steps].tolist() for x in (*records.place, records.status[:, 0])), strict=True)
-        for parts, (instant, safe_step, radius, turnover, status) in zip(zip(*taken, strict=True), places, strict=True):
+        for parts, (instant, safe_step, radius, det_rate, status) in zip(zip(*taken, strict=True), places, strict=True):
             state = jax.tree.unflatten(structure, parts)
-            self.anchors.append(Anchor(instant, state, safe_step, radius, turnover, Status(status)))
+            self.anchors.append(Anchor(instant, state, safe_step, radius, det_rate, Status(status)))
         solved = (records.lane >= 0) & (records.status == Status.OK)
         if solved.any():
             found = [np.moveaxis(x, 0, -2)[..., solved] for x in leaves]
@@ -164,13 +164,13 @@ class FollowedPath:
 
 def _is_left(place: "Anchor | Place") -> Any:
     """Tell whether a motion leaves a singular position close behind a place."""
-    return (place.turnover > 0) & (place.turnover * place.radius > 1 / NEARBY)
+    return (place.det_rate > 0) & (place.det_rate * place.radius > 1 / NEARBY)
 
 
 def _is_just_beyond(place: "Anchor | Place", end: float) -> Any:
     """Tell whether a motion nears a singular position close to a place, and comes to its end next to it or before."""
-    near = (place.turnover < 0) & (-place.turnover * place.radius > 1 / NEARBY)
-    return near & ((end - place.instant) * -place.turnover < 1 + LEAST_PASSAGE)
+    near = (place.det_rate < 0) & (-place.det_rate * place.radius > 1 / NEARBY)
+    return near & ((end - place.instant) * -place.det_rate < 1 + LEAST_PASSAGE)
 
 
 def is_spoiled_outside(place: Place, begins: Bool[np.ndarray, " lane"], end: float) -> Bool[np.ndarray, " lane"]:
@@ -197,7 +197,7 @@ def follow(
     solver : Solver
         What solves an instant from another.
     start : Anchor or StepState
-        Where to begin: a solved instant, or the way that begins with solving one; no anchor is found if that fails.
+        Where to begin: a solved instant, or the run that begins with solving one; no anchor is found if that fails.
     stop : float
         Instant to arrive at, s.
     span : float
@@ -208,32 +208,32 @@ def follow(
         Instants to be solved on the way, s, from where it begins.
     """
     if isinstance(start, Anchor):
-        path, way = FollowedPath([start]), solver.way(start.state, start.place, first_step)
+        path, run = FollowedPath([start]), solver.run_from(start.state, start.place, first_step)
     else:
-        path, way = FollowedPath([]), start
+        path, run = FollowedPath([]), start
     first = 0
     while not path.anchors or path.anchors[-1].instant < stop:
-        done = solver.take_steps(way, grid[first:], stop, SMALLEST_STEP * span)
+        done = solver.take_steps(run, grid[first:], stop, SMALLEST_STEP * span)
         path.add(done, first)
-        way = jax.tree.map(np.asarray, done.way)
+        run = jax.tree.map(np.asarray, done.run)
         if not path.anchors:
             arrival = jax.tree.map(np.asarray, done.last)
-            return path.ended(Status(int(arrival.status[0])), float(way.instant[0]), solver.fault(arrival, 0))
+            return path.ended(Status(int(arrival.status[0])), float(run.instant[0]), solver.fault(arrival, 0))
         here = path.anchors[-1]
-        control = way.control
+        control = run.control
         ending = int(control.ending)
-        first += int(way.next_up)
+        first += int(run.next_up)
         if ending == StopReason.PASSAGE:
             passed = _passed(solver, here, stop)
             if passed is None:
                 no = np.zeros((), bool)
                 control = control._replace(may_pass=no, ending=np.asarray(int(StopReason.UNFINISHED)))
-                way = way._replace(planned=no, control=control)
+                run = run._replace(planned=no, control=control)
                 continue
             far_side, change_point = passed
             path.anchors.append(far_side)
             path.change_points.append(change_point)
-            way = solver.way(far_side.state, far_side.place, float(control.largest), int(control.crawled))
+            run = solver.run_from(far_side.state, far_side.place, float(control.largest), int(control.crawled))
             first = int(np.searchsorted(grid, far_side.instant, side="right"))
         elif ending == StopReason.COLLAPSED:
             beyond = float(np.nextafter(here.instant, np.inf))
@@ -245,12 +245,12 @@ def follow(
 
 def _ended(solver: Solver, path: FollowedPath, done: TakenSteps, span: float) -> FollowedPath:
     """Return the path that cannot be followed any further: where a law was first refused, if it was."""
-    here, refused = path.anchors[-1], float(done.way.control.refused)
+    here, refused = path.anchors[-1], float(done.run.control.refused)
     if np.isnan(refused):
-        target, arrival = float(done.way.instant[0]), jax.tree.map(np.asarray, done.last)
+        target, arrival = float(done.run.instant[0]), jax.tree.map(np.asarray, done.last)
     else:
         target, instant = refused, np.array([refused])
-        arrival = solver(solver.needed(here.state), instant - here.instant, instant, survey=True)
+        arrival = solver(solver.needed(here.state), instant - here.instant, instant, search=True)
     status = Status(int(arrival.status[0]))
     if status != Status.INADMISSIBLE and here.reach < NEARLY_SINGULAR * span:
         status = Status.SINGULAR  # the range of the motion ends at a dead point
@@ -270,11 +270,11 @@ def _passed(solver: Solver, here: Anchor, stop: float) -> tuple[Anchor, ChangePo
     coordinates, outputs, sign = here.state
     shortened = jax.tree.map(_shortened, (coordinates, outputs))
     known = (*shortened, np.zeros_like(sign))  # the sign may change
-    arrival = solver(solver.needed(known), np.array([target - here.instant]), np.array([target]), survey=True)
+    arrival = solver(solver.needed(known), np.array([target - here.instant]), np.array([target]), search=True)
     beyond = Anchor.of(arrival, target)
     if arrival.status[0] not in PASSABLE or not arrival.deviation[0] <= PASSAGE_DEVIATION:
         return None
-    if not (beyond.turnover > 0 and abs(beyond.reach - (target - middle)) <= 0.5 * (target - middle)):
+    if not (beyond.det_rate > 0 and abs(beyond.reach - (target - middle)) <= 0.5 * (target - middle)):
         return None
     located = 0.5 * (middle + target - beyond.reach)  # what each side errs by cancels to the second order
     return beyond, ChangePoint(located, min(here.radius, beyond.radius))

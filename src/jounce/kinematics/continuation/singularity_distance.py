@@ -25,7 +25,7 @@ SQUARINGS = 4  # of the matrix of which the largest eigenvalue is sought
 PROBES = 8  # vectors by which the norm of a power of a large matrix is estimated
 
 
-def turnover_of(
+def det_rate_of(
     system: System,
     pose_type: type[Pose],
     coordinates: dict[str, Jet],
@@ -49,23 +49,23 @@ def turnover_of(
     return _of_matrix(factor.applied_inverse(system.pattern.dense(slope)[..., 0] * system.row_scale))
 
 
-def turnover_at(
+def det_rate_at(
     system: System, pose_type: type[Pose], coordinates: dict[str, Numbers], time: Float[Numbers, " batch"]
 ) -> Float[Numbers, " 1"]:
-    """Return what `turnover_of` does, from the jets of the coordinates alone."""
+    """Return what `det_rate_of` does, from the jets of the coordinates alone."""
     first = {name: Jet(tuple(x[:2, ..., :1])) for name, x in coordinates.items()}
     pose = pose_type.predicted_from(first, np.zeros(1))
-    return turnover_of(system, pose_type, first, factored(system, pose, Jet([time[None, :1]])), time)
+    return det_rate_of(system, pose_type, first, factored(system, pose, Jet([time[None, :1]])), time)
 
 
-def turnovers_of(
+def det_rates_of(
     system: System,
     pose_type: type[Pose],
     coordinates: dict[str, Jet],
     factor: Factor,
     time: Float[Numbers, " batch"],
 ) -> Float[Numbers, " batch"]:
-    """Return what `turnover_of` does, for all lanes."""
+    """Return what `det_rate_of` does, for all lanes."""
     first = {name: jet.truncate(1) for name, jet in coordinates.items()}
 
     def entries(step: Any) -> Any:

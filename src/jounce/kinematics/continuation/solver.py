@@ -50,17 +50,17 @@ class Solver:
         step: Float[np.ndarray, " batch"],
         instant: Float[np.ndarray, " batch"],
         *,
-        survey: bool = False,
+        search: bool = False,
     ) -> StepResult:
         """Solve instants from what is `needed` of solved ones.
 
-        Of a few instants, `survey` looks for singular positions.
+        Of a few instants, `search` looks for singular positions.
         """
         lanes = len(instant)
         if lanes <= SMALL_BATCH:
             known, step, instant = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), (needed, step, instant))
-            way = _way(known, (0.0,) * 4, away=step, instant=instant)
-            arrival = self._take_steps(way, NO_GRID, _limits(0.0, 0.0), 1, survey=survey).last
+            run = _run_from(known, (0.0,) * 4, away=step, instant=instant)
+            arrival = self._take_steps(run, NO_GRID, _limits(0.0, 0.0), 1, search=search).last
         else:
             arrival = self.program((needed, step, instant, None, np.zeros(step.shape, bool)))
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
@@ -109,25 +109,25 @@ class Solver:
         lanes = self.needed(store), (step, instant, own), np.zeros(1, bool)
         return self.program.rounds(lanes, StepResult(**(nothing | wanted)), sources)
 
-    def take_steps(self, way: StepState, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> TakenSteps:
-        """Go on along a way with the next instants of a grid, as far as they fit; see `continuation_steps`."""
-        way = way._replace(next_up=np.zeros((), int))
-        return self._take_steps(way, grid, _limits(stop, smallest), self._batches, survey=True)
+    def take_steps(self, run: StepState, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> TakenSteps:
+        """Go on with a run and the next instants of a grid, as far as they fit; see `continuation_steps`."""
+        run = run._replace(next_up=np.zeros((), int))
+        return self._take_steps(run, grid, _limits(stop, smallest), self._batches, search=True)
 
     def prepare(self) -> None:
         """Make the program of runs, unless it is there; nothing is solved."""
-        way = self.beginning(self.still(self.model.guess), 0.0)
-        self._take_steps(way, NO_GRID, _limits(0.0, 0.0), 0, survey=True, only_made=True)
+        run = self.beginning(self.still(self.model.guess), 0.0)
+        self._take_steps(run, NO_GRID, _limits(0.0, 0.0), 0, search=True, only_made=True)
 
-    def way(self, solved: SolvedState, place: Sequence[float], largest: float, crawled: int = 0) -> StepState:
-        """Return the way that begins at a solved instant, the place of an anchor, with a largest first step, s."""
+    def run_from(self, solved: SolvedState, place: Sequence[float], largest: float, crawled: int = 0) -> StepState:
+        """Return the run that begins at a solved instant, the place of an anchor, with a largest first step, s."""
         known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(solved))
-        return _way(known, place, largest=largest, crawled=crawled)
+        return _run_from(known, place, largest=largest, crawled=crawled)
 
     def beginning(self, guess: SolvedState, instant: float) -> StepState:
-        """Return the way that begins with solving an instant, from a position put together there."""
+        """Return the run that begins with solving an instant, from a position put together there."""
         known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(guess))
-        return _way(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant))
+        return _run_from(known, (instant, 0.0, 0.0, 0.0), instant=np.full(SMALL_BATCH, instant))
 
     @property
     def backend(self) -> str:
@@ -189,22 +189,22 @@ class Solver:
 
     def _take_steps(
         self,
-        way: StepState,
+        run: StepState,
         grid: Float[np.ndarray, " time"],
         limits: StepLimits,
         most: int,
         *,
-        survey: bool,
+        search: bool,
         only_made: bool = False,
     ) -> Any:
         room = (self._batches + 1) * (SMALL_BATCH - 1)
         window = np.full(room, np.inf)
         window[: len(grid)] = grid[:room]
-        settings, kind = self._settings._replace(survey=np.asarray(survey)), self.model.pose_type
-        run = take_steps.prepare if only_made else take_steps
-        return run(
+        settings, kind = self._settings._replace(search=np.asarray(search)), self.model.pose_type
+        call = take_steps.prepare if only_made else take_steps
+        return call(
             self.model.system,
-            way,
+            run,
             window,
             limits,
             settings,
@@ -236,7 +236,7 @@ class Solver:
         return f"{', '.join(list(names)[:4])} ({told})"
 
 
-def _way(
+def _run_from(
     known: SolvedState,
     place: Sequence[float],
     *,
@@ -245,7 +245,7 @@ def _way(
     largest: float = np.inf,
     crawled: int = 0,
 ) -> StepState:
-    """Return a way that begins, with what is solved first, if that is told."""
+    """Return a run that begins, with what is solved first, if that is told."""
     nothing = np.zeros(SMALL_BATCH)
     here = nothing if instant is None else instant
     control = steps_begin(Place(*map(np.asarray, place)), np.asarray(here[0]))

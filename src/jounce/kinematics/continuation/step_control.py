@@ -19,7 +19,7 @@ from jounce.kinematics.continuation.correct_and_differentiate import SAFE_FRACTI
 from jounce.kinematics.status import Status
 from jounce.shapes import Numbers
 
-LARGEST_TURNOVER = 1.0  # of the Jacobian over a step, seen from its end; from its start, SAFE_FRACTION
+LARGEST_DET_RATE = 1.0  # of the Jacobian over a step, seen from its end; from its start, SAFE_FRACTION
 PASSAGE = 3e-3  # of the radius of the series: so near a singular position it is seen whether the motion is smooth there
 CRAWLING = 1e-6  # of what is left of the motion: steps this short, and for so many anchors,
 LONGEST_CRAWL = 300  # are no sharp turn, which takes a few dozen, but a law that grows beyond all bounds
@@ -46,12 +46,12 @@ class Place(NamedTuple):
     instant: Lanes
     safe_step: Lanes
     radius: Lanes
-    turnover: Lanes
+    det_rate: Lanes
 
     @property
     def reach(self) -> Any:
         """Time to or from the nearest singular position, to first order, s."""
-        rate = jnp.abs(self.turnover)
+        rate = jnp.abs(self.det_rate)
         return jnp.where(rate > 0, 1 / jnp.where(rate > 0, rate, 1.0), jnp.inf)
 
 
@@ -88,7 +88,7 @@ def planned(control: StepControl, limits: StepLimits) -> StepControl:
     left = limits.stop - place.instant
     step = jnp.minimum(jnp.minimum(place.safe_step, SAFE_FRACTION * place.reach), jnp.minimum(control.largest, left))
     crawled = jnp.where(step < CRAWLING * left, control.crawled + 1, 0)
-    singular = control.may_pass & (place.turnover < 0) & (place.reach < PASSAGE * place.radius)
+    singular = control.may_pass & (place.det_rate < 0) & (place.reach < PASSAGE * place.radius)
     endings = (
         ((crawled > LONGEST_CRAWL) | (place.instant + step == place.instant), StopReason.COLLAPSED),
         (singular, StopReason.PASSAGE),
@@ -107,7 +107,7 @@ def planned(control: StepControl, limits: StepLimits) -> StepControl:
 def accepted(control: StepControl, status: Int[Numbers, "*batch"], there: Place) -> Truths:
     """Tell whether a step may be taken, of which the status is known, and the place that it led to."""
     passable = (status == int(Status.OK)) | (status == int(Status.UNDEFINED))
-    return passable & ((control.step == 0) | (control.step * jnp.abs(there.turnover) <= LARGEST_TURNOVER))
+    return passable & ((control.step == 0) | (control.step * jnp.abs(there.det_rate) <= LARGEST_DET_RATE))
 
 
 def after(

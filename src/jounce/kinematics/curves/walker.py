@@ -298,7 +298,7 @@ class Walker:
     def nearing(self, place: Place) -> complex:
         """Return the arc length to the nearest place where the bordered Jacobian is singular; it may be complex.
 
-        As for motions in time (see `turnover`): minus the inverse of the eigenvalue of ``B^-1 B'`` of largest size.
+        As for motions in time (see `det_rate`): minus the inverse of the eigenvalue of ``B^-1 B'`` of largest size.
         """
         matrix = self.bordered(place.jacobian, self.tangent(place), place.rows)
         slope = self.bordered(place.slope, self._turning(place), place.rows)

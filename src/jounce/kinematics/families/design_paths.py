@@ -127,7 +127,7 @@ class DesignPaths:
                 return found
             away, own = control.target - control.place.instant, self.designs.own(lanes)
             arrival = solver.program((known, away, control.target, own, np.ones(len(lanes), bool)))
-            there: Any = Place(control.target, arrival.safe_step, arrival.radius, arrival.turnover)
+            there: Any = Place(control.target, arrival.safe_step, arrival.radius, arrival.det_rate)
             begins: Any = control.step == 0
             control, taken = decide((control, arrival.status, there))
             unlike = taken & ((arrival.status != Status.OK) | is_spoiled_outside(there, begins, last))
