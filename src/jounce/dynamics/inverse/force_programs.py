@@ -11,6 +11,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.forward.accelerations import Lanes
@@ -26,6 +27,7 @@ from jounce.execution.store import is_wanted_soon
 from jounce.jet import Jet, cross
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics.sensitivity.jacobian_series import along_displacements, slopes
+from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism.axis_angles import with_turns
 from jounce.mechanism.system import Group, System, movable, with_rows
 from jounce.modules import with_fields
@@ -102,6 +104,13 @@ def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, A
         return least_multipliers.function(system, blocks, load, *choice), finite
     still = None if system.shape[0] == system.shape[1] else part_of(bodies, None, 1)
     return multipliers.function(system, blocks, load, still, masses, pose_type)[None], finite
+
+
+def without_constraints(system: System, forces: tuple[Group, ...]) -> System:
+    """Return a system with forces and nothing that joins its bodies."""
+    nothing = Pattern.of((), (), system.pattern.width, system.body_count)
+    values = {"groups": (), "pattern": nothing, "row_scale": np.zeros((0, 1)), "rank": None, "fronts": None}
+    return with_fields(system, **values, forces=forces)
 
 
 def balance_of_instant(shared: Any, lanes: Any, pose_type: type[Pose]) -> OnLlvm | None:

@@ -17,7 +17,6 @@ from jounce.errors import MechanismError
 from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.continuation.change_points import spoiled
-from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism.axis_angles import at_lanes, measures_angle
 from jounce.mechanism.element_indices import ElementIndex, element_indices, force_names
 from jounce.mechanism.redundant_reactions import resolved_reactions
@@ -58,7 +57,7 @@ class MotionForces:
         self.forces = motion.forces if applied else ()
         self.indices = element_indices(self.model)
         system = self.model.system  # programs without laws serve all of them, also those that a motion has found
-        self._bare = dataclasses.replace(system, groups=tuple(map(law_left_out, system.groups)))
+        self._joined = dataclasses.replace(system, groups=tuple(map(law_left_out, system.groups)), outputs=())
         self._kept: dict[tuple[Any, ...], Numbers] = {}
         self.flanks: teeth.Flanks = teeth.either_flank(system.groups, len(motion.time)) if flanks else {}
         self._reversals: dict[int, np.ndarray] = {}
@@ -89,7 +88,7 @@ class MotionForces:
         """Multipliers that balance the loads; after them some that balance none, where any are looked for."""
         if not self.flanks:
             return self._balanced({})
-        teeth.check_pitch(self.motion, self._bare.groups, lambda k: self._poses(k, np.arange(len(self.motion.time))))
+        teeth.check_pitch(self.motion, self._joined.groups, lambda k: self._poses(k, np.arange(len(self.motion.time))))
         found, known, self._reversals = teeth.settled(self._balanced, self.flanks, self.model, self.motion)
         if self._looks_for_open:  # what is open presses on no flank that is known: any others tell what depends on it
             found = np.stack([found[0], self._balanced(teeth.by_chance(known))[1]])
@@ -105,7 +104,6 @@ class MotionForces:
     def _balanced(self, flanks: teeth.Flanks) -> Float[Numbers, "case level row time"]:
         """Return what balances the loads, and balances none, with flanks that teeth press on."""
         self.flanks = flanks
-        square = self.model.system.shape[0] == self.model.system.shape[1]
         choice = None if self.model.system.rank is None else self._choice
         code = self._balancing_code(choice)
 
@@ -115,12 +113,12 @@ class MotionForces:
                 self._check_finite(finite, lanes)
                 return found
             blocks, (bodies, *_, instants) = self._blocks(lanes), self._lanes(lanes)
-            forces = self._loaded(lanes)
+            forces = programs.without_constraints(self._joined, at_lanes(self.forces, lanes))
             load, finite = programs.body_loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
             self._check_finite(finite, lanes)
             if choice is not None:
                 return programs.least_multipliers(self._joined, blocks, load, *choice)
-            still = None if square else self.coordinates_at(None, lanes, 1)
+            still = None if self._joined.shape[0] == self._joined.shape[1] else self.coordinates_at(None, lanes, 1)
             return programs.multipliers(self._joined, blocks, load, still, self.masses, self.pose_type)[None]
 
         found = self.in_chunks(chunk)
@@ -129,27 +127,17 @@ class MotionForces:
 
     def _balancing_code(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
         """Return what `balance_of_instant` does, for a choice among multipliers of redundant rows."""
-        first = np.zeros(1, int)
-        shared = self._joined, self._loaded(first), self.masses, self.gravity, choice
-        return programs.balance_of_instant(shared, self._lanes(first), self.pose_type)
+        one = self._lanes(first := np.zeros(1, int))
+        loaded = programs.without_constraints(self._joined, at_lanes(self.forces, first))
+        return programs.balance_of_instant(
+            (self._joined, loaded, self.masses, self.gravity, choice), one, self.pose_type
+        )
 
     def _lanes(self, lanes: np.ndarray) -> Any:
         """Return what a balance takes of some instants."""
-        bodies = self.coordinates_at(None, lanes, self.levels + 2)
-        angles = [group.element.datum.near for group in self.forces if measures_angle(group)]
-        turned, pressed = (tuple(x[..., lanes] for x in each) for each in (angles, self.flanks.values()))
-        return bodies, turned, pressed, self.motion.time[lanes]
-
-    @property
-    def _joined(self) -> Any:
-        """The system with joints and drivers, without their laws."""
-        return dataclasses.replace(self._bare, outputs=())
-
-    def _loaded(self, lanes: np.ndarray) -> Any:
-        """Return the system with forces at some instants, whose angles are given with each, and nothing that joins."""
-        nothing = Pattern.of((), (), self._bare.pattern.width, self._bare.body_count)
-        free = {"groups": (), "pattern": nothing, "row_scale": np.zeros((0, 1)), "rank": None, "fronts": None}
-        return dataclasses.replace(self._joined, forces=at_lanes(self.forces, lanes), **free)
+        angles = tuple(group.element.datum.near[..., lanes] for group in self.forces if measures_angle(group))
+        pressed = tuple(flank[..., lanes] for flank in self.flanks.values())
+        return self.coordinates_at(None, lanes, self.levels + 2), angles, pressed, self.motion.time[lanes]
 
     @property
     def _choice(self) -> tuple[Numbers, Numbers, Numbers]:
@@ -419,11 +407,10 @@ class MotionForces:
             raise MechanismError(f"has no finite value at t = {instant:g} s; check its law", name=f"forces.{name}")
 
     def _poses(self, index: int, lanes: np.ndarray) -> tuple[dict[str, Any], ...]:
-        bodies = self.model.system.groups[index].bodies
-        return tuple(self.coordinates_at(slot, lanes, self.levels) for slot in bodies)
+        return tuple(self.coordinates_at(slot, lanes, self.levels) for slot in self.model.system.groups[index].bodies)
 
     def _slopes(self, index: int, slot: int, lanes: np.ndarray) -> Any:
-        group = self._bare.groups[index]
+        group = self._joined.groups[index]
         if index in self.flanks:
             group = holding(group, "flank", self.flanks[index][..., lanes])
         element, poses, instants = group.element, self._poses(index, lanes), self.motion.time[lanes]
