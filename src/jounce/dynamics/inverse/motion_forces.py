@@ -128,10 +128,8 @@ class MotionForces:
     def _balancing_code(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
         """Return what `balance_of_instant` does, for a choice among multipliers of redundant rows."""
         one = self._lanes(first := np.zeros(1, int))
-        loaded = programs.without_constraints(self._joined, at_lanes(self.forces, first))
-        return programs.balance_of_instant(
-            (self._joined, loaded, self.masses, self.gravity, choice), one, self.pose_type
-        )
+        free = programs.without_constraints(self._joined, at_lanes(self.forces, first))
+        return programs.balance_of_instant((self._joined, free, self.masses, self.gravity, choice), one, self.pose_type)
 
     def _lanes(self, lanes: np.ndarray) -> Any:
         """Return what a balance takes of some instants."""
