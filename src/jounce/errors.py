@@ -303,12 +303,13 @@ class MechanismFileError(MechanismError):
 class MobilityError(MechanismError):
     """The drivers and joints do not leave exactly zero degrees of freedom.
 
-    ``status`` is that of a singular position, where the start is one.
+    ``status`` is that of a singular position, where the start is one. ``idle`` are the axes of bodies that may spin
+    about themselves, on the bodies, by body, where all degrees of freedom left are of that kind.
     """
 
-    def __init__(self, message: str, *, status: Any = None, **place: Any) -> None:
+    def __init__(self, message: str, *, status: Any = None, idle: Any = None, **place: Any) -> None:
         super().__init__(message, **place)
-        self.status = status
+        self.status, self.idle = status, idle or {}
 
 
 class RobotError(JounceError):
@@ -363,6 +364,10 @@ class UnitWarning(_BoundedWarning):
 
 class AssemblyWarning(_BoundedWarning):
     """Bodies were put together with a part turned over in its joint, unlike in the starting guess."""
+
+
+class IdleMotionWarning(_BoundedWarning):
+    """Bodies that may spin about an axis of themselves, which moves nothing else, are held by the least motion."""
 
 
 class MachineCodeWarning(_BoundedWarning):

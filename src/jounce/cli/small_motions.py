@@ -35,6 +35,7 @@ def modes(
     hold: list[str] | None = None,
     release: list[str] | None = None,
     coordinate: list[str] | None = None,
+    moving: bool = False,
     out: Path | None = None,
     animation: Path | None = None,
     mode: int = 1,
@@ -44,6 +45,8 @@ def modes(
     json: bool = False,
 ) -> int:
     """Tell where a mechanism stands still, and its modes about that place.
+
+    With --moving, the modes about the motion that it starts with.
 
     Equilibrium and its stability, natural frequencies, damping ratios,
     and what moves most in each mode.
@@ -64,6 +67,8 @@ def modes(
         Driver whose force stays instead of its motion; repeatable.
     coordinate
         Output or coordinate of a body to use; repeatable [chosen].
+    moving
+        About the motion of the initial conditions, as of a bicycle.
     out
         Write eigenvalues and shapes to this .csv file.
     animation
@@ -84,6 +89,8 @@ def modes(
       jounce modes examples/robots/planar_arm.xml
       jounce modes examples/double_pendulum.yaml --animation second.gif \
         --mode 2
+      jounce modes examples/bicycle.yaml --moving --set push=0 \
+        --coordinate frame.x --coordinate frame.turn_x --coordinate steer
     """
     from jounce.io.files.writing import check_target
     from jounce.reporting.facts.modes_facts import equilibrium_tables, equilibrium_words, modes_facts, modes_table
@@ -99,20 +106,26 @@ def modes(
         spare_inputs(target, overwrite=overwrite)
     from jounce.dynamics import equilibrium, linearize
 
+    rest = None
     with _errors_about(file):
-        rest = equilibrium(subject, time, method=method, **settings)
-        small = linearize(rest, coordinates=coordinate, release=release or ())
+        if moving:
+            small = _in_motion(subject, time, coordinate, settings | {"release": release})
+        else:
+            rest = equilibrium(subject, time, method=method, **settings)
+            small = linearize(rest, coordinates=coordinate, release=release or ())
         modes_found = small.modes
         facts = modes_facts(small, file, without or [])
         moved = None if animation is None else modes_found.motion(mode, amplitude)
     if not json:
-        say(f"{rest.mechanism.title or file.name}\n{equilibrium_words(facts['equilibrium'])}\n")
-        for table in (*equilibrium_tables(rest), modes_table(modes_found)):
+        resting = facts["equilibrium"]
+        words = f"in motion at t = {small.time:g} s" if resting is None else equilibrium_words(resting)
+        say(f"{small.mechanism.title or file.name}\n{words}\n")
+        for table in (*(() if rest is None else equilibrium_tables(rest)), modes_table(modes_found)):
             show_table(table)
     if out is not None:
         from jounce.reporting.facts.modes_facts import write_modes
 
-        written(lambda: write_modes(modes_found, rest.mechanism.space, out, overwrite=overwrite))
+        written(lambda: write_modes(modes_found, small.mechanism.space, out, overwrite=overwrite))
     if moved is not None and animation is not None:
         from jounce.plot import animate
 
@@ -123,6 +136,20 @@ def modes(
             say(f"\nMode {mode} is in {animation}, {_slowly(duration)}")
     tell("modes", lambda: {**facts, "written": out}, out, json=json)
     return 0
+
+
+def _in_motion(subject: Any, time: float | None, coordinates: Sequence[str] | None, settings: dict[str, Any]) -> Any:
+    """Return the small motions about that with which a mechanism starts."""
+    from jounce.dynamics import linearize
+    from jounce.integrate import simulate
+    from jounce.mechanism import Mechanism
+    from jounce.mechanism.time import instants_of
+
+    if not isinstance(subject, Mechanism) or any(settings.values()):
+        message = "is for a mechanism as its file has it: a robot, --without, --hold and --release are about rest"
+        raise JounceError(message, name="--moving")
+    first = instants_of(subject.time, subject.parameter_values)[0] if time is None else time
+    return linearize(simulate(subject, [float(first)], 2), coordinates=coordinates)
 
 
 def _subject(file: Path, reading: MechanismReading, without: Sequence[str], hold: Sequence[str]) -> tuple[Any, Any]:

@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Bool
 
@@ -126,6 +127,8 @@ class AbstractConstraint(Module):
     body_counts: ClassVar[tuple[int, ...]] = ()  # where more than one number is right
     hidden: ClassVar[tuple[str, ...]] = ()  # coordinates besides those of bodies, which a carriage of its own has
     periodic: ClassVar[bool] = False  # whether its residual forgets whole turns, which the law must not skip then
+    nonholonomic: ClassVar[bool] = False  # whether rows of it hold velocities, which no positions fulfil
+    parts: ClassVar[Mapping[str, Mapping[str, str]]] = MappingProxyType({})  # keys of files within a key, with fields
     law_apart: ClassVar[bool] = False  # of the class that defines `residual`: a function of bodies less one of the law
     dimensions: ClassVar[Mapping[str, str]] = USUAL_DIMENSIONS
     signs: ClassVar[Mapping[str, str]] = USUAL_SIGNS
@@ -154,6 +157,30 @@ class AbstractConstraint(Module):
         Bodies are poses (`PlanarPose` or `SpatialPose`), `time` is a jet in s. The result has the shape of one row,
         (...), or of several, (rows, ...), as `rows` joins them.
         """
+
+    def variation(self, bodies: tuple[Any, ...], changes: tuple[Any, ...], time: Jet) -> Jet:
+        """Return how the residual varies as the bodies are displaced; linear in the displacements.
+
+        It follows from the residual, unless rows of it hold velocities: then it is these for the displacements instead.
+
+        Parameters
+        ----------
+        bodies : tuple of PlanarPose or SpatialPose
+            Where the bodies are.
+        changes : tuple of PlanarPose or SpatialPose or None
+            What ``varied`` of them gives; None for a body that is not displaced.
+        time : Jet
+            In s.
+        """
+        moved = [k for k, change in enumerate(changes) if change is not None]
+
+        def residual(*poses: Any) -> Jet:
+            placed = list(bodies)
+            for k, pose in zip(moved, poses, strict=True):
+                placed[k] = pose
+            return self.residual(*placed, time)
+
+        return jax.jvp(residual, tuple(bodies[k] for k in moved), tuple(changes[k] for k in moved))[1]
 
     def admissible(self, time: Jet) -> Bool[Numbers, "..."]:
         """Tell at which instants the motion law, if there is one, has a permitted value: a finite one, unless more."""

@@ -77,11 +77,12 @@ _MACHINES = {
         "gear",
         "curve",
         "surface",
+        "wheel",
     ),
 }
 _DRIVES = ("coordinate", "slide", "distance", "rotation")
 _LOADS = ("spring", "slide spring", "slide", "distance", "rotation", "spiral", "point force")
-_SYMBOL_FIELDS = {"rolling": ("radius",), "coordinate": ("coordinate",)}
+_SYMBOL_FIELDS = {"rolling": ("radius",), "wheel": ("radius",), "coordinate": ("coordinate",)}
 PAIRS = {
     "revolute": ("point_i", "point_j"),
     "rod": ("point_i", "point_j", "length"),

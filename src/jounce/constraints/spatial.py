@@ -12,6 +12,7 @@ import numpy as np
 from jounce.constraints.angles import Datum, Vectors, coaxial, perpendiculars, relative_angle
 from jounce.constraints.base import AbstractConstraint, Curve, Scalar, Vector, rows
 from jounce.constraints.planar import length_of, slide
+from jounce.constraints.wheels import Wheel as Wheel
 from jounce.jet import Jet, cross, dot, wrap
 from jounce.rigid import SpatialPose
 

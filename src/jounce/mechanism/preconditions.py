@@ -75,9 +75,20 @@ def concrete_or(
     return partial(concrete, traced=traced)
 
 
+def check_holonomic(mechanism: Any, what: str) -> None:
+    """Raise UnsupportedError, by name, for a joint that holds velocities where positions are asked for."""
+    for name, joint in mechanism.joints.items():
+        if getattr(joint, "nonholonomic", False):
+            message = (
+                f"{what} follows from positions, and a {joint.type_name} that rolls restricts velocities alone, so "
+                "that where it is depends on the way there: simulate the motion"
+            )
+            raise UnsupportedError(message, name=f"joints.{name}")
+
+
 def _traced(given: Mapping[str, Any]) -> str | None:
     """Return the dotted name of the first value that JAX traces, None if there is none."""
-    if not _holds_tracer(given):  # nearly always, and before names are put together
+    if not holds_tracer(given):  # nearly always, and before names are put together
         return None
     pending: list[tuple[tuple[str | int, ...], Any]] = [((), given)]
     while pending:
@@ -89,7 +100,8 @@ def _traced(given: Mapping[str, Any]) -> str | None:
     return None
 
 
-def _holds_tracer(given: Mapping[str, Any]) -> bool:
+def holds_tracer(given: Mapping[str, Any]) -> bool:
+    """Tell whether JAX traces something in what is given."""
     pending: list[Any] = [given]
     while pending:
         value = pending.pop()

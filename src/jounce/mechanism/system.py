@@ -85,7 +85,10 @@ class Group(Module):
         return self.element.energy(self.element.displacement(*self._poses(pose), time))
 
     def variation(self, pose: Pose, change: Pose, time: Jet) -> Jet:
-        """Return how far forces act along as all bodies move by a change, shape (components, instances, batch)."""
+        """Return how residuals, or how far forces act along, vary as all bodies move by a change.
+
+        Shape (rows, instances, batch), or (components, instances, batch).
+        """
         return with_rows(self.element.variation(tuple(self._poses(pose)), tuple(self._poses(change)), time))
 
     def _acting(self, pose: Pose, time: Jet) -> tuple[Jet, Jet]:
@@ -232,6 +235,13 @@ class System(Module):
         if not self.groups:  # bodies that fly freely
             return Jet.constant(jnp.zeros((0, time.coefficients[0].shape[-1])), pose.order)
         parts = [group.residual(pose, time).map(_flat) for group in self.groups]
+        return concatenate(parts) * self.row_scale
+
+    def variation(self, pose: Pose, change: Pose, time: Jet) -> Float[Jet, "row batch"]:
+        """Return how the residuals of all constraints, shape (rows, batch), scaled, vary with displacements."""
+        if not self.groups:
+            return Jet.constant(jnp.zeros((0, time.coefficients[0].shape[-1])), pose.order)
+        parts = [group.variation(pose, change, time).map(_flat) for group in self.groups]
         return concatenate(parts) * self.row_scale
 
     def jacobian(self, pose: Pose, time: Jet) -> Float[Numbers, "row column batch"]:

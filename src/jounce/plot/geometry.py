@@ -355,7 +355,7 @@ def _symbol(
             points[slot] = value
         if slot < len(bodies) and facts.dimensions[field_name] == "direction" and axes[slot] is None:
             axes[slot] = value
-    if facts.symbol == "rolling":
+    if facts.symbol in ("rolling", "wheel"):
         radii[1] = float(values["radius"])
     coordinate = element.coordinate if facts.symbol == "coordinate" else "angle"
     if coordinate != "angle":

@@ -194,7 +194,7 @@ def _universal(drawing: Drawing, symbol: Symbol) -> None:
 
 
 def _shafts(drawing: Drawing, symbol: Symbol) -> None:
-    """Draw the wheels of two shafts, each with a mark that shows how it turns."""
+    """Draw the wheels of two shafts, or one that rolls, each with a mark that shows how it turns."""
     for slot, (body, radius) in enumerate(zip(symbol.bodies[:2], symbol.radii, strict=False)):
         if radius is None or body == GROUND:
             continue
@@ -234,7 +234,7 @@ def _unknown(drawing: Drawing, symbol: Symbol) -> None:
         drawing.line(*points, width=1.0, dashes=parts.DASHES, layer=GUIDES)
 
 
-_UNNAMED = ("none", "coordinate", "gear", "rack", "rolling")
+_UNNAMED = ("none", "coordinate", "gear", "rack", "rolling", "wheel")
 _PLANAR: dict[str, Callable[[Drawing, Symbol], None]] = {
     "revolute": _revolute,
     "rod": _rod,
@@ -259,5 +259,6 @@ _SPATIAL: dict[str, Callable[[Drawing, Symbol], None]] = {
     "curve": _curve,
     "surface": _curve,
     "gear": _shafts,
+    "wheel": _shafts,
     "none": _nothing,
 }

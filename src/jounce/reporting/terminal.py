@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from jounce.errors import (
     AssemblyWarning,
     DamageWarning,
+    IdleMotionWarning,
     MachineCodeWarning,
     ProgramFolderWarning,
     RecordingWarning,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 OURS = (
     AssemblyWarning,
     DamageWarning,
+    IdleMotionWarning,
     MachineCodeWarning,
     ProgramFolderWarning,
     RecordingWarning,

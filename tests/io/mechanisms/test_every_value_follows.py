@@ -41,6 +41,9 @@ def values_of(kind, size):
     """Return a value for each key of a class."""
     found = {}
     for key in file_keys(kind):
+        if key.kind == "parts":
+            found[key.key] = {name: [*VECTORS.get(name, [0.4, 0.5, 0.6])][:size] for name in key.names}
+            continue
         vector = [*VECTORS.get(key.key, [0.4, 0.5, 0.6])][:size]
         one = {
             "scalar": 0.3,

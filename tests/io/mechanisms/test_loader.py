@@ -76,7 +76,7 @@ TRIPLE = {"points": "[[1 cm, 0, 0], [AB, 0, 1]]", "vectors": "[[1, 0, 0], [0, 1,
 TRIPLE |= {"axes": "[[0, 0, 1], [0, 0, 1]]", "axis": "[0, 0, 1]", "normals": "[[1, 0, 0], [1, 0, 0]]"}
 SCALARS = {"length": "14.23 cm", "ratio": "2", "radius": "AB", "lead": "5 mm", "coordinate": "angle", "motion": "t"}
 PAIR["curve"], TRIPLE["curve"], TRIPLE["surface"] = "[s, s**2 + s]", "[s, sin(s), 0.1*s]", "[u, v, u*v]"
-TRIPLE["point"] = "[0, 0, 0]"
+TRIPLE["point"], TRIPLE["plane"] = "[0, 0, 0]", "{point: [0, 0, 1 mm], normal: [0, 0, 1]}"
 
 KEYS = {  # the table of the documentation
     ("planar", "joint", "revolute"): "points",
@@ -109,6 +109,7 @@ KEYS = {  # the table of the documentation
     ("spatial", "joint", "curve"): "curve point start?",
     ("spatial", "joint", "surface"): "surface point start_u? start_v?",
     ("spatial", "joint", "gear"): "axes ratio offset?",
+    ("spatial", "joint", "wheel"): "point axis radius plane",
     ("spatial", "driver", "rotation"): "axis vectors? motion",
     ("spatial", "driver", "slide"): "points vector motion",
     ("spatial", "driver", "distance"): "points motion",

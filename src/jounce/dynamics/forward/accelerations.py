@@ -188,7 +188,7 @@ class Equations(Module):
         now = clock.truncate(0)
 
         def loosened(change: Any) -> Any:
-            return jax.jvp(lambda p: self.system.residual(p, now).coefficients[0], (at_rest,), (change,))[1]
+            return self.system.variation(at_rest, change, now).coefficients[0]
 
         forces = inertia / self.scale + conjugate(loosened, at_rest, multipliers)[:, 1:]
         applied = self.system.applied_forces(moving, clock.truncate(1)).coefficients[0]

@@ -9,6 +9,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -31,6 +32,7 @@ from jounce.mechanism.element_indices import element_indices
 COLUMNS = {"planar": ("x", "y", "angle"), "spatial": ("x", "y", "z", "turn_x", "turn_y", "turn_z")}
 TIE = 0.99  # of the largest: candidates as good as that are taken in the order of the mechanism
 SHIFT = 0.9  # by which shifts count less than turns where coordinates are chosen: angles read better
+NOWHERE = 1e-8  # of the largest that must balance: less is none
 ROUNDING = 1e-12  # of the sum of the sizes of what enters a sum
 
 Lanes = Float[np.ndarray, "3 column lane"]
@@ -247,7 +249,42 @@ def reduced(
     units = [_unit_of_driver(point.mechanism, name) for name in released] + [_unit(point, name) for name in chosen]
     matrices, sizes = basis.T @ parts.sum(axis=0), np.abs(basis).T @ np.abs(parts).sum(axis=0)
     sizes[:, : 2 * own] += np.concatenate(_magnitudes(point, basis), axis=1)
+    if rolls(point):
+        _check_nowhere(point, (*released, *chosen), (gradients, inverse, basis, sizes.max(axis=1)), len(released))
     return Reduction(point, (*released, *chosen), tuple(units), tuple(released), driving, changes, matrices, sizes)
+
+
+def rolls(point: OperatingPoint) -> bool:
+    """Tell whether rows of joints hold velocities: then there are more positions than small motions."""
+    return any(joint.nonholonomic for joint in point.mechanism.joints.values())
+
+
+def _check_nowhere(
+    point: OperatingPoint, names: tuple[str, ...], reduction: tuple[Any, Any, Any, Any], released: int
+) -> None:
+    """Raise MechanismError unless small motions are the same wherever wheels have rolled to.
+
+    Positions that the coordinates do not tell, such as where a bicycle is and which way it heads, are changed one after
+    the other, with the velocities that the rows then ask for: what the bodies have to balance must not change.
+    """
+    gradients, inverse, basis, sizes = reduction
+    count, chosen = len(point.scale), names[released:]
+    rows = point.varied(np.stack([np.eye(count), *[np.zeros((count, count))] * 2]))[1][0]
+    directions = null_space(rows)
+    directions = directions - basis @ (gradients @ directions) if len(gradients) else directions
+    changes = np.stack([directions, *[np.zeros_like(directions)] * 2])
+    for level in (1, 2):
+        gaps = point.varied(changes)[1][level]
+        told = _measured(point, chosen, changes, level) if chosen else np.zeros((0, gaps.shape[1]))
+        changes[level] = inverse @ np.concatenate([-gaps, -told])
+    left = basis.T @ point.varied(changes)[0].sum(axis=0)
+    if released or (np.abs(left) > NOWHERE * sizes[:, None]).any():
+        message = (
+            "small motions of wheels that roll are known where they do not depend on the places that wheels have "
+            "rolled to: name coordinates that tell how bodies move whichever way they head, release no driver, and "
+            "look at a steady motion"
+        )
+        raise MechanismError(message, name="coordinates", value=list(names))
 
 
 def _magnitudes(point: OperatingPoint, basis: Float[np.ndarray, "column coordinate"]) -> list[np.ndarray]:
@@ -299,6 +336,9 @@ def _chosen(
         width = len(COLUMNS[point.mechanism.space])
         turns = np.arange(width) >= point.model.pose_type.shifts
         rows = free * np.tile(np.where(turns, 1.0, SHIFT), len(point.model.bodies))[:, None]
+        if rolls(point):  # the axes of a wheel that turns are other ones at any other instant
+            spin = np.abs(point.coordinates["angular_velocity"][0, :, 1:, 0]).max(axis=0)
+            rows[np.repeat(spin > NOWHERE * spin.max(initial=0.0), width)] *= 1e-3
     columns: list[int] = []
     left = rows.copy()
     for _ in range(free.shape[1]):

@@ -22,7 +22,7 @@ from jounce.kinematics.position_analysis.curve_ends import beyond_end
 from jounce.kinematics.results.pose_outputs import output_values
 from jounce.mechanism import Body, Mechanism, build, check_mechanism, time_grid
 from jounce.mechanism.law_checks import check_laws
-from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.preconditions import check_holonomic, concrete
 from jounce.robot import Robot
 from jounce.robot.closed_loops.closures import GivenCoordinates
 from jounce.shapes import Real, Refused
@@ -277,6 +277,7 @@ def at_rest_from(
 ) -> OperatingPoint:
     """Return the mechanism at rest where its bodies can be put together, or raise where something is not valid."""
     check_mechanism(mechanism)
+    check_holonomic(mechanism, "an equilibrium")
     check_choice("method", method, METHODS, MechanismError)
     if isinstance(without, str):
         without = (without,)

@@ -85,7 +85,7 @@ def variations(
 
     def evaluated(moved: Pose) -> tuple[Any, Any]:
         def loosened(change: Any) -> Any:
-            return jax.jvp(lambda p: system.residual(p, now).coefficients[0], (moved.truncate(0),), (change,))[1]
+            return system.variation(moved.truncate(0), change, now).coefficients[0]
 
         joints = conjugate(loosened, moved.truncate(0), multipliers)
         forces = jnp.stack([*_loads(equations, moved, time), joints])

@@ -46,6 +46,7 @@ from jounce.kinematics.sensitivity.traced_motion import TracedMotion
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.axis_angles import measures_angle
+from jounce.mechanism.preconditions import check_holonomic
 from jounce.mechanism.traced import Angles, angles_of, template, traced_model, traced_values
 from jounce.modules import with_fields
 from jounce.shapes import Numbers
@@ -78,6 +79,7 @@ def traced_simulation(simulate: Callable[..., Simulation], given: Mapping[str, A
         mechanism = dataclasses.replace(mechanism, initial=dict(given["initial"]))
     if options.get("events") or not isinstance(options.get("method") or Taylor(), Taylor):
         raise UnsupportedError("a simulation is differentiated with jn.Taylor() and without events", name="mechanism")
+    check_holonomic(mechanism, "the derivative of a simulation")
     if (recorded := _recorded(simulate, mechanism, options)) is None:
         return _called(simulate, mechanism, options)
     simulation, made = recorded

@@ -33,7 +33,7 @@ class FileKey:
     fields : tuple of str
         Fields of the class that it fills; more than one when the key holds a list with an entry for each body.
     kind : str
-        ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``curve`` or ``text``.
+        ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``curve``, ``text``, ``parts``.
     quantity : str
         Kind of unit that the class states: one of ``units.KINDS``; or ``direction`` (any unit, the same in all
         components), or ``of coordinate`` and ``per angle``, which follow the key ``coordinate`` beside it.
@@ -46,6 +46,8 @@ class FileKey:
     kind: str
     quantity: str
     required: bool
+    names: tuple[str, ...] = ()
+    """Of the keys within this one, for each field, where it holds a mapping; then `kind` is ``parts``."""
 
 
 def file_keys(kind: type[Any]) -> tuple[FileKey, ...]:
@@ -61,7 +63,9 @@ def file_keys(kind: type[Any]) -> tuple[FileKey, ...]:
     """
     fields = value_fields(kind)
     groups: dict[str, list[str]] = {}
-    for name in fields:
+    parts = getattr(kind, "parts", {})
+    within = {field for its in parts.values() for field in its.values()}
+    for name in (name for name in fields if name not in within):
         stem, _, body = name.rpartition("_")
         groups.setdefault(stem if stem in _PLURALS and body in ("i", "j", "m") else name, []).append(name)
     keys = []
@@ -70,6 +74,7 @@ def file_keys(kind: type[Any]) -> tuple[FileKey, ...]:
         key = stem if len(names) == 1 else _PLURALS[stem]
         required = first.default is MISSING and first.default_factory is MISSING
         keys.append(FileKey(key, tuple(names), field_kind(first), facts_of(kind).dimensions[names[0]], required))
+    keys += [FileKey(key, tuple(its.values()), "parts", "any", True, tuple(its)) for key, its in parts.items()]
     return tuple(sorted(keys, key=lambda k: k.kind != "text"))
 
 
@@ -101,6 +106,7 @@ def location_of(keys: Iterable[FileKey], field: str) -> Location:
     """Return where in a file the value of a field stands, below its joint, driver or output."""
     for key in keys:
         if field in key.fields:
-            return (key.key,) if len(key.fields) == 1 else (key.key, key.fields.index(field))
+            index = key.fields.index(field)
+            return (key.key,) if len(key.fields) == 1 else (key.key, key.names[index] if key.names else index)
     first, _, rest = field.partition(".")
     return (first, rest) if rest else (field,)

@@ -24,6 +24,7 @@ from jounce.io.mechanisms.output_types import HOLDERS, output_holder, output_tag
 from jounce.io.mechanisms.values import (
     Checked,
     orientation,
+    parts,
     problem,
     redundant_reactions,
     scalar,
@@ -167,6 +168,9 @@ def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
             return wrenches()
         case "curve":
             return curve(kind.hidden, size)
+        case "parts":
+            kinds = {name: facts_of(kind).dimensions[field] for name, field in zip(key.names, key.fields, strict=True)}
+            return parts(kinds, size)
         case "whole":
             return Annotated[Any, Checked(_whole, {"type": "integer", "minimum": 0})]
     choices = facts_of(kind).choices.get(key.fields[0])

@@ -157,6 +157,23 @@ def vectors(count: int, size: int, quantity: str) -> Any:
     return Annotated[Any, Checked(check, list_schema(vector_schema(size, quantity), count))]
 
 
+def parts(kinds: dict[str, str], size: int) -> Any:
+    """Return the annotation of a mapping of vectors, each of a kind of its own, by name."""
+
+    def check(raw: object, info: Any) -> tuple[Any, ...]:
+        if not isinstance(raw, dict) or set(raw) != set(kinds):
+            raise problem(f"must have {' and '.join(kinds)}, as {{{', '.join(f'{name}: [...]' for name in kinds)}}}")
+        return tuple(vector_value(raw[name], size, quantity, info, name) for name, quantity in kinds.items())
+
+    schema = {
+        "type": "object",
+        "properties": {name: vector_schema(size, quantity) for name, quantity in kinds.items()},
+        "required": list(kinds),
+        "additionalProperties": False,
+    }
+    return Annotated[Any, Checked(check, schema)]
+
+
 def wrenches() -> Any:
     """Return the annotation of rows of six values: a force and a moment."""
 

@@ -210,7 +210,8 @@ class _Writer:
                 written = [self.laws.curve(where, x) for x in values]
             else:
                 written = [plain(value, where) for value in values]
-            entries[key.key] = written[0] if len(written) == 1 else written
+            whole = dict(zip(key.names, written, strict=True)) if key.names else written
+            entries[key.key] = written[0] if len(written) == 1 else whole
         return entries
 
 

@@ -12,6 +12,7 @@ from jounce.execution.device import resident
 from jounce.jet import Jet
 from jounce.kinematics.assembly.axis_directions import drawn_senses, pair_names, senses, senses_to_seek, starts_with
 from jounce.kinematics.assembly.gauss_newton import AssemblyAttempt, Displacements, assemble_from_guess
+from jounce.kinematics.assembly.idle_motions import idle_motions
 from jounce.kinematics.assembly.initial_revolutions import (
     Coordinates,
     DriverLag,
@@ -75,7 +76,11 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     check_assembled(model, found, instant, free=free)
     warn_of_parts_turned_over(model, found)
     model, told = redundancy_of(model, _exact(model, found, instant, tolerance), instant)
-    check_mobility(model, told, free=free)
+    try:
+        check_mobility(model, told, free=free)
+    except MobilityError as error:
+        error.idle = idle_motions(model, told, found.coordinates, Displacements(model, instant))
+        raise
     return model, found.coordinates
 
 

@@ -21,7 +21,7 @@ from jounce.kinematics.assembly.tangent_cone import LocalCurve, curves
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Mechanism, Model, build, check_mechanism, time_grid
 from jounce.mechanism.builder import with_reference
-from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.preconditions import check_holonomic, concrete
 from jounce.modules import with_fields
 
 Kind = Literal["regular", "rigid", "shaky", "cusp", "singular", "change point"]
@@ -170,6 +170,7 @@ def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -
     1 degree of freedom
     """
     check_mechanism(mechanism)
+    check_holonomic(mechanism, "mobility to a finite extent")
     order = whole_number("order", order, 2, HIGHEST_ORDER, error=MechanismError)
     if time is None:
         time = 0.0 if mechanism.time is None else float(time_grid(mechanism.time, mechanism.parameter_values)[0])

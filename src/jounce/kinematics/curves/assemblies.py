@@ -25,7 +25,7 @@ from jounce.kinematics.curves.tracing import check_number, traced
 from jounce.kinematics.curves.walker import Walker
 from jounce.mechanism import Mechanism, build, check_mechanism
 from jounce.mechanism.carriages import check_without_ends
-from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.preconditions import check_holonomic, concrete
 from jounce.modules import with_fields
 from jounce.shapes import Real
 
@@ -189,6 +189,7 @@ def assemblies(
     """
     check_mechanism(mechanism)
     check_without_ends(mechanism, "a search for assemblies")
+    check_holonomic(mechanism, "an assembly")
     check_number("count", count, 1, 10**7, whole=True)
     check_number("seed", seed, 0, 2**63 - 1, whole=True)
     if time is not None:

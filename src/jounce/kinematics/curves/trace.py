@@ -8,7 +8,7 @@ from jounce.kinematics.curves.start import first_instant
 from jounce.kinematics.curves.tracing import check_number, traced
 from jounce.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.carriages import check_without_ends
-from jounce.mechanism.preconditions import concrete
+from jounce.mechanism.preconditions import check_holonomic, concrete
 from jounce.shapes import Real
 
 HIGHEST_ORDER = 8  # of derivatives with respect to arc length: those above are worse than rounding between the places
@@ -69,6 +69,7 @@ def trace(
     """
     check_mechanism(mechanism)
     check_without_ends(mechanism, "a trace")
+    check_holonomic(mechanism, "a trace")
     check_number("order", order, 0, HIGHEST_ORDER, whole=True)
     check_number("count", count, 2, 10**7, whole=True)
     check_number("length", length, 1e-6, 1e6)

@@ -16,6 +16,7 @@ from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.families.design_paths import DesignPaths
 from jounce.kinematics.families.design_sides import Sides, sides_of_designs
 from jounce.kinematics.families.design_values import Designs
+from jounce.kinematics.position_analysis.idle_holding import with_idle_held_in_family
 from jounce.kinematics.position_analysis.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
@@ -152,6 +153,11 @@ def _family(
     names, rows = tuple(values), np.stack(list(values.values()), axis=-1)
     order = checked_settings(mechanism, order, tolerance)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
+    ends = [
+        mechanism.with_parameters(**dict(zip(names, row.tolist(), strict=True)))
+        for row in (rows[0], rows[len(rows) // 2], rows[-1])
+    ]
+    mechanism = with_idle_held_in_family(mechanism, ends, instants, tolerance, solve)
     return _Family(mechanism, names, rows, instants, order, float(tolerance), progress), values
 
 

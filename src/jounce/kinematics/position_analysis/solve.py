@@ -21,6 +21,7 @@ from jounce.kinematics.position_analysis.chunked_motion import Stretches
 from jounce.kinematics.position_analysis.curve_ends import beyond_end, cut_at_ends
 from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID
 from jounce.kinematics.position_analysis.grid_storage import solve_grid
+from jounce.kinematics.position_analysis.idle_holding import holding_idle
 from jounce.kinematics.position_analysis.limit_position_messages import dead_end_words
 from jounce.kinematics.results.actuation import actuated
 from jounce.kinematics.results.motion import Motion
@@ -40,7 +41,7 @@ from jounce.mechanism.axis_angles import AttitudeHistory, lost_count
 from jounce.mechanism.builder import group_rows
 from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
-from jounce.mechanism.preconditions import concrete, concrete_or
+from jounce.mechanism.preconditions import check_holonomic, concrete, concrete_or
 from jounce.mechanism.time import Instants, TimeLike, instants_of
 
 LOWEST_ORDER = 4  # of the jets inside: predictions need some, also where the user wants positions only
@@ -77,6 +78,7 @@ def lost_orders(mechanism: Mechanism) -> int:
     return max((output.lost_orders for output in mechanism.outputs.values()), default=0)
 
 
+@holding_idle(lambda: solve)
 @concrete_or(_differentiated)
 def solve(
     mechanism: Mechanism,
@@ -157,6 +159,7 @@ def solve(
     return motion
 
 
+@holding_idle(lambda: solve)
 @concrete
 def solve_in_stretches(
     mechanism: Mechanism,
@@ -207,6 +210,7 @@ def solve_in_stretches(
 def checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
     """Return the order of derivatives, or raise MechanismError unless mechanism, order and tolerance are valid."""
     check_mechanism(mechanism)
+    check_holonomic(mechanism, "a motion that is solved")
     order = checked_order(order)
     for name, output in mechanism.outputs.items():
         if order + output.lost_orders > HIGHEST_OF_MOTION:

@@ -112,6 +112,7 @@ class Motion(Displayed):
     """
 
     traced = False  # by JAX
+    check_idle: Callable[[dict[str, AbstractQuantity]], None] | None = None  # raises for what depends on idle motions
 
     def __init__(
         self,
@@ -312,6 +313,8 @@ class Motion(Displayed):
         given: Any = bound_alone(output, self.mechanism)
         check_output(given, self.mechanism, name)
         self._check_order(given, name)
+        if self.check_idle is not None:
+            self.check_idle({name: given})
         if isinstance(given, AbstractMotionOutput):
             return self._labeled(name, self._derivatives(given.coefficients(self)), given)
         group = output_group(given, self.mechanism, self.model, name)

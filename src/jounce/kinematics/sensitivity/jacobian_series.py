@@ -47,11 +47,13 @@ def slopes(element: AbstractConstraint, poses: Sequence[Pose], time: Jet, slot: 
         Taylor coefficients of the derivatives by a shift in global axes, m, and by a turn in axes of the body, rad.
     """
     body = movable(poses[slot].truncate(time.order))
+    bodies = (*poses[:slot], body, *poses[slot + 1 :])
 
-    def residual(pose: Any) -> Any:
-        return stacked(with_rows(element.residual(*poses[:slot], pose, *poses[slot + 1 :], time)))
+    def changed(change: Any) -> Any:
+        changes = (*[None] * slot, change, *[None] * (len(bodies) - slot - 1))
+        return stacked(with_rows(element.variation(bodies, changes, time)))
 
-    return along_displacements(body, lambda change: jax.jvp(residual, (body,), (change,))[1])
+    return along_displacements(body, changed)
 
 
 def along_displacements(body: Any, changed: Callable[[Any], Any]) -> Slope:

@@ -18,7 +18,8 @@ from jounce.kinematics.assembly.assemble import (
     settled,
     warn_of_parts_turned_over,
 )
-from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
+from jounce.kinematics.assembly.gauss_newton import Displacements, assemble_from_guess
+from jounce.kinematics.assembly.idle_motions import idle_motions
 from jounce.kinematics.assembly.mobility import facts_of, independent, mobility
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Mechanism, Model, build
@@ -50,6 +51,7 @@ class FreedomFacts(TypedDict):
     redundant_among: list[str]
     repeated: list[RepetitionFacts]
     moving: list[str]
+    idle: list[list[str]]
     words: str
     message: str | None
 
@@ -93,12 +95,14 @@ class StartingState:
         self.coordinates, self.assembly = self._assembled()
         self.freedom = self._counted()
         massive = any(body.mass is not None for body in mechanism.bodies.values())
-        possible = not self.is_singular and (self.freedom["left"] == 0 or massive)
+        prescribed = self.freedom["left"] == 0 or self.freedom["idle"]
+        possible = not self.is_singular and bool(prescribed or massive)
         self.ok = self.assembly["status"] == "assembled" and possible
 
     def mobility(self) -> dict[str, Any] | None:
         """Return how it can move with its drivers released; None where it cannot be put together."""
-        if self.coordinates is None or self.here is None:
+        rolling = any(joint.nonholonomic for joint in self.mechanism.joints.values())  # where it is tells no motions
+        if self.coordinates is None or self.here is None or rolling:
             return None
         joints = self.here.take(np.array([name.startswith("joints.") for name in self.model.rows], bool))
         equations, columns = joints.shape
@@ -125,7 +129,7 @@ class StartingState:
         if coordinates is not None:
             model, _ = with_reference(dataclasses.replace(model, guess=coordinates), coordinates, self.instant)
         trial = assemble_from_guess(model, self.instant, TOLERANCE) if model.rows else None
-        facts = message = None
+        facts, message, idle = None, None, {}
         pattern = model.system.pattern
         jacobian = HostJacobian.of(pattern, np.zeros(pattern.entry_count))
         if trial is not None and trial.jacobian.finite().all():
@@ -135,7 +139,8 @@ class StartingState:
             try:
                 check_mobility(model, facts)
             except MobilityError as error:
-                message = error.message
+                idle = idle_motions(model, facts, trial.coordinates, Displacements(model, self.instant))
+                message = None if idle else error.message
         drives = np.array([name.startswith("drivers.") for name in model.rows], bool)
         freedom, rank = columns - jacobian.take(~drives).rank, jacobian.rank
         repeated = () if facts is None else facts.repetitions
@@ -151,6 +156,7 @@ class StartingState:
             "redundant_among": [] if facts is None else list(facts.among),
             "repeated": [{**x._asdict(), "of": list(x.of)} for x in repeated],
             "moving": freely_moving(model, jacobian.free_directions).split(", ") if columns > rank else [],
+            "idle": [list(bodies) for bodies, _ in idle.values()],
             "words": freedom_words(freedom, mechanism.drivers),
             "message": message,
         }

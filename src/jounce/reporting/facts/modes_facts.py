@@ -43,24 +43,23 @@ class ModeFacts(TypedDict):
 
 
 class ModesFacts(TypedDict):
-    """An equilibrium and the modes about it."""
+    """An equilibrium, unless a mechanism is in motion, and the modes about it."""
 
     title: str
     file: str
-    equilibrium: EquilibriumFacts
+    equilibrium: EquilibriumFacts | None
     coordinates: list[str]
     modes: list[ModeFacts]
 
 
 def modes_facts(small: Linearization, file: str | PathLike[str], without: list[str]) -> ModesFacts:
-    """Return what is known of a mechanism in its equilibrium and of its modes."""
+    """Return what is known of a mechanism in its equilibrium, or in motion, and of its modes."""
     rest = small.equilibrium
-    assert rest is not None  # the command looks for one
     modes: Any = [{**row, "eigenvalue": [row["eigenvalue"].real, row["eigenvalue"].imag]} for row in small.modes.rows]
     return {
         "title": small.mechanism.title,
         "file": str(file),
-        "equilibrium": equilibrium_facts(rest, without),
+        "equilibrium": None if rest is None else equilibrium_facts(rest, without),
         "coordinates": list(small.coordinates),
         "modes": modes,
     }

@@ -113,6 +113,11 @@ def _mechanism_start(facts: Facts) -> list[str]:
         lines.append(f"  {mobility['words']}")
     if freedom["left"]:
         lines.append(f"  left to move: {freedom['left']}, with which {', '.join(freedom['moving'])} can move")
+    if freedom["idle"]:
+        spinning = "; ".join(
+            " and ".join(bodies) + (" as one" if len(bodies) > 1 else "") for bodies in freedom["idle"]
+        )
+        lines.append(f"  idle: {spinning} may spin about an axis of itself; held by the least motion")
     assembled = assembly["status"] == "assembled"
     lines += ["", "Start", f"  put together at t = {assembly['at']:g} s" if assembled else f"  {assembly['message']}"]
     if time is not None:

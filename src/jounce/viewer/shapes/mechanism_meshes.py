@@ -169,7 +169,7 @@ def spatial_meshes(motion: Motion, skeleton: Skeleton, colors: Mapping[str, Colo
         elif symbol.kind in ("curve", "surface"):
             yield from _groove(motion, symbol, skeleton.size)
             yield symbol.bodies[1], sphere(1.3 * radius, symbol.points[1]), DARK
-        elif symbol.kind == "gear":
+        elif symbol.kind in ("gear", "wheel"):
             yield from _shaft_wheels(symbol, skeleton.size, colors)
         else:
             yield from _spatial_joint(symbol, skeleton.size)
@@ -194,7 +194,7 @@ def _spatial_joint(symbol: Symbol, size: float) -> Pieces:
 
 
 def _shaft_wheels(symbol: Symbol, size: float, colors: Mapping[str, Color]) -> Pieces:
-    """Give the wheels of two shafts, with marks that show how they turn."""
+    """Give the wheels of two shafts, or one that rolls, with marks that show how they turn."""
     for slot, (body, radius) in enumerate(zip(symbol.bodies[:2], symbol.radii, strict=False)):
         if radius is None or body == GROUND:
             continue

@@ -1,0 +1,169 @@
+"""Motions of mechanisms with idle motions: these are held by the least motion, and nothing told may depend on them."""
+
+import dataclasses
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any, ParamSpec, TypeVar, cast
+
+import numpy as np
+
+from jounce.constraints.spin_hold import SpinHold
+from jounce.errors import (
+    IdleMotionWarning,
+    JounceError,
+    MechanismError,
+    MobilityError,
+    UnsupportedError,
+    warn_caller,
+)
+from jounce.kinematics.assembly.assemble import assemble
+from jounce.kinematics.assembly.idle_motions import IdleMotions
+from jounce.kinematics.results.motion import Motion
+from jounce.kinematics.status import Status
+from jounce.mechanism import AbstractQuantity, Mechanism, build, with_outputs_held
+from jounce.mechanism.preconditions import holds_tracer
+from jounce.mechanism.time import instants_of
+
+P = ParamSpec("P")
+R = TypeVar("R")
+DEPENDS = 1e-9  # part of an output, or of the size of the mechanism
+ORDER = 4  # of the derivatives by which outputs are compared
+BETWEEN = 0.618  # of the time: an instant at which they are compared, beside the first and the last
+
+
+def with_idle_held(mechanism: Mechanism, idle: IdleMotions) -> Mechanism:
+    """Return the mechanism with joints by which its idle motions are the least: no spin about the axes."""
+    taken = {*mechanism.joints, *mechanism.drivers, *mechanism.initial}
+    holds = {}
+    for body, (_, axis) in idle.items():
+        name = f"{body}_spin"
+        while name in taken:
+            name += "_"
+        holds[name] = SpinHold((body,), list(axis))
+    return dataclasses.replace(mechanism, joints={**mechanism.joints, **holds})
+
+
+def spins_held(mechanism: Mechanism) -> dict[str, SpinHold]:
+    """Return what holds idle motions of a mechanism, by name."""
+    return {name: joint for name, joint in mechanism.joints.items() if isinstance(joint, SpinHold)}
+
+
+def idle_words(idle: IdleMotions) -> str:
+    """Say which bodies may spin."""
+    return "; ".join(" and ".join(bodies) + (" as one" if len(bodies) > 1 else "") for bodies, _ in idle.values())
+
+
+def warn_of_idle(idle: IdleMotions) -> None:
+    """Tell once which idle motions are held."""
+    message = (
+        f"nothing keeps these bodies from spinning about an axis of themselves, which moves nothing else: "
+        f"{idle_words(idle)}; they are held by the least motion, and no output depends on it"
+    )
+    warn_caller(IdleMotionWarning(message))
+
+
+def holding_idle(solver: Callable[[], Callable[..., Any]]) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Let a function of a mechanism hold idle motions of it, where these are all the degrees of freedom that are left.
+
+    Parameters
+    ----------
+    solver : callable
+        Returns what solves a mechanism at instants to an order.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        @functools.wraps(function)
+        def door(*arguments: P.args, **keywords: P.kwargs) -> R:
+            try:
+                return function(*arguments, **keywords)
+            except MobilityError as error:
+                if not error.idle:
+                    raise
+                idle = error.idle
+            given: Any = dict(zip(("mechanism", "time"), arguments, strict=False)) | keywords
+            if holds_tracer(given):  # a change of design may end an idle motion, and depend on how far it has gone
+                message = f"these bodies may spin about themselves: {idle_words(idle)}; hold them by joints"
+                raise UnsupportedError(f"{message} where a motion is differentiated", name="mechanism")
+            mechanism = with_idle_held(given["mechanism"], idle)
+            check: Any = functools.partial(check_independent, mechanism, idle, given.get("time"), solver())
+            check()
+            warn_of_idle(idle)
+            rest: Any = {name: value for name, value in keywords.items() if name != "mechanism"}
+            solve_held: Any = function
+            found: Any = solve_held(mechanism, *arguments[1:], **rest)
+            if isinstance(found, Motion):  # what is asked for later must not depend on them either
+                vars(found).update(mechanism=given["mechanism"], check_idle=check)
+            return cast("R", found)
+
+        return door
+
+    return decorate
+
+
+def with_idle_held_in_family(
+    mechanism: Mechanism, designs: Sequence[Mechanism], instants: Any, tolerance: float, solve: Callable[..., Any]
+) -> Mechanism:
+    """Return a mechanism of many designs with its idle motions held, as the first of the designs given has them.
+
+    Outputs of the designs given are checked not to depend on them.
+    """
+    model, first = build(with_outputs_held(designs[0])), float(instants[0])
+    rows, columns = model.system.shape
+    if rows >= columns:
+        return mechanism
+    try:
+        assemble(model, first, tolerance)
+    except MobilityError as error:
+        idle = error.idle
+    except JounceError:  # told where the design is solved
+        return mechanism
+    else:
+        return mechanism
+    if not idle:
+        return mechanism
+    for design in designs:
+        check_independent(with_idle_held(design, idle), idle, instants, solve)
+    warn_of_idle(idle)
+    return with_idle_held(mechanism, idle)
+
+
+def check_independent(
+    mechanism: Mechanism,
+    idle: IdleMotions,
+    time: Any,
+    solve: Callable[..., Any],
+    outputs: dict[str, AbstractQuantity] | None = None,
+) -> None:
+    """Raise MechanismError for an output that depends on an idle motion, by name.
+
+    Outputs at some instants, with derivatives, are compared with those of bodies that spin. Those of forces are not:
+    what they are without a spin follows, where nothing drives one, from what holds it exerting nothing.
+    """
+    wanted = mechanism.outputs if outputs is None else outputs
+    wanted = {name: output for name, output in wanted.items() if not output.of_forces}
+    if not wanted:
+        return
+    instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
+    first, span = float(instants[0]), abs(float(instants[-1]) - float(instants[0])) or 1.0
+    holds = {
+        name: dataclasses.replace(joint, rate=rate / span)
+        for rate, (name, joint) in enumerate(spins_held(mechanism).items(), 1)
+    }
+    posed = dataclasses.replace(mechanism, outputs=wanted, forces={}, initial={})
+    spinning = dataclasses.replace(posed, joints={**posed.joints, **holds})
+    middle = float(instants[0] + BETWEEN * (instants[-1] - instants[0]))
+    some = sorted({first, middle, float(instants[-1])}, reverse=bool(instants[-1] < instants[0]))
+    still, spun = (solve(made, some, ORDER, strict=False) for made in (posed, spinning))
+    solved = (still.status == Status.OK) & (spun.status == Status.OK)
+    scale = span ** -np.arange(ORDER + 1.0) * still.model.length
+    for name in wanted:
+        one, other = (np.asarray(motion.outputs[name])[solved] for motion in (still, spun))
+        size = np.maximum(np.abs(one), np.abs(other)).reshape(len(one), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)
+        away = np.abs(one - other).reshape(len(one), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)
+        if not (away <= DEPENDS * np.maximum(size, scale)).all():
+            bodies = idle_words(idle)
+            message = (
+                f"depends on a motion that nothing prescribes: {bodies} may spin about an axis of itself, which moves "
+                "nothing else; drive it, hold it by a joint, or leave this output out"
+            )
+            raise MechanismError(message, name=f"outputs.{name}")
