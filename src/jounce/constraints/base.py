@@ -127,7 +127,7 @@ class AbstractConstraint(Module):
     body_counts: ClassVar[tuple[int, ...]] = ()  # where more than one number is right
     hidden: ClassVar[tuple[str, ...]] = ()  # coordinates besides those of bodies, which a carriage of its own has
     periodic: ClassVar[bool] = False  # whether its residual forgets whole turns, which the law must not skip then
-    nonholonomic: ClassVar[bool] = False  # whether rows of it hold velocities, which no positions fulfil
+    nonholonomic: ClassVar[bool] = False  # whether rows of it hold velocities, which no positions fulfill
     parts: ClassVar[Mapping[str, Mapping[str, str]]] = MappingProxyType({})  # keys of files within a key, with fields
     law_apart: ClassVar[bool] = False  # of the class that defines `residual`: a function of bodies less one of the law
     dimensions: ClassVar[Mapping[str, str]] = USUAL_DIMENSIONS

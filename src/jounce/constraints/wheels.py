@@ -1,4 +1,4 @@
-"""Wheels that roll on a plane without slip: rows of velocities, which no positions fulfil (nonholonomic)."""
+"""Wheels that roll on a plane without slip: rows of velocities, which no positions fulfill (nonholonomic)."""
 
 from collections.abc import Sequence
 from typing import Any
