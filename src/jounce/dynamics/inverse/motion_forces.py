@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.constraints.spin_hold import SpinHold
-from jounce.dynamics.inverse import force_programs as programs, tooth_flanks as teeth
+from jounce.dynamics.inverse import force_programs as programs, idle_torques, tooth_flanks as teeth
 from jounce.dynamics.inverse.redundant_forces import OPEN, OpenMultipliers
 from jounce.dynamics.masses import check_loads, gravity_of, masses_of
 from jounce.dynamics.motion_values import along_motion, part_of
@@ -67,10 +66,7 @@ class MotionForces:
     def of(cls, motion: Motion) -> "MotionForces":
         """Return the forces of a motion, those computed before among them."""
         if "forces" not in motion.derived:
-            made = cls(motion)
-            if any(isinstance(group.element, SpinHold) for group in made.model.system.groups):
-                made._check_idle()  # applied forces depend on how far a body has spun, too
-            motion.derived["forces"] = made
+            motion.derived["forces"] = idle_torques.checked(cls(motion))
         return motion.derived["forces"]
 
     @cached_property
@@ -86,37 +82,6 @@ class MotionForces:
             unknown = [spoiled(passages, time, level + 1) for level in range(len(found))]
             found = np.where(np.array(unknown)[:, None], np.nan, found)
         return found
-
-    def _check_idle(self) -> None:
-        """Raise MechanismError where something would spin a body about an axis of itself that is held by no joint."""
-        found, solved = np.nan_to_num(self.multipliers), self.motion.status == Status.OK
-        most = np.abs(found[..., solved]).max(axis=(1, 2), initial=0.0) * self.model.length
-        rate = self._rate(solved)
-        for level in range(1, len(most)):  # what vanishes at a level is as exact as that of the level before
-            most[level] = max(most[level], rate * most[level - 1])
-        for place in self.indices.values():
-            group = self.model.system.groups[place.group]
-            if not isinstance(group.element, SpinHold):
-                continue
-            torque = np.abs(found[:, list(place.own_rows)][..., solved]).max(axis=(1, 2), initial=0.0)
-            if (torque > NOTHING * most).any():
-                body = self.model.bodies[group.bodies[0][place.instance] - 1]
-                message = (
-                    "inertia or forces would spin this body about an axis of itself, which nothing prescribes, and the "
-                    "forces in the mechanism depend on it: simulate the motion, or hold the body by a joint or driver"
-                )
-                raise MechanismError(message, name=f"bodies.{body}")
-
-    def _rate(self, solved: Numbers) -> float:
-        """Return how fast the motion changes, 1/s: how large its Taylor coefficients are."""
-        parts = {"position": self.model.length, "angle": 1.0, "quaternion": 1.0}
-        sizes = [
-            np.nan_to_num(np.abs(self.coordinates[name][1:, ..., solved])).reshape(self.levels + 1, -1) / scale
-            for name, scale in parts.items()
-            if name in self.coordinates
-        ]
-        powers = 1.0 / np.arange(1.0, self.levels + 2)
-        return float(max((size.max(axis=1, initial=0.0) ** powers).max() for size in sizes))
 
     @cached_property
     def _balancing(self) -> Float[Numbers, "case level row time"]:

@@ -1,0 +1,55 @@
+"""Whether forces depend on idle motions: whether anything would spin a body about an axis that no joint holds."""
+
+from typing import Any
+
+import numpy as np
+
+from jounce.constraints.spin_hold import SpinHold
+from jounce.errors import MechanismError
+from jounce.kinematics import Status
+from jounce.shapes import Numbers
+
+NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
+
+
+def checked(forces: Any) -> Any:
+    """Return forces, or raise MechanismError where something would spin a body about an axis of itself that is held by no joint.
+
+    Parameters
+    ----------
+    forces : MotionForces
+        Of a motion, in which idle motions are held by the least motion.
+    """
+    model, motion = forces.model, forces.motion
+    if not any(isinstance(group.element, SpinHold) for group in model.system.groups):
+        return forces
+    found, solved = np.nan_to_num(forces.multipliers), motion.status == Status.OK
+    most = np.abs(found[..., solved]).max(axis=(1, 2), initial=0.0) * model.length
+    rate = _rate(forces, solved)
+    for level in range(1, len(most)):  # what vanishes at a level is as exact as that of the level before
+        most[level] = max(most[level], rate * most[level - 1])
+    for place in forces.indices.values():
+        group = model.system.groups[place.group]
+        if not isinstance(group.element, SpinHold):
+            continue
+        torque = np.abs(found[:, list(place.own_rows)][..., solved]).max(axis=(1, 2), initial=0.0)
+        if (torque > NOTHING * most).any():
+            body = model.bodies[group.bodies[0][place.instance] - 1]
+            message = (
+                "inertia or forces would spin this body about an axis of itself, which nothing prescribes, and the "
+                "forces in the mechanism depend on it: simulate the motion, or hold the body by a joint or driver"
+            )
+            raise MechanismError(message, name=f"bodies.{body}")
+    return forces
+
+
+def _rate(forces: Any, solved: Numbers) -> float:
+    """Return how fast the motion changes, 1/s: how large its Taylor coefficients are."""
+    parts = {"position": forces.model.length, "angle": 1.0, "quaternion": 1.0}
+    sizes = [
+        np.nan_to_num(np.abs(forces.coordinates[name][1:, ..., solved])).reshape(forces.levels + 1, -1) / scale
+        for name, scale in parts.items()
+        if name in forces.coordinates
+    ]
+    powers = 1.0 / np.arange(1.0, forces.levels + 2)
+    return float(max((size.max(axis=1, initial=0.0) ** powers).max() for size in sizes))

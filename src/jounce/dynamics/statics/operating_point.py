@@ -1,0 +1,134 @@
+"""A mechanism in a motion at one instant, where small changes of that motion are looked at."""
+
+import dataclasses
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.forward.accelerations import Equations
+from jounce.dynamics.statics.variations import loads_at, masses_at, output_variations, variations
+from jounce.linear_algebra.host_jacobian import RANK_TOLERANCE
+from jounce.mechanism import Mechanism, Model
+
+Lanes = Float[np.ndarray, "3 column lane"]
+"""Taylor coefficients of changes of the scaled coordinates of all moving bodies."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class OperatingPoint:
+    """A mechanism in a motion at one instant, where small changes of that motion are looked at.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What moves.
+    model : Model
+        Its numbers, the rows scaled.
+    equations : Equations
+        Its forces there, with the turns that angles about axes have.
+    coordinates : dict of str to array
+        Taylor coefficients to order 2 of the coordinates of all bodies, the ground first; a batch of one.
+    clock : array of shape (3, 1, 1)
+        Those of time; of rate zero where the laws of time are held.
+    """
+
+    mechanism: Mechanism
+    model: Model
+    equations: Equations
+    coordinates: dict[str, np.ndarray]
+    clock: np.ndarray
+
+    @cached_property
+    def _loads_and_jacobian(self) -> tuple[np.ndarray, np.ndarray]:
+        parts, jacobian = loads_at(self.equations, self.coordinates, self.clock)
+        return np.asarray(parts), np.asarray(jacobian)
+
+    @property
+    def loads(self) -> Float[np.ndarray, "2 column"]:
+        """Inertia less weight, and applied forces with the minus sign, in scaled coordinates: N m, or N by size."""
+        return self.as_columns(self._loads_and_jacobian[0][..., None])[..., 0]
+
+    @property
+    def jacobian(self) -> Float[np.ndarray, "row column"]:
+        """Of all constraints, scaled on both sides."""
+        return self._loads_and_jacobian[1]
+
+    @property
+    def scale(self) -> Float[np.ndarray, " column"]:
+        """Of the coordinates of the moving bodies, m or rad."""
+        return np.tile(np.asarray(self.model.system.column_scale), len(self.model.bodies))
+
+    @cached_property
+    def multipliers(self) -> Float[np.ndarray, " row"]:
+        """Of the scaled rows: the shortest ones that balance the loads."""
+        load = self.loads.sum(axis=0)
+        return -np.linalg.lstsq(self.jacobian.T, load, rcond=RANK_TOLERANCE)[0] if len(self.jacobian) else np.zeros(0)
+
+    @cached_property
+    def free(self) -> Float[np.ndarray, "column direction"]:
+        """Orthonormal directions of the scaled coordinates that all constraints leave free."""
+        return null_space(self.jacobian)
+
+    @cached_property
+    def masses(self) -> Float[np.ndarray, "coordinate coordinate body"]:
+        """Mass matrices of the moving bodies, their rows and columns scaled, kg m^2."""
+        scale = np.asarray(self.model.system.column_scale)
+        return np.asarray(masses_at(self.equations, self.coordinates)) * (scale[:, None] * scale)[..., None]
+
+    def as_columns(self, by_body: Float[np.ndarray, "... coordinate body lane"]) -> np.ndarray:
+        """Return what acts on the coordinates of bodies in the order of the scaled columns."""
+        scaled = by_body * np.asarray(self.model.system.column_scale)[:, None, None]
+        return np.swapaxes(scaled, -3, -2).reshape(*scaled.shape[:-3], -1, scaled.shape[-1])
+
+    def changes(
+        self, columns: Float[np.ndarray, "level column lane"]
+    ) -> Float[np.ndarray, "level coordinate all lane"]:
+        """Return changes of the scaled coordinates as shifts and turns of all bodies, the ground first, m and rad."""
+        count = len(self.model.system.column_scale)
+        parts = (columns * self.scale[:, None]).reshape(len(columns), -1, count, columns.shape[-1])
+        return np.pad(np.swapaxes(parts, 1, 2), ((0, 0), (0, 0), (1, 0), (0, 0)))
+
+    def varied(self, columns: Lanes) -> tuple[Float[np.ndarray, "3 column lane"], Float[np.ndarray, "3 row lane"]]:
+        """Return how loads, with those of the joints, and the rows vary with changes of the scaled coordinates."""
+        arguments = self.equations, self.coordinates, self.clock, self.multipliers[:, None], self.changes(columns)
+        forces, rows = (np.asarray(x) for x in variations(*arguments))
+        return self.as_columns(forces), rows
+
+    def outputs_varied(self, columns: Lanes) -> list[Float[np.ndarray, "level component instance lane"]]:
+        """Return how outputs, group by group, vary with changes of the scaled coordinates."""
+        groups, pose_type = self.model.system.outputs, self.model.pose_type
+        return [np.asarray(x) for x in output_variations(groups, self.coordinates, pose_type, self.changes(columns))]
+
+    @cached_property
+    def output_gradients(self) -> dict[str, Float[np.ndarray, " column"]]:
+        """Gradients, by the scaled coordinates, of the components of outputs that are positions or angles, by name."""
+        count = len(self.scale)
+        varied = self.outputs_varied(np.stack([np.eye(count), *[np.zeros((count, count))] * 2]))
+        components = self.components([x.shape[1] for x in varied])
+        groups = self.model.system.outputs
+        return {name: varied[g][0, c, k] for name, (g, c, k) in components.items() if not groups[g].element.lost_orders}
+
+    def components(self, counts: Sequence[int]) -> dict[str, tuple[int, int, int]]:
+        """Return group, component and instance of each component of an output, by its name in tables."""
+        components = {}
+        for index, (names, group) in enumerate(zip(self.model.outputs, self.model.system.outputs, strict=True)):
+            labels = group.element.labels[: counts[index]] if counts[index] > 1 else ("",)
+            for instance, name in enumerate(names):
+                for k, label in enumerate(labels):
+                    components[f"{name}_{label}" if label else name] = index, k, instance
+        return {name: components[name] for name in sorted(components, key=self._order)}
+
+    def _order(self, component: str) -> int:
+        """Return the position of the output that a component belongs to in the order of the mechanism."""
+        names = list(self.mechanism.outputs)
+        return max(k for k, name in enumerate(names) if component == name or component.startswith(f"{name}_"))
+
+
+def null_space(jacobian: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "column direction"]:
+    """Return an orthonormal basis of the directions that a scaled Jacobian takes to zero."""
+    if not len(jacobian):
+        return np.eye(jacobian.shape[1])
+    _, sizes, right = np.linalg.svd(jacobian)
+    return right[int(np.sum(sizes > RANK_TOLERANCE * sizes.max(initial=0.0))) :].T
