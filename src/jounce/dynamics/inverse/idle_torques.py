@@ -13,7 +13,7 @@ NOTHING = 1e-9  # of the largest multiplier: what is less is rounding
 
 
 def checked(forces: Any) -> Any:
-    """Return forces, or raise MechanismError where something would spin a body about an axis of itself that is held by no joint.
+    """Return forces, or raise MechanismError where something would spin a body about an axis that no joint holds.
 
     Parameters
     ----------
