@@ -67,6 +67,7 @@ from jounce.mechanism import (
 from jounce.planning import (
     inverse_kinematics as inverse_kinematics,
     retime as retime,
+    smooth as smooth,
 )
 from jounce.robot import (
     Inertia as Inertia,

@@ -39,6 +39,7 @@ from jounce.cli.robots import check, torques
 from jounce.cli.servo import servo
 from jounce.cli.shell_completion import complete
 from jounce.cli.small_motions import modes
+from jounce.cli.smoothing import smooth
 from jounce.cli.standard_streams import failsafe_streams
 from jounce.cli.starters import new
 from jounce.cli.sweeping import sweep
@@ -72,7 +73,7 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 COMMANDS = (
     new, example, inspect, run, trace, simulate, optimize, sweep, tolerance, modes, plot, report, view, servo, cam,
-    check, torques, retime, feedforward, export, convert, reproduce, equations, schema, completion, doctor,
+    check, torques, smooth, retime, feedforward, export, convert, reproduce, equations, schema, completion, doctor,
 )  # fmt: skip
 LIGHT = (new, example, completion)  # they compute nothing
 GARBAGE = 50_000  # new objects before the collector looks: imports and traces leave none, and 700 take 0.2 s of a run

@@ -31,6 +31,7 @@ def check(
     limits: Path | None = None,
     hand_over: bool = False,
     out: Path | None = None,
+    deviation: str | None = None,
     reading: RobotReading = PLAIN_ROBOT,
     overwrite: bool = False,
     json: bool = False,
@@ -52,6 +53,8 @@ def check(
         The robot moves already at the start, and goes on at the stop.
     out
         Draw the joints' shares of their limits: .png, .svg or .pdf.
+    deviation
+        Smooth the samples first, within this of each, as 0.01deg.
     overwrite
         Let --out replace a file that is read here.
     json
@@ -84,7 +87,7 @@ def check(
             bounds = load_motion_limits(limits, model)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", SampleWarning)
-        motion = reading.trajectory(trajectory, model)
+        motion = _smoothed(reading.trajectory(trajectory, model), deviation, trajectory)
         with errors_about(trajectory, robot):
             spare_inputs(out, overwrite=overwrite)
             report = check_motion(model, motion, bounds, hand_over=hand_over)
@@ -111,6 +114,7 @@ def torques(
     *,
     rates: int = 2,
     no_drives: bool = False,
+    deviation: str | None = None,
     reading: RobotReading = PLAIN_ROBOT,
     output: TableOutput = NO_TABLE,
 ) -> int:
@@ -128,6 +132,8 @@ def torques(
         Highest rate of the torques, 0 to 28.
     no_drives
         Leave out armature, damping and friction.
+    deviation
+        Smooth the samples first, within this of each, as 0.01deg.
 
     Examples
     --------
@@ -146,7 +152,7 @@ def torques(
         raise JounceError(f"must be a whole number from 0 to {MOST_RATES}", name="--rates", value=rates)
     output.check()
     model = reading.robot(robot)
-    motion = reading.trajectory(trajectory, model)
+    motion = _smoothed(reading.trajectory(trajectory, model), deviation, trajectory)
     spare_inputs(output.out, overwrite=output.overwrite)
     with errors_about(trajectory, robot):
         dataset = trajectory_torques(model, motion, rates, drives=not no_drives)
@@ -175,3 +181,14 @@ def _torques_at_breaks(robot: Any, motion: Any, rates: int, *, drives: bool) -> 
         warnings.simplefilter("ignore", SampleWarning)  # told of all instants
         torques_there = trajectory_torques(robot, motion, rates, times=sides, drives=drives)
     return torques_there.assign_coords(time=breaks[which])
+
+
+def _smoothed(motion: Any, deviation: str | None, file: Path) -> Any:
+    """Return a motion within a deviation of the samples of another, where one is given."""
+    if deviation is None:
+        return motion
+    from jounce.cli.retiming import deviation_of
+    from jounce.planning import smooth
+
+    with errors_about(file):
+        return smooth(motion, deviation_of(deviation))

@@ -14,6 +14,11 @@ from jounce.planning.elastic.spring_deflection import SpringDeflection as Spring
 from jounce.planning.retiming.limits import MotionLimits as MotionLimits, PointLimits as PointLimits
 from jounce.planning.retiming.retime import retime as retime
 from jounce.planning.retiming.retimed import RetimedTrajectory as RetimedTrajectory
+from jounce.planning.smoothing.smooth import (
+    SmoothedJoint as SmoothedJoint,
+    SmoothedTrajectory as SmoothedTrajectory,
+    smooth as smooth,
+)
 from jounce.planning.tool_paths.follow_tool_path import follow_tool_path as follow_tool_path
 from jounce.planning.tool_paths.inverse_kinematics import inverse_kinematics as inverse_kinematics
 from jounce.planning.tool_paths.joint_poses import JointPoses as JointPoses

@@ -1,0 +1,1 @@
+"""Smooth motions within a deviation of noisy samples."""

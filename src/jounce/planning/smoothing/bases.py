@@ -1,0 +1,60 @@
+"""B-splines of degree 7 on knots: their values at samples, their jounce, and systems with few diagonals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+DEGREE, PENALIZED = 7, 4
+"""Of the splines, and which derivative of them is to be small: jounce; natural splines for it have this degree."""
+_Knots = Float[np.ndarray, " knot"]
+
+
+def whole(knots: _Knots) -> Float[np.ndarray, " repeated"]:
+    """Return knots with those at the ends as often as B-splines ask for."""
+    return np.concatenate([np.full(DEGREE, knots[0]), knots, np.full(DEGREE, knots[-1])])
+
+
+def values_at(times: Float[np.ndarray, " sample"], knots: _Knots) -> Any:
+    """Return the sparse matrix of the values of B-splines at instants, (sample, spline)."""
+    from scipy.interpolate import BSpline  # here, since importing SciPy takes half a second
+
+    return BSpline.design_matrix(times, whole(knots), DEGREE)
+
+
+def penalty_root(knots: _Knots, weights: Float[np.ndarray, " cell"]) -> Any:
+    """Return a sparse matrix, (node, spline), whose square is the weighted integral of the square of the jounce.
+
+    Parameters
+    ----------
+    knots : array of shape (cell + 1,)
+        Increasing.
+    weights : array of shape (cell,)
+        Of each cell between them.
+    """
+    from scipy import sparse
+    from scipy.interpolate import BSpline
+
+    repeated, degree = whole(knots), DEGREE
+    derivative: Any = sparse.identity(len(knots) + DEGREE - 1, format="csr")
+    for _ in range(PENALIZED):
+        count = derivative.shape[0]
+        gaps = repeated[degree + 1 : degree + count] - repeated[1:count]
+        step: Any = sparse.diags_array([-degree / gaps, degree / gaps], offsets=[0, 1], shape=(count - 1, count))
+        derivative, repeated, degree = step.tocsr() @ derivative, repeated[1:-1], degree - 1
+    nodes, shares = np.polynomial.legendre.leggauss(degree + 1)  # exact for squares
+    lengths = np.diff(knots)
+    at = knots[:-1, None] + lengths[:, None] * (nodes + 1) / 2
+    root = np.sqrt(weights[:, None] * lengths[:, None] / 2 * shares)
+    return sparse.diags(root.reshape(-1)) @ BSpline.design_matrix(at.reshape(-1), repeated, degree) @ derivative
+
+
+def banded(matrix: Any) -> Float[np.ndarray, "diagonal spline"]:
+    """Return the upper diagonals of a symmetric sparse matrix, as SciPy's banded solvers take them."""
+    found = np.zeros((DEGREE + 1, matrix.shape[0]))
+    for k in range(DEGREE + 1):
+        if k < matrix.shape[0]:
+            found[DEGREE - k, k:] = matrix.diagonal(k)
+    return found

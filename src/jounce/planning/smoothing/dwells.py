@@ -1,0 +1,184 @@
+"""Where samples stand still: as far as their noise, or the steps in which they were written, can tell."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.trajectory.sample_errors import noise
+
+BLOCK = 8  # samples whose mean is compared
+LEAST = 32  # samples of a dwell
+SURE = 4.0  # standard deviations
+SLOPE = 3.0  # standard deviations of the drift over a dwell
+SHARES = (1.0, 0.95, 0.9, 0.8, 0.65, 0.5)  # of a run, that are tried
+NEAR = 5  # blocks between dwells that are one
+LEAST_LEFT = 2  # samples
+MARGIN = 1.5  # blocks at each end of a dwell that may be of the motion beside it
+LONGER = 4  # times as long a run of equal samples is than those beside it, if it is a dwell
+EQUAL = 16  # samples in a run of equal ones
+SEEN = 20_000  # samples in which noise and steps are looked for
+AGREE = 1e-3  # of a step, to which all differences are whole numbers of steps
+QUANTA = 4096  # steps in the range of the samples at most
+
+
+@dataclasses.dataclass(frozen=True)
+class Dwell:
+    """A time at which samples stand still.
+
+    Parameters
+    ----------
+    first, last : int
+        Of its samples, both included.
+    position : float
+        rad or m.
+    """
+
+    first: int
+    last: int
+    position: float
+
+
+def step_of(values: Float[np.ndarray, " sample"]) -> float:
+    """Return the step in which samples were written; 0 where there is none to be seen."""
+    differences = np.abs(np.diff(values[:SEEN]))
+    differences = differences[differences > 0]
+    if len(differences) < 8:
+        return 0.0
+    step = float(differences.min())
+    if np.ptp(values[:SEEN]) > 1e9 * step:
+        return 0.0
+    whole = differences / step
+    near = np.abs(whole - np.rint(whole)).max() <= max(AGREE * float(whole.max()), 0.05)
+    return step if near and float(np.ptp(values[:SEEN])) < QUANTA * step * 1e3 and np.mean(whole < 1.5) > 0.02 else 0.0
+
+
+def noise_of(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"]) -> float:
+    """Return the standard deviation of the noise of samples, that of their steps included."""
+    found = noise(times[:SEEN], values[:SEEN])
+    return max(found, step_of(values) / np.sqrt(12))
+
+
+def dwells(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], sigma: float) -> list[Dwell]:
+    """Return the dwells of samples, without what may be of the motions beside them.
+
+    Parameters
+    ----------
+    times, values : array of shape (sample,)
+        s, rad or m.
+    sigma : float
+        Standard deviation of their noise.
+    """
+    found = _of_equal(values)
+    taken = np.zeros(len(values), bool)
+    for dwell in found:
+        taken[dwell.first : dwell.last + 1] = True
+    found += [dwell for dwell in _of_noise(times, values, sigma) if not taken[dwell.first : dwell.last + 1].any()]
+    return _together(sorted(found, key=lambda dwell: dwell.first), values, sigma)
+
+
+def without_margins(
+    dwells: Sequence[Dwell], times: Float[np.ndarray, " sample"], scales: Sequence[tuple[float, float]]
+) -> list[Dwell]:
+    """Return dwells without the times next to motions in which these may begin or end unseen.
+
+    Parameters
+    ----------
+    dwells : sequence of Dwell
+        In their sequence.
+    times : array of shape (sample,)
+        s.
+    scales : sequence of (float, float)
+        The time in which the motion before a dwell, and the one after it, may change, s.
+    """
+    found = []
+    for dwell, (before, after) in zip(dwells, scales, strict=True):
+        first, last = dwell.first, dwell.last
+        if first > 0:
+            first = int(np.searchsorted(times, times[first] + before))
+        if last < len(times) - 1:
+            last = int(np.searchsorted(times, times[last] - after, side="right")) - 1
+        if last - first >= LEAST_LEFT and times[last] - times[first] >= min(before, after):
+            found.append(dataclasses.replace(dwell, first=first, last=last))
+    return found
+
+
+def _together(found: list[Dwell], values: np.ndarray, sigma: float) -> list[Dwell]:
+    """Join dwells between which there is little more than a margin, and no motion."""
+    result: list[Dwell] = []
+    for dwell in found:
+        if result and dwell.first - result[-1].last <= NEAR * BLOCK:
+            before = result[-1]
+            counts = before.last - before.first + 1, dwell.last - dwell.first + 1
+            if abs(before.position - dwell.position) <= SURE * sigma * np.sqrt(1 / counts[0] + 1 / counts[1]):
+                own = values[before.first : dwell.last + 1]
+                result[-1] = Dwell(before.first, dwell.last, float(own.mean()))
+                continue
+        result.append(dwell)
+    return result
+
+
+def _of_equal(values: np.ndarray) -> list[Dwell]:
+    """Return runs of equal samples, if they are much longer than those beside: others are steps of a slow motion."""
+    begins = np.flatnonzero(np.append(True, np.diff(values) != 0))
+    lengths = np.diff(np.append(begins, len(values)))
+    found = []
+    for k in np.flatnonzero(lengths >= EQUAL).tolist():
+        beside = max((int(lengths[j]) for j in (k - 1, k + 1) if 0 <= j < len(lengths)), default=0)
+        if len(lengths) > 1 and lengths[k] < LONGER * beside:
+            continue
+        first, last = int(begins[k]), int(begins[k] + lengths[k] - 1)
+        first, last = _within(first, last, len(values), max(beside, int(lengths[k]) // 8))
+        if last - first >= 2:
+            found.append(Dwell(first, last, float(values[first])))
+    return found
+
+
+def _of_noise(times: np.ndarray, values: np.ndarray, sigma: float) -> list[Dwell]:
+    """Return runs of blocks whose means, drift and scatter are those of noise about one position."""
+    count = len(values) // BLOCK
+    if count < LEAST // BLOCK or sigma <= 0:
+        return []
+    means = values[: count * BLOCK].reshape(count, BLOCK).mean(axis=1)
+    near = SURE * sigma / np.sqrt(BLOCK)
+    found, first = [], 0
+    while first < count - 1:
+        last, low, high = first, means[first], means[first]
+        while last + 1 < count and max(high, means[last + 1]) - min(low, means[last + 1]) <= 2 * near:
+            last += 1
+            low, high = min(low, means[last]), max(high, means[last])
+        begin, end = first * BLOCK, (last + 1) * BLOCK - 1
+        if last == count - 1:
+            end = len(values) - 1
+        whole = end - begin + 1
+        lengths = [n for share in SHARES if (n := int(share * whole)) >= LEAST]
+        still = next((n for n in lengths if _still(times[begin : begin + n], values[begin : begin + n], sigma)), 0)
+        if still:  # the first samples of a motion may pass for noise
+            end = begin + still - 1
+            begin, end = _within(begin, end, len(values), int(MARGIN * BLOCK))
+            if end - begin >= 2:
+                found.append(Dwell(begin, end, float(values[begin : end + 1].mean())))
+            first = first + max(1, still // BLOCK)
+        else:
+            first = first + 1 if last == first else first + max(1, (last - first) // 2)
+    return found
+
+
+def _still(times: np.ndarray, values: np.ndarray, sigma: float) -> bool:
+    """Tell whether samples drift and scatter no more than noise about one position does."""
+    since = times - times.mean()
+    span = float(times[-1] - times[0])
+    slope = float(since @ values) / float(since @ since)
+    certain = SLOPE * sigma / np.sqrt(float(since @ since)) * span
+    half = len(values) // 2
+    apart = abs(values[:half].mean() - values[half:].mean())
+    scatter = float(values.std())
+    return bool(abs(slope) * span <= certain and scatter <= 1.3 * sigma and apart <= SURE * sigma / np.sqrt(half))
+
+
+def _within(first: int, last: int, count: int, margin: int) -> tuple[int, int]:
+    """Return a dwell without its margins, but at the ends of the samples."""
+    return (first if first == 0 else first + margin), (last if last == count - 1 else last - margin)

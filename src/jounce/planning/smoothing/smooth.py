@@ -1,0 +1,212 @@
+"""Smooth motions within a deviation of samples, whose torque rates are those of the motion and not of its noise."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Float
+
+from jounce.errors import SolveError, TrajectoryError
+from jounce.planning.retiming.path import SmoothPieces
+from jounce.planning.smoothing.bases import DEGREE, whole
+from jounce.planning.smoothing.curves import smoothed_curve
+from jounce.planning.smoothing.dwells import Dwell, dwells, noise_of, without_margins
+from jounce.planning.smoothing.weights import Stretch, stretches
+from jounce.trajectory import AbstractMotion, HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
+from jounce.trajectory.checks import positive
+from jounce.trajectory.splines import local_powers
+
+FEWEST = 12  # samples
+UNSEEN = 3.0  # over the cutoff frequency: for so long a motion may begin or end unseen
+
+
+@dataclasses.dataclass(frozen=True)
+class SmoothedJoint:
+    """What smoothing made of the samples of a joint.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of the noise that the samples show, that of their rounding included, rad or m.
+    away : float
+        Largest distance of the motion from a sample, rad or m.
+    dwells : tuple of (float, float)
+        Times at which it stands still, s.
+    cutoff : tuple of (float, float)
+        Lowest and highest frequency from which on nothing of the samples is followed, Hz.
+    """
+
+    noise: float
+    away: float
+    dwells: tuple[tuple[float, float], ...]
+    cutoff: tuple[float, float]
+
+
+class SmoothedTrajectory(JointTrajectory):
+    """A trajectory within a deviation of samples.
+
+    Parameters
+    ----------
+    laws, start, stop, times, measures
+        As for `JointTrajectory`.
+    deviation : float
+        Within which it is of every sample, rad or m.
+    joints : dict of str to SmoothedJoint
+        What was made of the samples of each joint.
+    """
+
+    def __init__(
+        self,
+        laws: Mapping[str, AbstractMotion],
+        start: float,
+        stop: float,
+        times: Float[np.ndarray, " sample"],
+        measures: Mapping[str, str],
+        deviation: float,
+        joints: Mapping[str, SmoothedJoint],
+    ):
+        super().__init__(laws, start, stop, times, measures)
+        self.deviation, self.joints = deviation, dict(joints)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        own = (dict(self.laws), self.start, self.stop, self.times, dict(self.measures), self.deviation, self.joints)
+        return type(self), own
+
+
+def smooth(trajectory: JointTrajectory, deviation: float) -> SmoothedTrajectory:
+    """Return a smooth motion within a deviation of the samples of a trajectory.
+
+    Splines of degree 7 stay within the deviation of each sample. How much jounce counts against distance follows from
+    the samples themselves, stretch by stretch, as the weight under which they are most likely; where that leads too far
+    from a sample, the motion is the one of the least cost within the deviation. Where samples stand still, so does the
+    motion. Derivatives to the sixth are continuous, so that torques and their rates are, too.
+
+    Parameters
+    ----------
+    trajectory : JointTrajectory
+        Through samples, as a log; its positions count, at instants that may be uneven. Laws that do not come from
+        samples stay as they are.
+    deviation : float
+        How far the motion may be from a sample, rad or m, for each joint.
+
+    Returns
+    -------
+    SmoothedTrajectory
+        With what was found of each joint: noise, distance, dwells.
+
+    Raises
+    ------
+    TrajectoryError
+        If no joint has samples, too few, or no motion is within the deviation: the message names joint and instant.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import jounce as jn
+    >>> t = np.linspace(0.0, 2.0, 401)
+    >>> noisy = np.sin(3 * t) + 1e-5 * np.random.default_rng(0).normal(size=t.size)
+    >>> log = jn.JointTrajectory.from_samples(t, noisy[:, None], ["axis"])
+    >>> motion = jn.smooth(log, deviation=5e-5)
+    >>> jerk = motion.derivatives(motion.times, 3)[:, 3, 0]
+    >>> bool(abs(np.abs(jerk).max() / 27 - 1) < 0.1)
+    True
+    """
+    deviation = positive("deviation", deviation)
+    samples = {name: own for name, law in trajectory.laws.items() if (own := sampled(law)) is not None}
+    if not samples:
+        message = "no joint goes through samples; there is nothing to be smoothed"
+        raise TrajectoryError(message, name="trajectory", value=list(trajectory.names))
+    laws, joints = dict(trajectory.laws), {}
+    for name, (times, values) in samples.items():
+        try:
+            laws[name], joints[name] = smoothed_samples(times, values, deviation)
+        except (SolveError, TrajectoryError) as error:
+            raise TrajectoryError(error.message, name=name, value=error.value) from None
+    return SmoothedTrajectory(
+        laws, trajectory.start, trajectory.stop, trajectory.times, trajectory.measures, deviation, joints
+    )
+
+
+def sampled(law: AbstractMotion) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, " sample"]] | None:
+    """Return times and values that a law goes through; None where it does not come from samples."""
+    of_samples = type(law) in (SplineMotion, HermiteSplineMotion) and law.beyond == "refuse"
+    if of_samples and law.samples.value is not None:
+        return law.samples.value
+    if isinstance(law, HermiteMotion) and law.degree == 1 and law.beyond == "refuse":
+        last = float(law.stop)
+        times = np.append(np.asarray(law.breakpoints, float)[:-1], last)
+        return times, np.asarray(law.coefficients, float)[0]
+    return None
+
+
+def smoothed_samples(
+    times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " sample"], deviation: float
+) -> tuple[AbstractMotion, SmoothedJoint]:
+    """Return the law of one joint within a deviation of its samples, and what was found.
+
+    Raises
+    ------
+    TrajectoryError, SolveError
+        As `smooth` tells.
+    """
+    if len(times) < FEWEST:
+        message = f"at least {FEWEST} samples are needed; a path through few points takes a deviation in retime"
+        raise TrajectoryError(message, value=len(times))
+    sigma = noise_of(times, values)
+    if not np.ptp(values):
+        still = [Dwell(0, len(times) - 1, float(values[0]))]
+        found = [Stretch(float(times[0]), float(times[-1]), 1.0, 1.0, 0.0)]
+    else:
+        still = dwells(times, values, sigma)
+        found = _moving(times, values, still)
+        still = without_margins(still, times, [_scales(times, dwell, found) for dwell in still])
+        still = [_fitting(times, values, dwell, deviation) for dwell in still]
+    curve = smoothed_curve(times, values, deviation, found, still)
+    from scipy.interpolate import BSpline  # here, since importing SciPy takes half a second
+
+    spline = BSpline(whole(curve.knots), curve.coefficients, DEGREE)
+    powers = local_powers(spline, curve.knots[:-1], DEGREE)
+    for dwell in still:  # at rest exactly, not up to rounding
+        own = (curve.knots[:-1] >= times[dwell.first]) & (curve.knots[:-1] < times[dwell.last])
+        powers[0, own], powers[1:, own] = dwell.position, 0.0
+    law = SmoothPieces(curve.knots[:-1], powers, float(curve.knots[-1]))
+    spans = tuple((float(times[d.first]), float(times[d.last])) for d in still)
+    rates = [stretch.cutoff / (2 * np.pi) for stretch in found]
+    noise = max(sigma, float(np.median([stretch.noise for stretch in found])))
+    return law, SmoothedJoint(noise, curve.away, spans, (min(rates), max(rates)))
+
+
+def _fitting(times: np.ndarray, values: np.ndarray, dwell: Dwell, deviation: float) -> Dwell:
+    """Return a dwell at a position that is within the deviation of all its samples."""
+    own = values[dwell.first : dwell.last + 1]
+    low, high = float(own.max()) - deviation, float(own.min()) + deviation
+    if low > high:
+        at = int(dwell.first + np.argmax(np.abs(own - np.median(own))))
+        message = (
+            f"samples of a dwell differ by {np.ptp(own):.3g} about t = {times[at]:.6g} s, more than twice the "
+            f"deviation of {deviation:.3g}; choose a larger one"
+        )
+        raise TrajectoryError(message)
+    return dataclasses.replace(dwell, position=float(np.clip(dwell.position, low, high)))
+
+
+def _scales(times: np.ndarray, dwell: Dwell, found: list[Stretch]) -> tuple[float, float]:
+    """Return the times in which the motions before and after a dwell may change, s."""
+    before = [stretch for stretch in found if stretch.stop <= times[dwell.first]]
+    after = [stretch for stretch in found if stretch.start >= times[dwell.last]]
+    ends = before[-1] if before else found[0], after[0] if after else found[-1]
+    return UNSEEN / ends[0].cutoff, UNSEEN / ends[1].cutoff
+
+
+def _moving(times: np.ndarray, values: np.ndarray, still: list[Dwell]) -> list[Stretch]:
+    """Return what samples between dwells say; of dwells, what those beside them do."""
+    edges = [0, *(k for dwell in still for k in (dwell.first, dwell.last)), len(times) - 1]
+    found: list[Stretch] = []
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if last - first >= FEWEST:
+            found += stretches(times[first : last + 1], values[first : last + 1])
+    if not found:
+        found = stretches(times, values)
+    return sorted(found, key=lambda stretch: stretch.start)

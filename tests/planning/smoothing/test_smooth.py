@@ -1,0 +1,108 @@
+"""Noisy samples of motions that are known: jerk, deviation, dwells, uneven stamps, and what is refused."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.errors import TrajectoryError
+
+
+def minimum_jerk(times, start, duration, size):
+    u = np.clip((times - start) / duration, 0, 1)
+    return size * (10 * u**3 - 15 * u**4 + 6 * u**5)
+
+
+def minimum_snap(times, start, duration, size):
+    u = np.clip((times - start) / duration, 0, 1)
+    return size * (35 * u**4 - 84 * u**5 + 70 * u**6 - 20 * u**7)
+
+
+MOTIONS = {
+    "sine": (lambda t: 0.5 * np.sin(2 * np.pi * t), 0.5 * (2 * np.pi) ** 3, 3.0),
+    "slow sine": (lambda t: 0.8 * np.sin(1.9 * t + 0.4), 0.8 * 1.9**3, 6.0),
+    "minimum jerk": (lambda t: minimum_jerk(t, 1.0, 1.0, 1.0), 60.0, 3.0),
+    "two moves": (lambda t: minimum_snap(t, 0.5, 0.6, 0.3) + minimum_snap(t, 2.0, 1.5, 0.7), 52.5 * 0.3 / 0.6**3, 5.0),
+}
+STILL = {"minimum jerk": [(0.0, 0.7), (2.3, 3.0)], "two moves": [(0.0, 0.2), (1.4, 1.6), (3.8, 5.0)]}
+
+
+def recorded(times, clean, noise):
+    generator, (kind, size) = np.random.default_rng(11), noise
+    if kind == "gaussian":
+        return clean + size * generator.normal(size=len(times)), 4.5 * size
+    if kind == "steps":
+        return size * np.round(clean / size), size
+    return size * np.round((clean + size / 2 * generator.normal(size=len(times))) / size), 3.5 * size
+
+
+def law_of(times, values, deviation):
+    motion = jn.smooth(jn.JointTrajectory.from_samples(times, values[:, None], ["a"]), deviation)
+    return motion, motion.laws["a"], motion.joints["a"]
+
+
+def derivative(law, times, order):
+    begins, powers = np.asarray(law.breakpoints), np.asarray(law.coefficients)
+    piece = np.clip(np.searchsorted(begins, times, side="right") - 1, 0, len(begins) - 1)
+    polynomial = [np.polynomial.Polynomial(c).deriv(order)(t - b) for c, b, t in zip(
+        powers.T[piece], begins[piece], times, strict=True)]  # fmt: skip
+    return np.array(polynomial)
+
+
+@pytest.mark.parametrize("rate", [100, 500])
+@pytest.mark.parametrize("noise", [("gaussian", 1e-5), ("gaussian", 1e-4), ("steps", 1e-4), ("both", 2e-5)])
+@pytest.mark.parametrize("name", MOTIONS)
+def test_the_jerk_is_that_of_the_motion(name, noise, rate):
+    clean, peak, stop = MOTIONS[name]
+    times = np.arange(0, stop + 1e-9, 1 / rate)
+    values, deviation = recorded(times, clean(times), noise)
+    motion, law, own = law_of(times, values, deviation)
+    looks = np.linspace(0, stop, 2501)
+    assert 0.75 <= np.abs(derivative(law, looks, 3)).max() / peak <= 1.25
+    assert np.abs(derivative(law, times, 0) - values).max() <= deviation
+    assert own.away <= deviation
+    for first, last in STILL.get(name, []):
+        inside = np.linspace(first, last, 50)
+        assert not derivative(law, inside, 1).any()
+    assert motion.stop == times[-1]
+
+
+def test_a_deviation_below_the_noise_is_kept_where_it_can_be():
+    times = np.linspace(0, 3, 601)
+    values = np.sin(2 * times) + 1e-4 * np.random.default_rng(2).normal(size=601)
+    _, law, own = law_of(times, values, 1.5e-4)
+    assert np.abs(derivative(law, times, 0) - values).max() <= 1.5e-4
+    assert 0.8e-4 < own.noise < 1.2e-4
+
+
+def test_uneven_stamps_and_all_derivatives_are_continuous():
+    generator = np.random.default_rng(4)
+    times = np.sort(generator.uniform(0, 4, 900))
+    values = np.sin(2 * times) + 1e-5 * generator.normal(size=900)
+    motion, law, _ = law_of(times, values, 6e-5)
+    looks = np.linspace(times[0], times[-1], 1500)
+    assert np.abs(derivative(law, looks, 3)).max() == pytest.approx(8.0, rel=0.2)
+    knots = np.asarray(law.breakpoints)[1:]
+    for k in range(7):
+        size = np.abs(derivative(law, looks, k)).max()
+        before = derivative(law, np.nextafter(knots, 0), k)
+        assert np.abs(derivative(law, knots, k) - before).max() <= 1e-6 * size
+    again = pickle.loads(pickle.dumps(motion))
+    assert again.deviation == motion.deviation
+    assert again.joints == motion.joints
+
+
+def test_what_is_refused_is_named():
+    times = np.linspace(0, 1, 201)
+    laws = jn.JointTrajectory({"a": "t"}, 0.0, 1.0)
+    with pytest.raises(TrajectoryError, match="no joint goes through samples"):
+        jn.smooth(laws, 1e-3)
+    log = jn.JointTrajectory.from_samples(times, np.sin(times)[:, None], ["a"])
+    with pytest.raises(TrajectoryError, match="deviation: must be greater than zero"):
+        jn.smooth(log, 0.0)
+    with pytest.raises(TrajectoryError, match="a: at least 12 samples are needed"):
+        jn.smooth(jn.JointTrajectory.from_samples(times[:8], times[:8, None], ["a"]), 1e-3)
+    noisy = 1e-3 * np.random.default_rng(1).normal(size=201)
+    with pytest.raises(TrajectoryError, match=r"a: samples of a dwell differ by .* more than twice the deviation"):
+        jn.smooth(jn.JointTrajectory.from_samples(times, noisy[:, None], ["a"]), 1e-3)
