@@ -5,16 +5,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jounce.cli.options import PLAIN_ROBOT, RobotReading, errors_about, spare_inputs, written
 from jounce.cli.retiming import ROWS, deviation_of
 from jounce.cli.servo import frequency_of
 from jounce.errors import SampleWarning
 from jounce.reporting.terminal import say, show_table
-
-if TYPE_CHECKING:
-    import numpy as np
 
 BLOCK = 50_000  # rows at once
 FOLLOWED = 3.0  # times the noise: within less, the motion follows noise
@@ -99,7 +96,7 @@ def _dwells(spans: tuple[tuple[float, float], ...]) -> str:
     return ", ".join([*shown, f"and {len(spans) - 3} more"] if len(spans) > len(shown) else shown)
 
 
-def _parts(motion: Any, times: np.ndarray) -> Iterator[Any]:
+def _parts(motion: Any, times: Any) -> Iterator[Any]:
     """Yield positions of the joints, and their derivatives to jerk, some instants at a time."""
     import xarray
 

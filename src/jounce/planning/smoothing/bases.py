@@ -42,7 +42,8 @@ def penalty_root(knots: _Knots, weights: Float[np.ndarray, " cell"]) -> Any:
     for _ in range(PENALIZED):
         count = derivative.shape[0]
         gaps = repeated[degree + 1 : degree + count] - repeated[1:count]
-        step: Any = sparse.diags_array([-degree / gaps, degree / gaps], offsets=[0, 1], shape=(count - 1, count))
+        build: Any = sparse.diags_array  # its types know one diagonal only
+        step = build([-degree / gaps, degree / gaps], offsets=[0, 1], shape=(count - 1, count))
         derivative, repeated, degree = step.tocsr() @ derivative, repeated[1:-1], degree - 1
     nodes, shares = np.polynomial.legendre.leggauss(degree + 1)  # exact for squares
     lengths = np.diff(knots)

@@ -72,11 +72,13 @@ def dwells(times: Float[np.ndarray, " sample"], values: Float[np.ndarray, " samp
     sigma : float
         Standard deviation of their noise.
     """
-    found = _of_equal(values)
+    found: list[Dwell] = []
     taken = np.zeros(len(values), bool)
-    for dwell in found:
-        taken[dwell.first : dwell.last + 1] = True
-    found += [dwell for dwell in _of_noise(times, values, sigma) if not taken[dwell.first : dwell.last + 1].any()]
+    for dwell in sorted([*_of_equal(values), *_of_noise(times, values, sigma)], key=lambda x: x.first - x.last):
+        own = slice(dwell.first, dwell.last + 1)
+        if not taken[own].any():  # the longest first
+            found.append(dwell)
+            taken[own] = True
     return _together(sorted(found, key=lambda dwell: dwell.first), values, sigma)
 
 
@@ -163,7 +165,7 @@ def _of_noise(times: np.ndarray, values: np.ndarray, sigma: float) -> list[Dwell
                 found.append(Dwell(begin, end, float(values[begin : end + 1].mean())))
             first = first + max(1, still // BLOCK)
         else:
-            first = first + 1 if last == first else first + max(1, (last - first) // 2)
+            first += max(1, (last - first) // 8)
     return found
 
 
