@@ -103,7 +103,8 @@ def without_margins(
             first = int(np.searchsorted(times, times[first] + before))
         if last < len(times) - 1:
             last = int(np.searchsorted(times, times[last] - after, side="right")) - 1
-        if last - first >= LEAST_LEFT and times[last] - times[first] >= min(before, after):
+        whole = first == 0 and last == len(times) - 1
+        if whole or (last - first >= LEAST_LEFT and times[last] - times[first] >= min(before, after)):
             found.append(dataclasses.replace(dwell, first=first, last=last))
     return found
 
