@@ -102,7 +102,7 @@ def test_designs_that_cannot_be_are_counted_and_left_out(crank):
 @pytest.mark.slow
 def test_the_command_tells_what_matters_and_draws_it(crank, tmp_path, capsys, spread):
     command = ["tolerance", str(crank), "--vary", f"L=normal:{SIGMA_L}", "--vary", VARY["K"].join(["K=", ""])]
-    command += ["--of", "tip_x,tip_d2,angle", "--samples", "64"]
+    command += ["--output", "tip_x,tip_d2,angle", "--samples", "64"]
     out, figure = tmp_path / "spread.csv", tmp_path / "bands.svg"
     assert main([*command, "--out", str(out), "--figure", str(figure)]) == 0
     text = capsys.readouterr().out

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
 
 from jounce.cli.options import (
     NO_TABLE,
@@ -32,7 +34,7 @@ def trace(
     length: float = 200.0,
     circuits: bool = False,
     figure: Path | None = None,
-    show: list[str] | None = None,
+    show: Annotated[list[str] | None, Parameter(name="--output", alias="--show")] = None,
     reading: MechanismReading = PLAIN_MECHANISM,
     output: TableOutput = NO_TABLE,
 ) -> int:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import Parameter
 
 from jounce.cli.mechanisms import outcome, simulated, solved
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, errors_about, spare_inputs, written
@@ -31,7 +33,7 @@ def plot(
     out: Path | None = None,
     output: list[str] | None = None,
     derivative: int | None = None,
-    instant: float | None = None,
+    instant: Annotated[float | None, Parameter(name="--time", alias="--instant")] = None,
     names: Names | None = None,
     azimuth: float = -60.0,
     elevation: float = 25.0,

@@ -46,7 +46,9 @@ OPTIONS = {
     "as_controller",
     "topic",
 }
-"""Arguments that are options of the same name."""
+"""Arguments that are options of the same name, but those of another."""
+
+RENAMED = {"of": "output"}
 
 
 class WritingError(Exception):
@@ -294,7 +296,7 @@ def errors_about(file: Path, robot: Path | None = None) -> Iterator[None]:
     except JounceError as error:
         option, _, rest = str(error.name or "").partition(" ")
         if option in OPTIONS:
-            error.name = f"--{option.replace('_', '-')} {rest}".rstrip()
+            error.name = f"--{RENAMED.get(option, option).replace('_', '-')} {rest}".rstrip()
             raise
         about_robot = robot is not None and isinstance(error, RobotError)
         raise error.located(path=robot if about_robot else file) from None

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from jounce.cli.options import (
     NO_TABLE,
@@ -21,7 +24,7 @@ def tolerance(
     /,
     *,
     vary: list[str],
-    of: str | None = None,
+    of: Annotated[str | None, Parameter(name="--output", alias="--of")] = None,
     order: int = 4,
     samples: int = 1024,
     no_linear: bool = False,
@@ -46,7 +49,7 @@ def tolerance(
     of
         Outputs, components and derivatives, as C_x,psi_d3 [all].
     order
-        Highest derivative, unless --of says.
+        Highest derivative, unless --output says.
     samples
         Designs that are solved; 0 for gradients alone.
     no_linear
@@ -59,7 +62,7 @@ def tolerance(
     Examples
     --------
       jounce tolerance examples/four_bar.yaml --vary BC=normal:0.1mm \
-        --vary CD=normal:0.1mm --of C_x,psi_d3 --figure bands.png
+        --vary CD=normal:0.1mm --output C_x,psi_d3 --figure bands.png
       jounce tolerance examples/four_bar.yaml --vary AB=uniform:0.2mm \
         --samples 0 --out spread.csv
     """
