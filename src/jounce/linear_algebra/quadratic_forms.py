@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float
 
 
-def polarised(
+def polarized(
     values: Callable[[Float[np.ndarray, "pair k"]], Float[np.ndarray, "form pair"]], count: int
 ) -> Float[np.ndarray, "form k k"]:
-    """Return the symmetric matrices of quadratic forms, by polarisation.
+    """Return the symmetric matrices of quadratic forms, by polarization.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Values without a unit that are likely meant in another one than SI: degrees for radians, millimeters for metres."""
+"""Values without a unit that are likely meant in another one than SI: degrees for radians, millimeters for meters."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.kinematics.assembly.constraint_series import FULFILLED, ReducedConstraints
-from jounce.linear_algebra.quadratic_forms import polarised
+from jounce.linear_algebra.quadratic_forms import polarized
 
 STARTS = 400  # directions from which tangents are sought
 MOST_CURVES = 16
@@ -106,7 +106,7 @@ def _quadratic_forms(constraints: ReducedConstraints) -> Float[np.ndarray, "s k 
         series[:, 0] = directions
         return constraints.along(series)[0][:, 1].T
 
-    return polarised(second_order, constraints.free.shape[1])
+    return polarized(second_order, constraints.free.shape[1])
 
 
 def _distinct(tangents: Sequence[Float[np.ndarray, " k"]]) -> list[Float[np.ndarray, " k"]]:

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from jounce.errors import SolveError
 from jounce.kinematics.curves.walker import Place, Walker, all_finite
 from jounce.kinematics.status import Status
-from jounce.linear_algebra.quadratic_forms import polarised
+from jounce.linear_algebra.quadratic_forms import polarized
 
 PASSAGE_ORDER = 8  # of the series that leads through: rounding spoils higher coefficients near a singular place
 NEAR = 0.02  # of the radius of the series: from so near its terms up to that order are good to rounding
@@ -151,7 +151,7 @@ def _tangents(
     """Return the directions of all branches that the second order allows, and whether it tells them apart."""
     rows = walker.left_null_space(place.jacobian, NEARLY_SINGULAR)
     # how combinations of rows that vanish see directions of the first order
-    forms = polarised(lambda along: rows.T @ walker.second_order(place, null @ along.T), null.shape[1])
+    forms = polarized(lambda along: rows.T @ walker.second_order(place, null @ along.T), null.shape[1])
     size = np.max(np.abs(forms), initial=0.0)
     known = null.T @ own
     if not size > VANISHING:

@@ -198,7 +198,7 @@ class RobotParts:
         """Return the moving bodies with their masses, at the pose that the coordinates give.
 
         Armature is inertia against the rate of a coordinate alone, of which the links know nothing: it is that of a
-        rotor on the ground, without mass, that turns by as many radians as the coordinate has radians or metres.
+        rotor on the ground, without mass, that turns by as many radians as the coordinate has radians or meters.
         """
         robot, tree = self.robot, self.robot.opened()
         masses: dict[str, list[Inertia]] = {name: [] for name in self.links}

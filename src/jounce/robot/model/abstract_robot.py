@@ -238,7 +238,7 @@ class AbstractRobot(Displayed, abc.ABC):
         >>> def torque(mass):
         ...     return jn.inverse_dynamics(arm.with_inertia("rod", mass=mass), [[0.0], [0.0], [0.0]])[0, 0]
         >>> with jax.enable_x64(True):
-        ...     round(float(jax.grad(torque)(1.0)), 9)  # N m for each kg at half a metre
+        ...     round(float(jax.grad(torque)(1.0)), 9)  # N m for each kg at half a meter
         4.905
         """
         check_name("link", link, self.links, RobotError, name="link")

@@ -72,7 +72,7 @@ def peak_slopes(motion: Motion, name: str, order: int) -> PeakSlopes:
     --------
     >>> import jounce as jn
     >>> found = peak_slopes(jn.solve(jn.load("examples/four_bar.yaml"), order=2), "psi", 1)
-    >>> round(found.peak, 4), round(found.slopes["BC"], 2)  # rad/s, and for each metre of the coupler
+    >>> round(found.peak, 4), round(found.slopes["BC"], 2)  # rad/s, and for each meter of the coupler
     (1.5179, -10.69)
     """
     scalars = scalar_outputs(motion)
