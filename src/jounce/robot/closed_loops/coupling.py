@@ -14,7 +14,7 @@ from jounce.errors import MechanismError, check_choice
 from jounce.jet import Jet, wrap
 from jounce.jet.turns import WHOLE_TURN
 from jounce.mechanism import AbstractOutput
-from jounce.rigid import SpatialPose
+from jounce.rigid import PlanarPose, SpatialPose
 from jounce.shapes import Numbers
 
 KINDS = ("turn-turn", "turn-slide", "slide-turn", "slide-slide")
@@ -148,6 +148,6 @@ class SlideOutput(AbstractOutput):
 
     body_count = 2
 
-    def evaluate(self, body_i: SpatialPose, body_j: SpatialPose) -> Jet:
+    def evaluate(self, body_i: PlanarPose | SpatialPose, body_j: PlanarPose | SpatialPose) -> Jet:
         """Return the distance."""
         return slide(body_i, body_j, self.point_i, self.point_j, self.vector_i)
