@@ -22,7 +22,7 @@ KINDS = {
 }
 TAKEN = {
     "run": ["mechanism"],
-    "simulate": ["mechanism"],
+    "simulate": ["mechanism", "robot"],
     "plot": ["mechanism"],
     "report": ["mechanism"],
     "inspect": ["mechanism", "robot"],

@@ -170,13 +170,11 @@ def test_the_speed_of_a_free_base_does_not_accelerate_a_frame(load):
         '<transmission name="t"><type>transmission_interface/SimpleTransmission</type><joint name="pin"/>'
         '<actuator name="m"><rotorInertia>0.01</rotorInertia><mechanicalReduction>10</mechanicalReduction></actuator>'
         "</transmission>",
-        '<gazebo reference="pin"><springStiffness>100</springStiffness><springReference>0.5</springReference></gazebo>',
-        '<gazebo reference="rod"><gravity>false</gravity></gazebo>',
-        '<loop_joint name="l" type="spherical"><link1 link="base"/><link2 link="rod"/></loop_joint>',
+        '<force_element name="f"/>',
     ],
 )
 def test_what_a_file_says_and_is_not_modeled_is_told(load, part):
-    """Files of Gazebo and Drake users: springs, gravity switches, rotors and loops beside a tree of links.
+    """Files of Gazebo and Drake users: rotors by nobody's rule and forces beside a tree of links.
 
     Whatever changes forces or motion and is left out is told, once for a file, and an error with `strict`.
     """
@@ -186,3 +184,19 @@ def test_what_a_file_says_and_is_not_modeled_is_told(load, part):
     assert len(told) == 1
     with pytest.raises(jn.errors.RobotFileError):
         load(*parts, strict=True)
+
+
+def test_springs_gravity_switches_and_loops_of_simulators_are_read(load):
+    """Files of Gazebo and Drake users: what they add to a tree of links is in the torques, and closes loops."""
+    rod = link("rod", "0.1 0 0"), joint("pin", "base", "rod", limit(-1, 1), axis="0 1 0")
+    spring = "<springStiffness>100</springStiffness><springReference>0.5</springReference>"
+    bare, sprung, light = (
+        np.asarray(jn.inverse_dynamics(load(*rod, part, strict=True), np.zeros((3, 1))))[0, 0]
+        for part in ("", *(f'<gazebo reference="{x}">{y}</gazebo>' for x, y in (("pin", spring), ("rod", OFF))))
+    )
+    np.testing.assert_allclose([sprung - bare, light], [-50, 0], atol=1e-12)
+    loop = '<loop_joint name="l" type="spherical"><link1 link="base"/><link2 link="rod"/></loop_joint>'
+    assert load(*rod, loop, strict=True).closures["l"].type == "connect"
+
+
+OFF = "<gravity>false</gravity>"

@@ -14,7 +14,7 @@ from jounce.io.files import DATA_FILES
 
 ADVICE = {
     "mechanism": "is a mechanism; run, simulate, modes, plot, report, view and inspect take mechanisms",
-    "robot": "is a robot; check, torques, inspect, modes and view take robots, and this makes it a mechanism: "
+    "robot": "is a robot; check, torques, simulate, inspect, modes and view take it, and this makes it a mechanism: "
     "jounce convert {path} {stem}.yaml --hold",
     "trajectory": "is a trajectory, which goes with its robot; jounce check ROBOT {path}, or jounce view ROBOT {path}",
     "cam": "is a plate cam; jounce cam {path} finds its profile",

@@ -17,13 +17,17 @@ from jounce.cli.options import (
     errors_about,
     spare_inputs,
 )
+from jounce.cli.robot_motion import RobotRun, simulate_robot_file
 from jounce.errors import JounceError, check_name
+from jounce.io.files import ROBOT_FILES
 from jounce.reporting.terminal import Bar, say, show_peaks
 
 if TYPE_CHECKING:
     from jounce.integrate import Obreshkov, Taylor
     from jounce.kinematics import Motion, Stretches
     from jounce.mechanism import Mechanism
+
+PLAIN_RUN = RobotRun()
 
 
 def run(
@@ -80,15 +84,16 @@ def simulate(
     longest_step: float = math.inf,
     no_refine: bool = False,
     reading: MechanismReading = PLAIN_MECHANISM,
+    robot: RobotRun = PLAIN_RUN,
     heading: Heading = PLAIN,
     output: TableOutput = NO_TABLE,
 ) -> int:
-    r"""Move a mechanism by its forces and print peak values, energy, drift.
+    r"""Move a mechanism or robot by its forces and print peak values, energy, drift.
 
     Parameters
     ----------
     file
-        Mechanism file with masses: .yaml, .yml, .toml or .json.
+        Mechanism file with masses, or robot file: .urdf, .xml or .sdf.
     order
         Highest derivative, 0 to 30; 3 is jerk, 4 jounce.
     method
@@ -108,14 +113,32 @@ def simulate(
       jounce simulate examples/double_pendulum.yaml --order 2 --out pendulum.nc
       jounce simulate examples/flyball_governor.yaml \
         --method obreshkov-6 --tolerance 1e-9
+      jounce simulate examples/robots/scara.urdf --until "2 s" \
+        --start "elbow=30 deg" --torque "shoulder=5*sin(t)"
     """
     output.check()
     chosen = method_of(method, step)
+    if file.suffix.lower() in ROBOT_FILES:
+        _refuse_options(file, reading)
+        control: Any = {"method": chosen, "tolerance": tolerance, "longest_step": longest_step}
+        return simulate_robot_file(file, order, robot, reading.allow, output, **control)
+    for name in robot.given():
+        option = f"--{name.replace('_', '-')}"
+        raise JounceError("is for robot files; a mechanism file has its own time and forces", name=option, path=file)
     units = heading.units
     mechanism = reading.mechanism(file)
     spare_inputs(output.out, overwrite=output.overwrite)
     motion = simulated(mechanism, file, order, method=chosen, tolerance=tolerance, longest_step=longest_step)
     return _finished("simulate", motion, file, output, refine=not no_refine, heading=units)
+
+
+def _refuse_options(file: Path, reading: MechanismReading) -> None:
+    """Refuse options of mechanism files for a robot file."""
+    given = {"--set": reading.set_, "--import": reading.import_, "--units": reading.units}
+    given["--redundant-reactions"] = reading.redundant_reactions
+    for name, value in given.items():
+        if value:
+            raise JounceError("is for mechanism files; results for robots are in SI units", name=name, path=file)
 
 
 def _is_long(mechanism: Mechanism, file: Path) -> bool:

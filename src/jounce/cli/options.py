@@ -117,6 +117,10 @@ class RobotReading:
         Between points what ros2_control's joint_trajectory_controller does.
     topic
         Of a bag, as /joint_states.
+    model
+        Which model of an SDF file that holds several.
+    closures
+        File with loops, springs and rotors that it does not have.
     """
 
     payload: list[str] | None = None
@@ -125,6 +129,8 @@ class RobotReading:
     allow: list[Path] | None = None
     as_controller: bool = False
     topic: str | None = None
+    model: str | None = None
+    closures: Path | None = None
 
     def robot(self, file: Path) -> Robot:
         """Return the robot of a file, with what it holds."""
@@ -132,7 +138,9 @@ class RobotReading:
         from jounce.io.robots.payloads import with_payloads
 
         with expecting(file, "robot"):
-            robot = load_robot(file, strict=self.strict, allow=allowed(self.allow))
+            robot = load_robot(
+                file, strict=self.strict, model=self.model, closures=self.closures, allow=allowed(self.allow)
+            )
         return with_payloads(robot, self.payload or ())
 
     def trajectory(self, file: Path, robot: Robot) -> JointTrajectory:

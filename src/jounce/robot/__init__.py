@@ -24,6 +24,7 @@ from jounce.robot.construct import (
     from_denavit_hartenberg as from_denavit_hartenberg,
     from_screws as from_screws,
 )
+from jounce.robot.model.couplings import BallDrive as BallDrive, Tendon as Tendon
 from jounce.robot.model.links_and_joints import (
     Closure as Closure,
     Joint as Joint,

@@ -27,6 +27,8 @@ class Robot(AbstractRobot):
     strict : bool, default True
         Refuse joints that move no mass. Otherwise they are kept (`massless_joints`): inverse dynamics gives them no
         torque, and a simulation in which they are free is refused, since nothing determines their acceleration.
+    couplings : sequence of Tendon or BallDrive, default none
+        What acts on several joints at once.
 
     Attributes
     ----------

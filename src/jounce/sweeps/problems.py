@@ -394,5 +394,4 @@ def _with(values: Mapping[str, float], robot: Robot) -> Robot:
             robot = robot.with_payload(owner, Inertia(value)) if value else robot
         else:
             joints[owner] = dataclasses.replace(joints[owner], **{kind: value})
-    parts = (list(robot.links.values()), list(joints.values()))
-    return Robot(robot.name, *parts, robot.gravity, list(robot.closures.values()), robot.strict)
+    return robot.changed(joints=list(joints.values()))

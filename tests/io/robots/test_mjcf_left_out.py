@@ -16,7 +16,8 @@ TENDON = '<tendon><fixed name="cord" {}><joint joint="knee" coef="1"/></fixed></
 DRIVE = TENDON.format("") + '<actuator><general {} armature="{}" damping="{}"/></actuator>'
 CARRYING = '<default><joint actuatorgravcomp="true"/></default>'
 CASES = {  # what the option, the lower body, its joint and the end of the file hold; what is said
-    "a spring": ("", "", 'stiffness="3"', "", r"springs of joints: knee \(line 5\); make"),
+    "a spring": ("", "", 'stiffness="3"', "", None),
+    "a spring away from zero": ("", "", 'stiffness="3" springref="20" ref="5"', "", None),
     "a progressive spring": (
         "",
         "",
@@ -24,17 +25,24 @@ CASES = {  # what the option, the lower body, its joint and the end of the file 
         "",
         r"springs of joints: knee \(line 5\); make",
     ),
-    "a tuned spring": ("", "", 'springdamper="0.1 1"', "", r"springs of joints: knee \(line 5\); make"),
-    "carried weight": ("", 'gravcomp="1"', "", "", r"gravity compensation of bodies: shank \(line 4\); make"),
+    "a tuned spring": ("", "", 'springdamper="0.1 1"', "", None),
+    "carried weight": ("", 'gravcomp="1"', "", "", None),
+    "weight carried in part": ("", 'gravcomp="0.3"', "", "", None),
     "water": ('density="1000"', "", "", "", r"forces of the fluid around: density 1000 kg/m\^3 \(line 2\); make"),
     "air": (
         'density="1.2" viscosity="2e-05" wind="1 0 0"',
         *("", "", ""),
         r"density 1.2 kg/m\^3 and viscosity 2e-05 Pa s \(line 2\); make",
     ),
-    "a cord": ("", "", "", TENDON.format('stiffness="4"'), r"springs of tendons: cord \(line 7\); make"),
-    "a damped cord": ("", "", "", TENDON.format('damping="4"'), r"damping of tendons: cord \(line 7\); make"),
-    "a cord that rubs": ("", "", "", TENDON.format('frictionloss="4"'), r"friction of tendons: cord \(line 7\); make"),
+    "a cord": ("", "", "", TENDON.format('stiffness="4"'), None),
+    "a cord of a length": ("", "", "", TENDON.format('stiffness="4" springlength="0.3"'), None),
+    "a cord with slack": (
+        *("", "", ""),
+        TENDON.format('stiffness="4" springlength="0.1 0.3"'),
+        r"springs of tendons: cord \(line 7\); make",
+    ),
+    "a damped cord": ("", "", "", TENDON.format('damping="4"'), None),
+    "a cord that rubs": ("", "", "", TENDON.format('frictionloss="4"'), None),
     "a heavy cord": ("", "", "", TENDON.format('armature="4"'), r"armature of tendons: cord \(line 7\); make"),
     "a winch": (
         *("", "", ""),
@@ -114,10 +122,10 @@ def test_it_is_told_of_where_mujoco_computes_other_forces(tmp_path, case):
 @pytest.mark.parametrize(
     "case, says",
     {
-        "a spring": r"leg\.xml, line 5, joints\.knee\.stiffness: .* without springs of joints, got 3\.0; set it",
-        "carried weight": r"line 4, links\.shank\.gravcomp: .* without gravity compensation of bodies, got 1\.0;",
+        "a progressive spring": r"leg\.xml, line 5, joints\.knee\.stiffness: .* without springs of joints, got \[",
+        "a weight that one drive carries": r"line 4, links\.shank\.gravcomp: .* of bodies, got 1\.0;",
         "water": r"line 2, option\.density: .* without forces of the fluid around, got 1000\.0;",
-        "a cord": r"line 7, tendons\.cord\.stiffness: .* without springs of tendons, got 4\.0;",
+        "a heavy cord": r"line 7, tendons\.cord\.armature: .* without armature of tendons, got 4\.0;",
         "a winch": r"line 7, actuators\.winch\.armature: .* without armature of actuators .*, got 2\.0;",
     }.items(),
 )
@@ -134,7 +142,9 @@ def test_a_spring_of_a_joint_that_an_equality_holds_moves_nothing(tmp_path):
 
 def test_one_warning_names_the_first_six_of_each_kind_and_the_faults(tmp_path):
     joints = "".join(
-        f'<body name="b{k}" gravcomp="{k % 2}"><joint name="j{k}" stiffness="2"/><geom size="0.1"/>' for k in range(8)
+        f'<body name="b{k}" gravcomp="{k % 2}"><joint name="j{k}" stiffness="0 2" '
+        f'actuatorgravcomp="{"false" if k else "true"}"/><geom size="0.1"/>'
+        for k in range(8)
     )
     rotor = '<body name="rotor"><inertial pos="0 0 0" mass="0" diaginertia="0.2 0.3 0.4"/></body>'
     path = tmp_path / "chain.xml"

@@ -40,7 +40,6 @@ def test_rotors_are_armature_at_the_joint(tmp_path):
 @pytest.mark.parametrize(
     "settings, says",
     [
-        ({"more": "<drake:ball_constraint/>"}, r"<drake:ball_constraint> between links: .* \(line 4\)"),
         ({"more": "<drake:linear_bushing_rpy/>"}, r"<drake:linear_bushing_rpy> between links: .* \(line 4\)"),
         (
             {"second": "<drake:rotor_inertia>2</drake:rotor_inertia>", "kind": "ball"},

@@ -419,6 +419,9 @@ def test_limits_that_say_little_are_read(tmp_path, limit, expected, told):
     assert (limits.lower, limits.upper, limits.velocity) == expected
 
 
-def test_a_range_with_both_ends_the_wrong_way_round_is_refused(tmp_path):
+def test_a_range_with_both_ends_the_wrong_way_round_is_none_and_told(tmp_path):
+    path = small(tmp_path, 'type="revolute"><limit lower="0.3" upper="0" effort="9" velocity="2"/>')
     with pytest.raises(jn.errors.RobotFileError, match="lower limit must not exceed"):
-        load_robot(small(tmp_path, 'type="revolute"><limit lower="0.3" upper="0" effort="9" velocity="2"/>'))
+        load_robot(path, strict=True)
+    with pytest.warns(jn.errors.RobotWarning, match="lower limits exceed upper ones, and are taken for no range: j"):
+        assert load_robot(path).limits["j"].lower is None

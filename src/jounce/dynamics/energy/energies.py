@@ -27,8 +27,10 @@ from jounce.rigid import PlanarPose
 from jounce.rigid.frames import Frames
 from jounce.rigid.pose import Pose
 from jounce.robot.model.arguments import checked_coordinates
+from jounce.robot.model.couplings import BallDrive
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.batches import Batched
+from jounce.robot.recursions.drive_forces import ball_spin
 from jounce.robot.recursions.kinematics import body_frames
 from jounce.robot.recursions.tree_scan import Series
 from jounce.robot.robot import Robot
@@ -232,8 +234,11 @@ def energies_of(
         )
         return *parts, bodies, order
     series = checked_coordinates(system, q, order + 1)
-    leading = tuple(k for k, joint in enumerate(system.moving_joints) if joint.mimic is None) if drives else ()
-    parts = _of_robot(system, (series,), (), (order, function, leading))
+    names = [joint.name for joint in system.moving_joints]
+    leading = tuple(names.index(name) for name in system.joint_names) if drives else ()
+    balls = [x for x in system.couplings.values() if isinstance(x, BallDrive)] if drives else []
+    turned = tuple(names.index(ball.joints[-1]) for ball in balls)
+    parts = _of_robot(system, (series,), (), (order, function, leading, turned))
     return *parts, system.moving_links, order
 
 
@@ -262,13 +267,24 @@ def mass_arrays(tree: Tree) -> tuple[Any, Any, Any]:
 
 @Batched
 def _of_robot(
-    tree: Tree, arrays: tuple[Series], _: Any, order: int, function: EnergyFunction, leading: tuple[int, ...]
+    tree: Tree,
+    arrays: tuple[Series],
+    _: Any,
+    order: int,
+    function: EnergyFunction,
+    leading: tuple[int, ...],
+    turned: tuple[int, ...],
 ) -> tuple[Float[Numbers, "levels body batch"], ...]:
     frames = body_frames(tree, arrays[0]).without_base()
     *parts, last = (stacked(part) for part in function(frames, *mass_arrays(tree), order))
     if leading:  # the bodies that coordinates move, in their order
         rate = differentiated(Jet(tuple(arrays[0])), order + 1)
         last = last.at[:, np.array(leading)].add(stacked(rate * rate * (0.5 * jnp.asarray(tree.armature)[:, None])))
+    if turned:  # the links of balls
+        coordinates = Jet(tuple(arrays[0]))
+        spin = differentiated(ball_spin(tree, coordinates, coordinates.differentiate()), order)
+        rotors = dot(spin, spin) * (0.5 * jnp.asarray(tree.balls.armature)[:, None])
+        last = last.at[:, np.array(turned)].add(stacked(rotors.truncate(len(last) - 1)))
     return *parts, last
 
 

@@ -104,8 +104,8 @@ def through_state(
 def _frictionless(robot: Robot) -> Robot:
     """Return a robot without Coulomb friction."""
     joints = [dataclasses.replace(joint, friction=0.0) for joint in robot.joints.values()]
-    parts = (list(robot.links.values()), joints, robot.gravity, list(robot.closures.values()), robot.strict)
-    return Robot(robot.name, *parts)
+    couplings = [dataclasses.replace(coupling, friction=0.0) for coupling in robot.couplings.values()]
+    return robot.changed(joints=joints, couplings=couplings)
 
 
 def _levels(robot: Robot, state: GivenState) -> Float[np.ndarray, "3 joint"]:

@@ -20,6 +20,7 @@ from jounce.mechanism import Mechanism, TimeGrid
 from jounce.mechanism.mechanism import GROUND, names_column
 from jounce.robot import Robot
 from jounce.robot.closed_loops.closed_loop import DRIVE
+from jounce.robot.model.couplings import Tendon
 from jounce.units.values import parse_value
 
 
@@ -167,8 +168,16 @@ def with_file_names(robot: Robot) -> tuple[Robot, dict[str, str]]:
             for given in robot.closures.values()
         ],
         robot.strict,
+        [_with_joints(given, file_names) for given in robot.couplings.values()],
     )
     return made, changed
+
+
+def _with_joints(coupling: Any, names: Mapping[str, str]) -> Any:
+    """Return a tendon or the drive of a ball with other names of joints."""
+    if isinstance(coupling, Tendon):
+        return dataclasses.replace(coupling, weights={names[name]: x for name, x in coupling.weights.items()})
+    return dataclasses.replace(coupling, joints=[names[name] for name in coupling.joints])
 
 
 def _file_names(names: Iterable[str]) -> dict[str, str]:

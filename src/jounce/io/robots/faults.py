@@ -9,6 +9,7 @@ MASSLESS = "these links move but have no mass"
 IDLE = "these links move and neither have nor carry mass, so that a simulation has no answer unless they are driven"
 FOLLOWS_NONE = "these joints follow one that the file does not have, and are taken as free"
 BELOW_ZERO = "limits of velocity or effort are below zero, as SDF writes that there is none, and are taken for none"
+REVERSED = "lower limits exceed upper ones, and are taken for no range"
 ONE_END = "these joints have one end of a range, beyond the zero that stands for the other, which is taken for none"
 WITHOUT_INERTIAL = "these links have no inertia of their own, which SDF takes for 1 kg with moments of 1 kg m^2"
 PARTLY_INERTIAL = "these links lack their mass or moments of inertia, which SDF takes for 1 kg and 1 kg m^2"
@@ -17,12 +18,12 @@ HEADINGS = {
     TRIANGLE: "a principal moment of inertia exceeds the sum of the others",
     WITHOUT_MASS: "moments of inertia have no mass beside them",
 }
+UNKNOWN = "elements that their formats do not have"
+NOT_XML = "text that is not XML, read as other readers do"
 JOINT_SPRINGS = "springs of joints"
-BALLS = "<drake:ball_constraint> between links"
 BUSHINGS = "<drake:linear_bushing_rpy> between links"
 PLUGINS = "joints that follow others by a plugin"
 ROTORS = "inertia of the rotors of drives"
-WEIGHTLESS = "gravity that is switched off for links"
 MASS_OF_SHAPES = "masses that follow from shapes, or from a total mass"
 LEAVE = "motions and forces are computed without {}; take it out of the file, or read it without strict"
 SHOWN = 200  # names for each fault

@@ -10,6 +10,7 @@ from pathlib import Path
 from jounce.errors import RobotFileError
 from jounce.io.files import ROBOT_FILES
 from jounce.io.files.reading import check_allowed
+from jounce.io.robots.closure_files import with_closures
 from jounce.io.robots.faults import Faults
 from jounce.io.robots.mjcf import read_mjcf
 from jounce.io.robots.sdf import read_sdf
@@ -29,6 +30,8 @@ def load_robot(
     floating_base: bool | str = False,
     massless: bool = False,
     strict: bool = False,
+    model: str | None = None,
+    closures: str | PathLike[str] | None = None,
     allow: Iterable[str | PathLike[str]] = (),
 ) -> Robot:
     """Read a robot from a URDF, MJCF or SDF file.
@@ -48,8 +51,12 @@ def load_robot(
         URDF links that move, have no mass and carry some are meant so: there is no warning of them.
     strict : bool, default False
         Make an error of what is warned of.
+    model : str, optional
+        Name of the model of an SDF file that holds several; needed unless only one of them moves.
+    closures
+        File beside it with loops, springs and rotors that the robot file does not have; see `with_closures`.
     allow
-        Folders besides that of the file that included files and meshes of MJCF may be below.
+        Folders besides that of the file that included files, models and meshes may be below.
 
     Returns
     -------
@@ -67,8 +74,8 @@ def load_robot(
     RobotWarning
         Links are as those of no real robot: negative moments of inertia, one that exceeds the sum of the other two by
         more than rounding, moments without mass, links that move and have no mass, links of SDF without a mass and all
-        moments. All is computed with the numbers of the file. Or the file has what is left out: springs, compensated
-        gravity, fluids, what tendons add, what simulators add to URDF and SDF, such as loops and links without weight;
+        moments. All is computed with the numbers of the file. Or the file has what is left out: springs that are
+        not linear, fluids, what tendons between points add, elements that their format does not have;
         or ranges of joints that leave the joint that they follow no room. One warning names links, joints and parts.
 
     Examples
@@ -90,7 +97,10 @@ def load_robot(
     if suffix not in ROBOT_FILES and not Path(name).is_dir():
         message = f"the kind of a robot file is given by its extension; valid: {', '.join(ROBOT_FILES)}"
         raise RobotFileError(message, path=name)
-    root, faults = read_markup(name), Faults(name, strict)
+    faults = Faults(name, strict)
+    root = read_markup(name, faults)
+    if model is not None and root.tag != "sdf":
+        raise root.error("only an SDF file holds models to choose from; leave the name of one out", value=model)
     if root.tag == "robot":
         _check_expanded(root)
         robot = read_urdf(root, faults, massless)
@@ -99,12 +109,14 @@ def load_robot(
             raise RobotFileError("MuJoCo reads MJCF only from files whose names end in .xml; rename it", path=name)
         robot = read_mjcf(root, faults, check_allowed(allow))
     elif root.tag == "sdf":
-        robot = read_sdf(root, faults)
+        robot = read_sdf(root, faults, model, check_allowed(allow))
     else:
         message = "is no robot file; the root element of a URDF is <robot>, of an MJCF file <mujoco>, of an SDF <sdf>"
         raise root.error(message, value=f"<{root.tag}>")
     if (warning := faults.warning()) is not None:
         warnings.warn(warning, stacklevel=2)
+    if closures is not None:
+        robot = with_closures(robot, closures)
     if floating_base is False:
         return robot
     return _released(robot, "ZYX" if floating_base is True else floating_base, name)
@@ -135,7 +147,7 @@ def _released(robot: Robot, sequence: str, path: str) -> Robot:
     if len(attached) == 1 and not attached[0].moving and frame:
         links = [link for name, link in robot.links.items() if name != robot.base]
         joints = [joint for joint in joints if joint is not attached[0]]
-        robot = Robot(robot.name, links, joints, robot.gravity, list(robot.closures.values()), robot.strict)
+        robot = robot.changed(links=links, joints=joints)
     if "world" in robot.links:
         message = (
             "the robot cannot have a floating base: a link named world carries it; rename that link, or set the robot "

@@ -15,11 +15,13 @@ from jaxtyping import Float
 from jounce.errors import JounceError, RobotError, RobotFileError
 from jounce.io.robots.faults import Faults, left_out
 from jounce.io.robots.followers import with_room
+from jounce.io.robots.mjcf_drives import Drives
 from jounce.io.robots.mjcf_files import check_assets, check_copies, included, line_of, quiet_mujoco
 from jounce.io.robots.mjcf_left_out import LeftOut, left_out_of_model, left_out_of_spec
-from jounce.io.robots.mjcf_ties import NO_CLOSURE, Ties, tied_tendons
+from jounce.io.robots.mjcf_ties import NO_CLOSURE, Ties, linear_tendons, tied_tendons
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
+from jounce.robot.model.couplings import Coupling
 from jounce.robot.model.floating_base import floating_joints
 from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link, Mimic, leaders
 from jounce.robot.model.tree import quaternion_matrix, turn_about
@@ -45,14 +47,15 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
     The base is the link ``world``. Hinges and slides are taken with their anchors and reference positions: a coordinate
     is MuJoCo's ``qpos``. A ball becomes three turns z, y, x about moving axes, zero in the pose of the file; a free
     joint three slides along the axes of the world, whose coordinates are the position of the body, and three such
-    turns, zero where its axes are those of the world. Several joints on one body have massless links between them.
-    Bodies and joints without a name are called ``body_1``, ``joint_0`` and so on, by their number in MuJoCo. Armature,
-    damping and friction of joints are kept, with the armature and damping of actuators on them; ranges become limits,
-    and symmetric ranges of force limits of effort. A joint tied to another by a linear equality, of joints or of
-    tendons along joints, follows it; active equalities of type connect and weld become closures, named closure_0 and so
-    on where they have no name. Contacts and all else that is no body, joint or actuator of a joint are left out; there
-    is a warning of springs, gravity compensation, fluids, and what tendons and the actuators on them add. What a flag
-    switches off is zero.
+    turns, zero where its axes are those of the world; what drives them acts on the angular velocity (`BallDrive`).
+    Several joints on one body have massless links between them. Bodies and joints without a name are called
+    ``body_1``, ``joint_0`` and so on, by their number in MuJoCo. Armature, damping, friction and linear springs of
+    joints are read, with the armature and damping of actuators on them, tendons along joints (`Tendon`), and the share
+    of gravity that is compensated for bodies; ranges become limits, and symmetric ranges of force limits of effort. A
+    joint tied to another by a linear equality, of joints or of tendons along joints, follows it; active equalities of
+    type connect and weld become closures, named closure_0 and so on where they have no name. Contacts and all else that
+    is no body, joint or actuator of a joint are left out; there is a warning of springs that are not linear, fluids,
+    and what other tendons and the actuators on them add. What a flag switches off is zero.
 
     Parameters
     ----------
@@ -82,7 +85,7 @@ def read_mjcf(root: Element, faults: Faults, allow: Iterable[str | PathLike[str]
             spec = mujoco.MjSpec.from_file(root.path)
             scaled = spec.compiler.fusestatic and getattr(spec.compiler, "settotalmass", 0.0) > 0  # which is deprecated
             unread = left_out_of_spec(spec, mujoco)
-            _strip(spec, mujoco, tied_tendons(spec, mujoco, root.path))
+            _strip(spec, mujoco, tied_tendons(spec, mujoco, root.path) | linear_tendons(spec, mujoco))
             check_assets(spec, parts, allow)
             model = spec.compile()
     except (ValueError, RuntimeError, OSError) as error:
@@ -133,6 +136,7 @@ def _strip(spec: Any, mujoco: Any, tied: Container[str]) -> None:
     spec.compiler.fusestatic = False  # or bodies without joints would lose their frames
     joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # which differ for balls and free joints
     unused = [actuator for actuator in spec.actuators if actuator.trntype not in joints]
+    unused += list(spec.lights)
     unused += [tendon for tendon in spec.tendons if tendon.name not in tied]
     for parts in (spec.sensors, spec.pairs, spec.excludes, spec.keys, spec.tuples, spec.skins):
         unused += list(parts)
@@ -180,7 +184,8 @@ class _Reader:
         self.ties = Ties(model, mujoco, self.joint_names)
         self.mimics: dict[str, Mimic] = {}
         self.closures: list[Closure] = []
-        self.efforts = _efforts(model, mujoco)
+        self.drives = Drives(model, mujoco, self.joint_names)
+        self.couplings: list[Coupling] = []
 
     def error(self, message: str, name: str, **value: Any) -> RobotFileError:
         """Return an error about a joint or link, with its line."""
@@ -198,10 +203,11 @@ class _Reader:
         try:
             for k in range(model.nbody):
                 self._body(k)
-            gravity = (0.0, 0.0, 0.0) if self._switched_off("GRAVITY") else model.opt.gravity
+            gravity = model.opt.gravity if self.drives.works("GRAVITY") else (0.0, 0.0, 0.0)
+            couplings = [*self.couplings, *self.drives.tendons(self.ties.fixed)]
             name = self.root.attributes.get("model") or "robot"
             joints = with_room(self.joints, self.faults, self._located, self.ties.fixed)
-            robot = Robot(name, self.links, joints, gravity, self.closures)
+            robot = Robot(name, self.links, joints, gravity, self.closures, couplings=couplings)
             return robot.locked(self.ties.fixed) if self.ties.fixed else robot
         except RobotFileError:
             raise
@@ -270,7 +276,7 @@ class _Reader:
             except JounceError as error:
                 raise self.error(error.message, f"links.{name}.{error.name}", value=error.value) from None
             self.faults.check(principal, name, self.lines.get(f"links.{name}"))
-        self.links.append(Link(name, inertia))
+        self.links.append(Link(name, inertia, 1.0 - self.drives.compensated(k)))
         if k == 0:
             return
         parent = self.bodies[model.body_parentid[k]]
@@ -301,52 +307,32 @@ class _Reader:
 
     def _single(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
         """Add a hinge or a slide; the pose in the file is that at its reference coordinate."""
-        model, dof, name = self.model, self.model.jnt_dofadr[j], self.joint_names[j]
+        model, name = self.model, self.joint_names[j]
         turning, axis, reference = model.jnt_type[j] == self.kind["hinge"], model.jnt_axis[j], self.ties.reference(j)
         if turning and reference:
             rotation = rotation @ turn_about(axis, -reference)
         elif reference:
             position = position - rotation @ axis * reference
-        if model.dof_dampingpoly[dof].any():
-            raise self.error("damping must be one number, proportional to the velocity", f"joints.{name}.damping")
+        drives, several = self.drives.of_joint(j)
+        if several:
+            raise self.error(f"{several} must be one number, proportional to the velocity", f"joints.{name}.damping")
         limited = bool(model.jnt_limited[j])
         lower, upper = (float(value) for value in model.jnt_range[j]) if limited else (None, None)
         kind = "prismatic" if not turning else "revolute" if limited else "continuous"
-        armature, damping = self._of_drives(j)
-        limits = Limits(lower=lower, upper=upper, effort=self.efforts.get(j))
-        friction = 0.0 if self._switched_off("FRICTIONLOSS") else float(model.dof_frictionloss[dof])
-        drive = {"armature": armature, "damping": damping, "friction": friction}
+        limits = Limits(lower=lower, upper=upper, effort=self.drives.efforts.get(j))
         self.joints.append(
-            Joint(name, parent, child, kind, position, rotation, axis, limits, self.mimics.get(name), **drive)
+            Joint(name, parent, child, kind, position, rotation, axis, limits, self.mimics.get(name), **drives)
         )
-
-    def _of_drives(self, j: int) -> tuple[float, float]:
-        """Return armature and damping of a joint, with those of its actuators times the square of the gear."""
-        model = self.model
-        armature, damping = (float(values[model.jnt_dofadr[j]]) for values in (model.dof_armature, model.dof_damping))
-        for k in np.flatnonzero(model.actuator_trnid[:, 0] == j):
-            gear = float(model.actuator_gear[k, 0]) ** 2
-            if np.any(model.actuator_dampingpoly[k]):
-                raise self.error("damping of an actuator must be one number", f"joints.{self.joint_names[j]}.damping")
-            armature += gear * float(model.actuator_armature[k])
-            damping += gear * float(np.ravel(model.actuator_damping[k])[0])
-        return armature, 0.0 if self._switched_off("DAMPER") else damping
-
-    def _switched_off(self, part: str) -> bool:
-        """Whether a flag of the file takes a part of the dynamics away."""
-        return bool(self.model.opt.disableflags & int(getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{part}")))
 
     def _expand(self, j: int, parent: str, child: str, position: _Vector, rotation: _Matrix) -> None:
         """Add the slides and turns that a free joint or a ball stands for."""
-        model, name, dof = self.model, self.joint_names[j], self.model.jnt_dofadr[j]
+        model, name = self.model, self.joint_names[j]
         _, joints = floating_joints(child, prefix=name)
         if model.jnt_type[j] == self.kind["ball"]:
             joints = joints[3:]
-        for field in ("armature", "damping", "frictionloss"):
-            values = getattr(model, f"dof_{field}")[dof : dof + len(joints)]
-            if values.any():
-                message = f"{field} of a ball or free joint has no counterpart in slides and turns; set it to zero"
-                raise self.error(message, f"joints.{name}.{field}", value=values.tolist())
+        drives = self.drives.of_several(j)
+        if model.dof_dampingpoly[model.jnt_dofadr[j]].any():
+            raise self.error("damping must be one number, proportional to the velocity", f"joints.{name}.damping")
         for k in np.flatnonzero(model.actuator_trnid[:, 0] == j):
             for field in ("armature", "damping", "dampingpoly"):
                 values = getattr(model, f"actuator_{field}")[k]
@@ -360,8 +346,10 @@ class _Reader:
             if end != child:
                 self.links.append(Link(end))
             own = {"name": self._unused(made.name), "parent": parent, "child": end}
-            self.joints.append(dataclasses.replace(made, **own, **pose))
+            along = {} if made.turning else drives
+            self.joints.append(dataclasses.replace(made, **own, **pose, **along))
             parent, pose = end, {}
+        self.couplings += self.drives.ball(name, [joint.name for joint in self.joints[-3:]], drives)
 
 
 def names_of_bodies(model: Any) -> list[str]:
@@ -379,24 +367,3 @@ def _names(given: list[str], kind: str) -> list[str]:
                 name += "_"
             names[k] = name
     return names
-
-
-def _efforts(model: Any, mujoco: Any) -> dict[int, float]:
-    """Return the largest force of each joint where its own range, or that of its only actuator, is symmetric."""
-    efforts: dict[int, float] = {}
-    for j in range(model.njnt):
-        actuators = np.flatnonzero(model.actuator_trnid[:, 0] == j)
-        ranges = [model.jnt_actfrcrange[j]] if model.jnt_actfrclimited[j] else []
-        if len(actuators) == 1:
-            k = actuators[0]
-            gear = float(model.actuator_gear[k, 0])
-            types = [int(getattr(model, f"actuator_{name}type")[k]) for name in ("gain", "bias", "dyn")]
-            simple = (mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtDyn.mjDYN_NONE)
-            if model.actuator_forcelimited[k]:
-                ranges.append(model.actuator_forcerange[k] * gear)
-            elif types == [int(kind) for kind in simple] and model.actuator_ctrllimited[k]:
-                ranges.append(model.actuator_ctrlrange[k] * model.actuator_gainprm[k, 0] * gear)
-        symmetric = [float(abs(high)) for low, high in ranges if low == -high and high != 0]
-        if symmetric:
-            efforts[j] = min(symmetric)
-    return efforts

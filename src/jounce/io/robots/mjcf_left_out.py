@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jounce.io.robots.faults import JOINT_SPRINGS
+from jounce.io.robots.mjcf_drives import single_spring
 from jounce.io.robots.mjcf_files import line_of
 
 COMPENSATION = "gravity compensation of bodies"
@@ -45,11 +46,21 @@ def left_out_of_spec(spec: Any, mujoco: Any) -> list[LeftOut]:
     for headings, kind, parts in kinds:
         for k, part in parts:
             name = part.name or f"{kind}_{k}"
+            read = _read_of(part, mujoco) if kind == "tendon" else ()
             for key, heading in headings.items():
                 value = np.ravel(getattr(part, key))
-                if value.any() and works(key):
+                if value.any() and works(key) and (key not in read or value[1:].any()):
                     left.append(LeftOut(heading, name, line_of(part.info), f"{kind}s.{name}.{key}", _plain(value)))
     return left
+
+
+def _read_of(tendon: Any, mujoco: Any) -> tuple[str, ...]:
+    """Return the attributes of a tendon that are read, as far as they are one number."""
+    if not len(tendon.path) or any(part.type != mujoco.mjtWrap.mjWRAP_JOINT for part in tendon.path):
+        return ()
+    lengths = np.ravel(tendon.springlength)
+    slack = len(set(lengths.tolist())) > 1 and lengths[0] != -1 and lengths[1] != -1
+    return ("damping", "frictionloss") if slack else ("stiffness", "damping", "frictionloss")
 
 
 def left_out_of_model(
@@ -70,11 +81,12 @@ def left_out_of_model(
     free = [name not in fixed for name in joints]
     for j, name in enumerate(joints):
         stiffness = np.array([model.jnt_stiffness[j], *model.jnt_stiffnesspoly[j]])
-        if stiffness.any() and works("stiffness") and free[j]:
+        if stiffness.any() and works("stiffness") and free[j] and not single_spring(model, j):
             yield LeftOut(JOINT_SPRINGS, name, None, f"joints.{name}.stiffness", _plain(stiffness))
     passive = works("stiffness") or works("damping")  # MuJoCo leaves out all such forces where it leaves out both
     falls = model.opt.gravity.any() and works("gravity")
-    for k in np.flatnonzero((model.body_gravcomp != 0) & (model.body_mass > 0)).tolist() if passive and falls else ():
+    told = passive and falls and model.jnt_actgravcomp.any()  # else bodies feel less of gravity
+    for k in np.flatnonzero((model.body_gravcomp != 0) & (model.body_mass > 0)).tolist() if told else ():
         if any(free[j] and not model.jnt_actgravcomp[j] for j in _moved_by(model, k)):
             yield LeftOut(COMPENSATION, bodies[k], None, f"links.{bodies[k]}.gravcomp", float(model.body_gravcomp[k]))
     fluid = {key: float(getattr(model.opt, key)) for key in FLUID_UNITS if getattr(model.opt, key)}

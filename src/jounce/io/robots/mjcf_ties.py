@@ -33,6 +33,14 @@ def tied_tendons(spec: Any, mujoco: Any, path: str) -> set[str]:
     return tied
 
 
+def linear_tendons(spec: Any, mujoco: Any) -> set[str]:
+    """Return the names of the tendons along joints, whose lengths are weighted sums of coordinates; all have names."""
+    for k, tendon in enumerate(spec.tendons):
+        tendon.name = tendon.name or f"tendon_{k}"
+    along = mujoco.mjtWrap.mjWRAP_JOINT
+    return {t.name for t in spec.tendons if len(t.path) and all(part.type == along for part in t.path)}
+
+
 class Ties:
     """What joints have to do with one another: those that are held, and those that follow another.
 

@@ -4,30 +4,31 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from os import PathLike
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import RobotError
+from jounce.io.robots.closure_files import CLOSED_BY
 from jounce.io.robots.faults import Faults
 from jounce.io.robots.followers import with_room
 from jounce.io.robots.named_elements import NamedElements
 from jounce.io.robots.sdf_joints import AXIS_TAGS, SdfJoint, read_joint
 from jounce.io.robots.sdf_left_out import note_left_out
 from jounce.io.robots.sdf_links import gravity_of, read_inertia
+from jounce.io.robots.sdf_models import chosen_model, named
 from jounce.io.robots.sdf_poses import (
     HERE,
     WORLD,
     FramePose,
     Frames,
-    check_known,
     flag_of,
     needed,
     number_of,
     only,
-    pose_of,
     text_of,
 )
 from jounce.io.robots.xml_elements import Element
@@ -35,21 +36,22 @@ from jounce.robot.model.floating_base import floating_joints
 from jounce.robot.model.links_and_joints import Closure, Joint, Link, Mimic, leaders
 from jounce.robot.robot import Robot
 
-CLOSED_BY = {"fixed": "weld", "revolute": "pin", "continuous": "pin", "prismatic": "slider", "ball": "connect"}
 TREE_FIRST = ("fixed", "revolute", "continuous", "prismatic", "universal", "revolute2", "ball")
+OF_AXIS = ("armature", "damping", "friction", "stiffness", "spring_reference")
 AXIS_TOLERANCE = 1e-5  # files give directions with six digits
-MODEL_PARTS = ("static", "self_collide", "allow_auto_disable", "enable_wind", "pose", "link", "joint", "frame")
-MODEL_PARTS += ("plugin", "gripper", "include", "model")
-ROOT = ("model", "world")
 DRAKE_MIMIC = "drake:mimic"
+BALL = "drake:ball_constraint"
 
 
-def read_sdf(root: Element, faults: Faults) -> Robot:
+def read_sdf(
+    root: Element, faults: Faults, model: str | None = None, allow: Iterable[str | PathLike[str]] = ()
+) -> Robot:
     """Return the robot that an SDF file describes; its loops become closures.
 
-    The file holds one model, alone or in a world. The base is the link ``world`` if a joint holds the model there or it
-    is static, else the model's canonical link. Gravity is that of the world in the file, or else 9.81 m/s^2 along its
-    -z; there is none if no link feels it.
+    Of several models the one is taken that is asked for, or that alone moves; models which it nests or includes are
+    part of it, their links and joints under names such as ``arm::elbow``. The base is the link ``world`` if a joint
+    holds the model there or it is static, else the model's canonical link. Gravity is that of the world in the file, or
+    else 9.81 m/s^2 along its -z; links may be out of it.
     Joints of one axis come into the tree before those of two, and balls last, each kind in the order of the file; what
     closes a loop then is a closure: a revolute joint a pin, a prismatic one a slider, a ball a point, a fixed one a
     weld. A joint of the tree whose child is nearer the base is taken the other way round, about the opposite axis, so
@@ -58,7 +60,7 @@ def read_sdf(root: Element, faults: Faults) -> Robot:
     there. A gearbox makes the second of its two joints follow the first; so does ``drake:mimic``, and rotors that Drake
     reads are armature. A link without ``<inertial>`` weighs 1 kg, as
     SDF says; there is a warning of it. Sensors and plugins are left out, and limits of a joint that closes a loop; of
-    springs, of damping and friction there, and of decaying velocities, which are left out too, there is a warning. So
+    springs, damping and friction there, and of decaying velocities, which are left out too, there is a warning. So
     there is of a static model whose joints move: a simulator holds it still, and here its joints have coordinates.
 
     Parameters
@@ -67,76 +69,19 @@ def read_sdf(root: Element, faults: Faults) -> Robot:
         The element ``<sdf>``.
     faults : Faults
         Takes what no real robot has, and what is left out.
+    model : str, optional
+        Name of the model to read.
+    allow
+        Folders besides that of the file that included models may be below.
 
     Raises
     ------
     RobotFileError
         Something is missing, unknown or impossible; the message has the line.
     """
-    version = _version(root)
-    world = next((world for world in root.every("world") if world.first("model")), None)
-    return _Reader(*model_frames(root), world, version, faults).robot()
-
-
-def model_frames(root: Element) -> tuple[Frames, FramePose]:
-    """Return the links, joints and further frames of the one model of a file, and its pose in the world."""
-    model, pose = _model(root)
-    check_known(model, MODEL_PARTS)
-    for tag in ("include", "model"):
-        for child in model.every(tag):
-            message = f"<{tag}> within a model is not read; write its links and joints into this model"
-            raise child.error(message, value=child.attributes.get("name"))
-    elements = _named(model)
-    if not any(element.tag == "link" for element in elements.values()):
-        raise model.error("a robot needs at least one <link>")
-    return Frames(model, elements), pose
-
-
-def _model(root: Element) -> tuple[Element, FramePose]:
-    """Return the model of a file, and its pose in the world."""
-    check_known(root, (*ROOT, "actor", "light"))
-    worlds = root.every("world")
-    models = [model for holder in (root, *worlds) for model in holder.every("model")]
-    if len(models) != 1:
-        message = f"must hold one <model>, it holds {len(models)}"
-        if any(holder.first("include") for holder in (root, *worlds)):
-            message += " besides those that it includes, which are not read"
-        raise (models[1] if models else root).error(message, value=[m.attributes.get("name") for m in models])
-    for joint in (joint for world in worlds for joint in world.every("joint")):
-        message = 'joints of a world are not read; write this one into the model, with "world" as its parent'
-        raise joint.error(message, value=joint.attributes.get("name"))
-    pose = only(models[0], "pose")
-    relative = "" if pose is None else pose.attributes.get("relative_to", "")
-    if pose is not None and relative not in ("", WORLD):
-        raise pose.error("a model is placed in the world, relative to nothing else", "pose", value=relative)
-    if models[0].attributes.get("placement_frame"):
-        raise models[0].error("placement_frame is not read; place the model by its own frame", "placement_frame")
-    return models[0], pose_of(models[0])
-
-
-def _version(root: Element) -> tuple[int, ...]:
-    text = root.text("version", "version")
-    try:
-        return tuple(int(part) for part in text.split("."))
-    except ValueError:
-        raise root.error(
-            "the version must be numbers with points between, such as 1.7", "version", value=text
-        ) from None
-
-
-def _named(model: Element) -> dict[str, Element]:
-    """Return links, joints and frames by name."""
-    elements: dict[str, Element] = {}
-    for tag in ("link", "joint", "frame"):
-        for element in model.every(tag):
-            name = element.text("name", f"{tag}s")
-            if name in elements:
-                message = f"this name is given twice, first in line {elements[name].line}"
-                raise element.error(message, f"{tag}s", value=name)
-            if name == WORLD or (name.startswith("__") and name.endswith("__")):
-                raise element.error("SDF keeps this name for itself", f"{tag}s", value=name)
-            elements[name] = element
-    return elements
+    chosen = chosen_model(root, faults, model, allow)
+    frames = Frames(chosen.model, named(chosen.model))
+    return _Reader(frames, chosen.pose, chosen.world, chosen.version, faults).robot()
 
 
 class _Reader:
@@ -169,7 +114,8 @@ class _Reader:
         base = WORLD if to_world or fixed else self.frames.canonical_link()
         tree, closing = self._divided(joints, base, [*inertias, *([WORLD] if base == WORLD else [])], fixed)
         self.links += [Link(WORLD)] if base == WORLD else []
-        self.links += [Link(name, inertia) for name, inertia in inertias.items()]
+        pulled = {name: flag_of(element, "gravity", "links", name, default=True) for name, element in elements.items()}
+        self.links += [Link(name, inertia, float(pulled[name])) for name, inertia in inertias.items()]
         for joint in tree:
             if len(joint.axes) == 2:
                 numbered = ((joint.name, tag, self._unused(f"{joint.name}_{k}")) for k, tag in enumerate(AXIS_TAGS, 1))
@@ -177,11 +123,11 @@ class _Reader:
         mimics = self._mimics(tree, gears)
         for joint in tree:
             self._add(joint, mimics)
-        closures = [self._closure(joint) for joint in closing]
+        closures = [self._closure(joint) for joint in closing] + self._ball_constraints()
         note_left_out(self.model, elements, tree, closing, self.faults)
         name = self.model.attributes.get("name", "robot")
         upright = self.pose.then(self._link_pose(base)).rotation if base != WORLD else np.eye(3)
-        gravity = upright.T @ gravity_of(self.world, elements, inertias)
+        gravity = upright.T @ gravity_of(self.world)
         try:
             joints = with_room(self.joints, self.faults, self.lines.located)
             return Robot(name, self.links, joints, gravity, closures, strict=False)
@@ -274,7 +220,7 @@ class _Reader:
             start = made[-1].child if made else joint.parent
             direction = rotation.T @ axis.direction
             arguments: dict[str, Any] = {"axis": direction, "limits": axis.limits, "mimic": mimics.get(name)}
-            arguments |= {field: getattr(axis, field) for field in ("armature", "damping", "friction")}
+            arguments |= {field: getattr(axis, field) for field in OF_AXIS}
             made.append(Joint(name, start, end, kind, **arguments))
         return made
 
@@ -310,6 +256,24 @@ class _Reader:
             )
         except RobotError as error:
             raise self.lines.located(error) from None
+
+    def _ball_constraints(self) -> list[Closure]:
+        """Return the ball constraints of Drake, each a point of one link held at a point of another."""
+        closures = []
+        for k, element in enumerate(self.model.every(BALL)):
+            name = self._unused(f"ball_constraint_{k}")
+            links, points = [], []
+            for body, point in (("A", "AP"), ("B", "BQ")):
+                part = needed(element, f"{BALL}_body_{body}", "closures", name)
+                place = needed(element, f"{BALL}_p_{point}", "closures", name)
+                links.append(self.frames.link(text_of(element, part.tag, "closures", name), part, "closures", name))
+                points.append(place.content_numbers(3, "closures", name, place.tag))
+            self.lines.add(element, "closures", name)
+            try:
+                closures.append(Closure(name, links, "connect", points))
+            except RobotError as error:
+                raise self.lines.located(error) from None
+        return closures
 
     def _mimics(self, tree: Sequence[SdfJoint], gears: Sequence[SdfJoint]) -> dict[str, Mimic]:
         """Return what joints follow: by ``<mimic>``, and by gearboxes."""

@@ -45,6 +45,8 @@ class SdfAxis:
     damping: float
     friction: float
     armature: float
+    stiffness: float
+    spring_reference: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -121,11 +123,12 @@ def _axis(
     for part, known in ((limit, LIMIT), (dynamics, DYNAMICS)):
         if part is not None:
             check_known(part, known, *where, part.tag)
-    damping, friction = (number_of(dynamics, key, *where, "dynamics", default=0.0) for key in ("damping", "friction"))
-    for key, value in (("damping", damping), ("friction", friction)):
-        if value < 0:
+    values = {key: number_of(dynamics, key, *where, "dynamics", default=0.0) for key in DYNAMICS}
+    for key, value in values.items():
+        if value < 0 and key != "spring_reference":
             raise (dynamics or axis).error("must be zero or greater", *where, "dynamics", key, value=value)
-    return SdfAxis(axis.tag, rotation @ direction, _limits(limit, *where), damping, friction, armature)
+    drives = (values["damping"], values["friction"], armature, values["spring_stiffness"], values["spring_reference"])
+    return SdfAxis(axis.tag, rotation @ direction, _limits(limit, *where), *drives)
 
 
 def _limits(limit: Element | None, *where: str) -> Limits:
@@ -138,3 +141,25 @@ def _limits(limit: Element | None, *where: str) -> Limits:
         return Limits(**bounds)
     except RobotError as error:
         raise limit.error(error.message, *where, "limit", value=error.value) from None
+
+
+def with_named_axes(joint: Element, version: tuple[int, ...]) -> Element:
+    """Return a joint whose axes say by name which frame they are in, whatever the version of the file."""
+    children = []
+    for axis in joint.children:
+        if axis.tag in ("axis", "axis2") and version < (1, 7):
+            where = ("joints", joint.attributes.get("name", ""), axis.tag)
+            in_model = flag_of(axis, "use_parent_model_frame", *where, default=version < (1, 5))
+            parts = [x for x in axis.children if x.tag != "use_parent_model_frame"]
+            if in_model:
+                directions = [x for x in parts if x.tag == "xyz"] or [
+                    Element("xyz", {}, axis.path, axis.line, pieces=["0 0 1"], faults=axis.faults)
+                ]
+                others = [x for x in parts if x.tag != "xyz"]
+                turned = [
+                    dataclasses.replace(x, attributes={**x.attributes, "expressed_in": MODEL}) for x in directions
+                ]
+                parts = [*turned, *others]
+            axis = dataclasses.replace(axis, children=parts)
+        children.append(axis)
+    return dataclasses.replace(joint, children=children)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from jounce.io.robots.faults import BALLS, BUSHINGS, JOINT_SPRINGS, LEAVE, PLUGINS, ROTORS, Faults, left_out
+from jounce.io.robots.faults import BUSHINGS, JOINT_SPRINGS, LEAVE, PLUGINS, ROTORS, Faults, left_out
 from jounce.io.robots.sdf_joints import ROTOR, SdfJoint, rotor_of
 from jounce.io.robots.sdf_poses import flag_of, needed, number_of, only
 from jounce.io.robots.xml_elements import Element
@@ -15,7 +15,7 @@ DECAY = "the decay of the velocities of links"
 IN_LOOPS = {"damping": "damping of joints that close a loop", "friction": "friction of joints that close a loop"}
 DECAYS = {"linear": DECAY, "angular": DECAY}
 MIMICS = ("mimic", "drake:mimic")
-OF_MODEL = {"drake:ball_constraint": BALLS, "drake:linear_bushing_rpy": BUSHINGS}
+OF_MODEL = {"drake:linear_bushing_rpy": BUSHINGS}
 SPRING = {"spring_stiffness": JOINT_SPRINGS}
 
 
@@ -44,11 +44,10 @@ def note_left_out(
     if flag_of(model, "static", "static") and any(joint.kind != "fixed" for joint in tree):
         error = needed(model, "static").error(left_out(STATIC, "false"), "static", value=True)
         faults.leave_out(STATIC, model.attributes.get("name", "robot"), error)
-    for joints, headings in ((tree, SPRING), (closing, SPRING | IN_LOOPS)):
-        for joint in joints:
-            for axis in joint.axes:
-                where = ("joints", joint.name, axis.tag, "dynamics")
-                _note_numbers(only(needed(joint.element, axis.tag), "dynamics"), joint.name, headings, faults, *where)
+    for joint in closing:
+        for axis in joint.axes:
+            where, headings = ("joints", joint.name, axis.tag, "dynamics"), SPRING | IN_LOOPS
+            _note_numbers(only(needed(joint.element, axis.tag), "dynamics"), joint.name, headings, faults, *where)
     _note_extensions(model, tree, closing, faults)
     for name, link in links.items():
         if flag_of(link, "kinematic", "links", name):

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from jaxtyping import Float
 
 from jounce.io.robots.faults import PARTLY_INERTIAL, WITHOUT_INERTIAL, Faults
-from jounce.io.robots.sdf_poses import check_known, flag_of, number_of, only, pose_of
+from jounce.io.robots.sdf_poses import check_known, number_of, only, pose_of
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
 
@@ -76,27 +74,14 @@ def _check_whole(name: str, inertial: Element, moments: Element | None, faults: 
         faults.add(PARTLY_INERTIAL, name, inertial.error(message, "links", name, "inertial"))
 
 
-def gravity_of(
-    world: Element | None, links: Mapping[str, Element], inertias: Mapping[str, Inertia | None]
-) -> Float[np.ndarray, "3"]:
-    """Return the gravity in the axes of the world: that of the world, or none where no link feels it.
+def gravity_of(world: Element | None) -> Float[np.ndarray, "3"]:
+    """Return the gravity in the axes of the world.
 
     Parameters
     ----------
     world : Element or None
         The element ``<world>`` that holds the model.
-    links : dict of str to Element
-        The links by name.
-    inertias : dict of str to Inertia or None
-        Their inertias.
     """
-    heavy = [name for name, inertia in inertias.items() if inertia is not None and inertia.mass > 0]
-    floats = [name for name in heavy if not flag_of(links[name], "gravity", "links", name, default=True)]
-    if floats and len(floats) < len(heavy):
-        message = "gravity is switched off for some links only, but a robot feels one; give all links the same"
-        raise links[floats[0]].error(message, "links", floats[0], "gravity")
-    if floats:
-        return np.zeros(3)
     holders = [] if world is None else [world, *world.every("physics")]  # up to SDF 1.5 it was a matter of the physics
     for holder in holders:
         if (element := only(holder, "gravity", "world")) is not None:

@@ -173,10 +173,10 @@ def flag_of(element: Element | None, tag: str, *name: str, default: bool = False
 
 
 def check_known(element: Element, known: Iterable[str], *name: str) -> None:
-    """Refuse an element that SDF does not have; those of other programs have a prefix, such as ``gz:``."""
+    """Note an element that SDF does not have; those of other programs have a prefix, such as ``gz:``."""
     for child in element.children:
         if child.tag not in known and ":" not in child.tag:
-            raise child.error(no_such("element of SDF here", child.tag, known), *name, value=f"<{child.tag}>")
+            child.leave_out_unknown(no_such("element of SDF here", child.tag, known), *name)
 
 
 def vector_of(element: Element, *name: str) -> Float[np.ndarray, "3"]:

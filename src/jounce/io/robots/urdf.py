@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import RobotError, RobotFileError, did_you_mean, no_such
-from jounce.io.robots.faults import BELOW_ZERO, FOLLOWS_NONE, IDLE, MASSLESS, ONE_END, Faults, left_out
+from jounce.io.robots.faults import BELOW_ZERO, FOLLOWS_NONE, IDLE, MASSLESS, ONE_END, REVERSED, Faults, left_out
 from jounce.io.robots.followers import with_room
 from jounce.io.robots.named_elements import NamedElements
+from jounce.io.robots.urdf_extensions import joint_springs, shares_of_gravity, urdf_closures
 from jounce.io.robots.urdf_left_out import check_version, note_left_out, rotors
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
@@ -21,6 +23,7 @@ from jounce.robot.model.links_and_joints import Joint, Limits, Link, Mimic, lead
 from jounce.robot.model.tree import axes_with_z_along, ordered
 from jounce.robot.robot import Robot
 
+WORLD = "world"  # which need not be a link of the file
 EXPANDED = ("floating", "planar")
 TYPES = ("continuous", "fixed", "prismatic", "revolute", *EXPANDED)
 LINK_PARTS = ("inertial", "visual", "collision", "contact", "material", "sensor")
@@ -41,8 +44,9 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     there is a warning. An ``<inertial>`` of zero mass and zero inertia is a frame. Limits that are zero are not given,
     nor is a range from zero to zero. A joint that follows one which itself follows another follows that one.
     Rotors that Drake reads from transmissions are armature: ``drake:rotor_inertia`` times the square of
-    ``drake:gear_ratio``. Of other elements by which simulators change motions or forces there is a warning: loops,
-    springs, links without weight.
+    ``drake:gear_ratio``. Loops (``loop_joint``, ``drake:ball_constraint``) become closures, ``springStiffness`` and
+    ``springReference`` of Gazebo are springs, and links may be out of gravity. Of other elements by which simulators
+    change motions or forces there is a warning.
 
     Parameters
     ----------
@@ -68,12 +72,14 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     if not links:
         raise root.error("a robot needs at least one <link>")
     lines = NamedElements(root)
-    made = []
+    made, pulled, springs = [], shares_of_gravity(root), joint_springs(root)
+    if WORLD not in links and any(_parent(element) == WORLD for element in joints.values()):
+        made.append(Link(WORLD))
     for name, element in links.items():
         lines.add(element, "links", name)
-        made.append(_link(name, element, faults))
+        made.append(_link(name, element, faults, pulled.get(name, 1.0)))
     for name, element in joints.items():
-        _check_joint(element, name, links)
+        _check_joint(element, name, dict.fromkeys([link.name for link in made]))
         _add_joint(lines, element, name)
     parts: list[Joint] = []
     mimics, armatures = _mimics(joints, faults), rotors(root, faults)
@@ -81,6 +87,8 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     try:
         for name, element in joints.items():
             more, expanded = _joints(name, element, mimics, armatures.get(name, 0.0), faults)
+            if len(expanded) == 1 and expanded[0].moving and name in springs:
+                expanded = [dataclasses.replace(expanded[0], **springs[name])]
             named[name] = expanded
             made += more
             parts += expanded
@@ -88,7 +96,11 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
                 lines.add(element, "joints", part.name)
         ordered(_distinct("links", made, root), _distinct("joints", parts, root))
         parts = with_room(parts, faults, lines.located)
-        robot = Robot(root.attributes.get("name", "robot"), made, parts, strict=False)
+        loops = urdf_closures(root, [link.name for link in made])
+        for loop in loops:
+            lines.add(loop.element, "closures", loop.closure.name)
+        closures = [loop.closure for loop in loops]
+        robot = Robot(root.attributes.get("name", "robot"), made, parts, closures=closures, strict=False)
         _check_masses(robot, joints, links, faults, massless)
         note_left_out(root, robot, named, faults)
         return robot
@@ -127,7 +139,7 @@ def _distinct(kind: str, parts: list[Any], root: Element) -> dict[str, Any]:
     return values
 
 
-def _link(name: str, element: Element, faults: Faults) -> Link:
+def _link(name: str, element: Element, faults: Faults, gravity: float) -> Link:
     """Return a link; its inertia is turned from the axes of ``<inertial>`` to those of the link."""
     where = ("links", name)
     element.check_children(LINK_PARTS, *where)
@@ -147,7 +159,7 @@ def _link(name: str, element: Element, faults: Faults) -> Link:
         return Link(name)
     inertia = Inertia(mass, tensor=tensor, strict=False)
     faults.check(inertia, name, (weight if mass == 0 else moments).line)
-    return Link(name, inertia.moved(*pose))
+    return Link(name, inertia.moved(*pose), gravity)
 
 
 def _part(element: Element, tag: str, advice: str, *name: str) -> Element:
@@ -176,7 +188,13 @@ def _pose(element: Element, *name: str) -> _Pose:
     return np.array(position), Rotation.from_quat(quaternion).as_matrix()
 
 
-def _check_joint(element: Element, name: str, links: dict[str, Element]) -> None:
+def _parent(joint: Element) -> str:
+    """Return what a joint says of its parent, empty where it says nothing."""
+    parent = joint.first("parent")
+    return "" if parent is None else parent.attributes.get("link", "")
+
+
+def _check_joint(element: Element, name: str, links: Collection[str]) -> None:
     where = ("joints", name)
     element.check_children(JOINT_PARTS, *where)
     kind = element.text("type", *where, "type")
@@ -293,6 +311,11 @@ def _limits(name: str, limit: Element | None, kind: str, bounds: dict[str, float
                 message = f"is missing and so is zero, beyond the other end of the range; give {key}"
                 faults.add(ONE_END, name, limit.error(message, "joints", name, "limit", key))
                 del ends[key]
+        elif bounds["lower"] > bounds["upper"]:
+            message = "the lower limit must not exceed the upper one; leave both out where there is no range"
+            error = limit.error(message, "joints", name, "limit", value=list(ends.values()))
+            faults.add(REVERSED, name, error)
+            ends = {}
         given |= ends
     try:
         return Limits(**{key: value for key, value in given.items() if math.isfinite(value)})

@@ -11,14 +11,12 @@ from collections.abc import Callable, Iterator, Mapping
 
 from jounce.errors import no_such
 from jounce.io.robots.faults import (
-    BALLS,
     BUSHINGS,
     JOINT_SPRINGS,
     LEAVE,
     MASS_OF_SHAPES,
     PLUGINS,
     ROTORS,
-    WEIGHTLESS,
     Faults,
     left_out,
 )
@@ -28,18 +26,15 @@ from jounce.io.robots.xml_elements import Element
 from jounce.robot.model.links_and_joints import Joint
 from jounce.robot.robot import Robot
 
-LOOPS = "<loop_joint>, which closes a loop"
 IN_GAZEBO = "links and joints that <gazebo> adds"
 FORCE_ELEMENTS = "<force_element>, which is a force"
 QUATERNIONS = "quat_xyzw, of which the version of this file knows nothing"
 OF_MUJOCO = "what <mujoco> says of gravity and fluids"
 OF_FILE = {
-    "loop_joint": LOOPS,
     "force_element": FORCE_ELEMENTS,
-    "drake:ball_constraint": BALLS,
     "drake:linear_bushing_rpy": BUSHINGS,
 }
-OF_DYNAMICS = dict.fromkeys(("stiffness", "spring_stiffness", "spring_k"), JOINT_SPRINGS) | dict.fromkeys(
+OF_DYNAMICS = dict.fromkeys(("stiffness", "spring_k"), JOINT_SPRINGS) | dict.fromkeys(
     ("armature", "rotor_inertia"), ROTORS
 )
 SPRINGS = ("springStiffness", "spring_stiffness")
@@ -185,13 +180,10 @@ def _of_gazebo(
     """Give what an element for Gazebo changes: the heading, of which link or joint, and where it stands."""
     about = gazebo.attributes.get("reference", "").strip()
     moves = any(joint.moving for joint in names.get(about, ()))
-    frame, link = robot.frames.get(about), robot.links.get(about)
+    frame = robot.frames.get(about)
     on_moving = frame is not None and frame.body >= 0
-    heavy = on_moving and link is not None and link.inertia is not None and link.inertia.mass > 0
     table: dict[str, tuple[str, bool, Callable[[Element], bool]]] = {
-        **dict.fromkeys(SPRINGS, (JOINT_SPRINGS, moves, _counts)),
-        "gravity": (WEIGHTLESS, heavy, lambda x: x.content.strip() in NO),
-        "turnGravityOff": (WEIGHTLESS, heavy, lambda x: x.content.strip() in YES),
+        **dict.fromkeys(SPRINGS, (JOINT_SPRINGS, moves and len(names.get(about, ())) > 1, _counts)),
         "kinematic": (KINEMATIC, on_moving, lambda x: x.content.strip() in YES),
         "static": (STATIC, moving and not about, lambda x: x.content.strip() in YES),
         "dampingFactor": (DECAY, on_moving, _counts),

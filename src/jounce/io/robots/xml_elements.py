@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,6 +12,7 @@ from xml.parsers import expat
 from jounce.errors import RobotFileError, did_you_mean
 from jounce.io.files.located_data import dotted
 from jounce.io.files.reading import LARGEST_NUMBER, fault_of_number, read_file
+from jounce.io.robots.faults import NOT_XML, UNKNOWN, Faults
 
 MAX_DEPTH = 2000
 
@@ -25,6 +27,7 @@ class Element:
     line: int
     children: list[Element] = field(default_factory=list)
     pieces: list[str] = field(default_factory=list)  # of the text within, but for that of the children
+    faults: Faults | None = None  # of the file, which take elements that nobody knows
 
     @property
     def content(self) -> str:
@@ -93,21 +96,46 @@ class Element:
         return values
 
     def check_children(self, known: Iterable[str], *name: str) -> None:
-        """Refuse a child whose tag is nearly a known one: what it holds would be left out without a word."""
+        """Note a child whose tag is nearly a known one: what it holds is left out.
+
+        Raises
+        ------
+        RobotFileError
+            If the faults of the file are errors.
+        """
         valid = set(known)
         for child in self.children:
             near = "" if child.tag in valid else did_you_mean(child.tag, valid, limit=0)
             if near and abs(len(child.tag) - len(near.split("'")[1])) <= 1:
-                raise child.error(f"unknown element; {near}", *name, value=f"<{child.tag}>")
+                child.leave_out_unknown(f"unknown element; {near}", *name)
+
+    def leave_out_unknown(self, message: str, *name: str) -> None:
+        """Note the element as one that its format does not have.
+
+        Raises
+        ------
+        RobotFileError
+            If the faults of the file are errors.
+        """
+        error = self.error(message, *name, value=f"<{self.tag}>")
+        if self.faults is None:
+            raise error
+        shown = f"<{self.tag}> of {name[1]}" if len(name) > 1 else f"<{self.tag}>"
+        self.faults.leave_out(UNKNOWN, shown, error)
 
 
-def read_markup(path: str) -> Element:
+def read_markup(path: str, faults: Faults | None = None) -> Element:
     """Read an XML file of at most 10 MB.
+
+    What the readers of other programs let pass is read as they do, and noted: a declaration after blank lines, two
+    hyphens within a comment, zero bytes at the end.
 
     Parameters
     ----------
     path : str
         The file.
+    faults : Faults, optional
+        Take what is read though it is not XML, and elements that nobody knows.
 
     Returns
     -------
@@ -123,19 +151,57 @@ def read_markup(path: str) -> Element:
     content = read_file(path, error=RobotFileError)
     if not content.strip():
         raise RobotFileError("the file is empty", path=path)
-    if b"\0" in content and not content.startswith((b"\xff\xfe", b"\xfe\xff")):
+    wide = content.startswith((b"\xff\xfe", b"\xfe\xff"))
+    noted: list[tuple[str, int]] = []
+    if not wide and content.endswith(b"\0"):
+        content = content.rstrip(b"\0")
+        noted.append(("zero bytes at the end", content.count(b"\n") + 1))
+    if b"\0" in content and not wide:
         line = content.count(b"\n", 0, content.index(b"\0")) + 1
         raise RobotFileError(
             "is not a text file: robots are read from URDF, MJCF and SDF, all XML", path=path, line=line
         )
-    return _Reader(path).read(content)
+    try:
+        root = _Reader(path, faults).read(content)
+    except RobotFileError:
+        tolerated, more = (content, []) if wide else _tolerated(content)
+        if not more:
+            raise
+        root = _Reader(path, faults).read(tolerated)
+        noted += more
+    if faults is None:
+        return root
+    for words, line in noted:
+        error = RobotFileError(f"has {words}, which XML does not allow; take them out", path=path, line=line)
+        faults.leave_out(NOT_XML, words, error)
+    return root
+
+
+def _tolerated(content: bytes) -> tuple[bytes, list[tuple[str, int]]]:
+    """Return text without what other readers let pass, all in its line, and what that is, with the line of each."""
+    noted: list[tuple[str, int]] = []
+
+    def blank(found: re.Match[bytes]) -> bytes:
+        return re.sub(rb"[^\n\r]", b" ", found[0])
+
+    def comment(found: re.Match[bytes]) -> bytes:
+        if b"--" in found[1] or found[1].endswith(b"-"):
+            noted.append(("two hyphens within a comment", content.count(b"\n", 0, found.start()) + 1))
+        return blank(found)
+
+    if late := re.match(rb"(?:\xef\xbb\xbf)?(\s+)<\?xml\s[^>]*\?>", content):
+        noted.append(("blank lines before the declaration <?xml", content.count(b"\n", 0, late.end(1)) + 1))
+        declaration = content[late.end(1) : late.end()]
+        content = declaration.replace(b"\n", b" ") + late[1] + content[late.end() :]
+    content = re.sub(rb"<!--(.*?)-->", comment, content, flags=re.DOTALL)
+    return content, noted
 
 
 class _Reader:
     """Builds elements from the events of the parser."""
 
-    def __init__(self, path: str):
-        self.path = path
+    def __init__(self, path: str, faults: Faults | None):
+        self.path, self.faults = path, faults
         self.open: list[Element] = []
         self.root: Element | None = None
         self.parser = expat.ParserCreate()
@@ -164,7 +230,7 @@ class _Reader:
         return f"; <{last.tag[:40]}> of line {last.line} is still open there"
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        element = Element(tag, attributes, self.path, self.parser.CurrentLineNumber)
+        element = Element(tag, attributes, self.path, self.parser.CurrentLineNumber, faults=self.faults)
         if len(self.open) >= MAX_DEPTH:
             raise element.error(f"nested more than {MAX_DEPTH} deep")
         if self.open:

@@ -1,10 +1,12 @@
 """What drives move, told alike for robots and for mechanisms: coordinates, and the forces that ask for them."""
 
 import abc
+import dataclasses
 import warnings
 from collections.abc import Mapping
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -12,11 +14,16 @@ from jounce.dynamics.inverse.reactions import driver_force
 from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.errors import MechanismError, RobotError, SampleWarning
 from jounce.execution.chunks import in_chunks
+from jounce.jet import Jet
+from jounce.jet.algebra import stacked
 from jounce.kinematics.position_analysis.solve import solve
 from jounce.mechanism import Mechanism, time_grid
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
+from jounce.robot.model.tree import Tree
+from jounce.robot.recursions.batches import Batched
+from jounce.robot.recursions.drive_forces import passive_forces
 from jounce.robot.robot import Robot
 from jounce.shapes import Numbers
 from jounce.trajectory.joint_trajectory import JointTrajectory
@@ -93,6 +100,12 @@ def robot_drives(robot: Robot, drives: object, losses: bool) -> DriveArrays:
             message = f"this joint follows {followers[name]}; give that one the drive"
             raise RobotError(message, name="drives", value=name)
     tree, names = robot.tree, robot.joint_names
+    if losses and np.any(tree.friction_skew):
+        message = "friction that differs by direction is not known to elastic joints; give one value for both"
+        raise RobotError(message, name=f"joints.{names[int(np.flatnonzero(tree.friction_skew)[0])]}.friction")
+    if tree.shape.armed:
+        message = "a ball with armature is not known to elastic joints; set its armature to zero"
+        raise RobotError(message, name="couplings")
     turning = [robot.joints[name].turning for name in names]
     friction = np.asarray(tree.friction) if losses else np.zeros(len(names))
     return DriveArrays.of(names, turning, drives, np.asarray(tree.armature), friction, "moving joint")
@@ -102,8 +115,24 @@ def link_forces(robot: Robot, q: Numbers, losses: bool) -> Float[Numbers, "*batc
     """Return forces of joints on their links with rates, two levels fewer than q: with damping, without rotors."""
     forces = inverse_dynamics(robot, q, drives=False)
     if losses:
-        forces = forces + robot.tree.damping * q[..., 1 : 1 + forces.shape[-2], :]
-    return forces
+        return forces + _passive(robot, (q,))
+    return forces + _passive(_lossless(robot), (q,)) if robot.tree.shape.tendons else forces
+
+
+@Batched
+def _passive(tree: Tree, arrays: tuple[Numbers], _: object) -> Numbers:
+    """Return what springs, dampers and the friction of tendons and balls take; that of joints is the motors'."""
+    (q,) = arrays
+    coordinates = Jet(tuple(q))
+    smooth = dataclasses.replace(tree, friction=jnp.zeros(tree.shape.coordinates))
+    return stacked(passive_forces(smooth, coordinates, coordinates.differentiate(), len(q) - 3))
+
+
+def _lossless(robot: Robot) -> Robot:
+    """Return a robot whose springs alone are left of its drives."""
+    joints = [dataclasses.replace(joint, damping=0.0, friction=0.0) for joint in robot.joints.values()]
+    couplings = [dataclasses.replace(x, damping=0.0, friction=0.0) for x in robot.couplings.values()]
+    return robot.changed(joints=joints, couplings=couplings)
 
 
 class DrivenMechanism(DrivenSystem):

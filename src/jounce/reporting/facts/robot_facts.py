@@ -191,4 +191,6 @@ def _joint(joint: Joint) -> dict[str, Any]:
         "armature": joint.armature,
         "damping": joint.damping,
         "friction": joint.friction,
+        "stiffness": joint.stiffness,
+        "spring_reference": joint.spring_reference,
     }

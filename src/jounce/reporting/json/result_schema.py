@@ -31,6 +31,22 @@ class SimulateResult(Result, SimulationFacts, Written):
     command: Literal["simulate"]
 
 
+class SimulateRobotResult(Result):
+    """jounce simulate --json of a robot file; energies in J, null where the motion was not followed."""
+
+    command: Literal["simulate"]
+    robot: str
+    file: str
+    order: int
+    time: Grid
+    followed_to: float
+    energy_at_start: float | None
+    energy_at_stop: float | None
+    peaks: list[TorquePeak]
+    ok: bool
+    written: str | None
+
+
 class InspectMechanismResult(Result, InspectedMechanism):
     """jounce inspect --json of a mechanism file."""
 
@@ -344,6 +360,7 @@ class WarningLine(TypedDict):
 RESULTS: dict[str, Any] = {
     "run": RunResult,
     "simulate": SimulateResult,
+    "simulate_robot": SimulateRobotResult,
     "inspect_mechanism": InspectMechanismResult,
     "inspect_robot": InspectRobotResult,
     "check": CheckResult,

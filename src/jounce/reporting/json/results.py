@@ -23,6 +23,8 @@ from jounce.trajectory import JointTrajectory
 if TYPE_CHECKING:
     import xarray
 
+    from jounce.integrate.results.robot_simulation import RobotSimulation
+
 VERSION = 1
 """Number of the form of the results; it grows where a key changes or goes."""
 
@@ -111,6 +113,26 @@ def limits_result(
         "ends": ends_facts(report.ends),
         "hand_over": report.hand_over,
         "between": None if motion is None else between_facts(motion),
+        "written": written,
+    }
+
+
+def robot_motion_result(
+    motion: RobotSimulation, peaks_found: Iterable[Peak], file: Path, written: Path | None
+) -> dict[str, Any]:
+    """Return what `jounce simulate` tells of a robot file."""
+    energy = [float(x) if math.isfinite(x) else None for x in motion.energy[[0, -1]]]
+    peak_records = [peak_facts(peak) for peak in peaks_found]
+    return {
+        "robot": motion.robot.name,
+        "file": file,
+        "order": motion.order,
+        "time": grid_facts(motion.time),
+        "followed_to": motion.ended_at,
+        "energy_at_start": energy[0],
+        "energy_at_stop": energy[1],
+        "peaks": [{"joint": peak.pop("output"), **peak} for peak in peak_records],
+        "ok": not motion.status.any(),
         "written": written,
     }
 

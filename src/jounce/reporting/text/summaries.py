@@ -18,6 +18,8 @@ from jounce.trajectory import JointTrajectory
 if TYPE_CHECKING:
     import xarray
 
+    from jounce.integrate.results.robot_simulation import RobotSimulation
+
 Facts = Mapping[str, Any]
 """Plain data, by the keys of a kind of facts."""
 
@@ -186,6 +188,17 @@ def torques_summary(
     if resting:
         lines.append(f"not in the trajectory, held still: {', '.join(resting)}")
     lines += [*between_words(motion), *ends_words(ends)]
+    return "\n".join(wrapped(line) for line in lines)
+
+
+def robot_motion_summary(motion: RobotSimulation, file: Path) -> str:
+    """Word how a robot moved, from when to when, and how its energy changed."""
+    times, energy, steps = motion.time, motion.energy, count(len(motion.steps.start), "step")
+    lines = [
+        f"{motion.robot.name}: motion of {count(len(motion.robot.joint_names), 'moving joint')} ({file.name})",
+        f"t = {times[0]:g} s to {times[-1]:g} s, {count(len(times), 'instant')}, {steps}",
+        f"energy: {energy[0]:.9g} J at the start, {energy[-1]:.9g} J at the stop",
+    ]
     return "\n".join(wrapped(line) for line in lines)
 
 

@@ -20,6 +20,7 @@ from jounce.rigid.frames import Frames
 from jounce.robot.model.arguments import checked_coordinates, checked_position
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.batches import Batched
+from jounce.robot.recursions.drive_forces import armature_matrix, inertial_forces, passive_forces
 from jounce.robot.recursions.kinematics import body_frames
 from jounce.robot.recursions.tree_scan import BodySeries, Series, joint_coordinates, to_coordinates
 from jounce.robot.robot import Robot
@@ -69,7 +70,15 @@ def work(partial: tuple[Jet, Jet], force: Jet, moment: Jet | None = None) -> Bod
 def work_of_weight(tree: Tree, frames: Frames) -> BodySeries:
     """Return the forces of the joints that hold the bodies against gravity."""
     weight = jnp.asarray(tree.gravity)[:, None, None] * jnp.asarray(tree.mass)[None, :, None]
-    return work(partial_velocities(tree, frames), Jet.constant(-weight, frames.position.order))
+    order = frames.position.order
+    partial = partial_velocities(tree, frames)
+    if not tree.shape.lifted:
+        return work(partial, Jet.constant(-weight, order))
+    lift, moment = jnp.asarray(tree.lift)[:-1], jnp.asarray(tree.lift_moment)[:-1]
+    down = jnp.broadcast_to(jnp.asarray(tree.gravity)[:, None, None], weight.shape)
+    off = moment - lift[:, None] * jnp.asarray(tree.center)  # of the mass that is lifted, about the center of all
+    arm = frames.direction(jnp.swapaxes(off, 0, 1)[:, :, None])
+    return work(partial, Jet.constant(lift[None, :, None] * down - weight, order), cross(arm, down))
 
 
 def work_of_motion(tree: Tree, q: Series, frames: Frames) -> Float[Numbers, "order-1 body batch"]:
@@ -137,7 +146,7 @@ def centrifugal(tree: Tree, q: Series) -> Float[Numbers, "order-1 coordinate bat
 @Batched
 def _mass_matrix(tree: Tree, arrays: tuple[Series], _: Any, drives: bool) -> Any:
     matrix = mass_jet(tree, arrays[0])
-    return matrix.at[0].add(jnp.diag(jnp.asarray(tree.armature))[:, :, None]) if drives else matrix
+    return matrix + armature_matrix(tree, Jet(tuple(arrays[0]))) if drives else matrix
 
 
 @Batched
@@ -153,14 +162,15 @@ def _bias(tree: Tree, arrays: tuple[Series], _: Any, parts: frozenset[str], driv
     if ("coriolis" in parts) != ("centrifugal" in parts):
         sign = 1.0 if "centrifugal" in parts else -1.0
         forces = forces + sign * centrifugal(tree, q)
-    return forces + drive_forces(tree, q, levels) if drives else forces
-
-
-def drive_forces(tree: Tree, q: Series, levels: int) -> Float[Numbers, "{levels} coordinate batch"]:
-    """Return what viscous damping and Coulomb friction take."""
-    damping, friction = (jnp.asarray(x)[:, None] for x in (tree.damping, tree.friction))
-    forces = stacked((Jet(tuple(q)).differentiate() * damping).truncate(levels - 1))
-    return forces.at[0].add(friction * jnp.sign(q[1]))
+    if not drives:
+        return forces
+    coordinates = Jet(tuple(q))
+    rate = coordinates.differentiate()
+    forces = forces + stacked(passive_forces(tree, coordinates, rate, levels - 1))
+    if not tree.shape.armed:
+        return forces
+    still = Jet.constant(jnp.zeros(q.shape[1:]), levels - 1)  # turns of a ball that go on drag others along
+    return forces + stacked(inertial_forces(tree, coordinates, rate, still))
 
 
 def mass_matrix(

@@ -224,14 +224,15 @@ def _check_margins(robot: Robot, margin: Any, driven: np.ndarray) -> None:
     """Raise SingularityError, by name, where nothing resists a joint."""
     margin = np.reshape(margin, (math.prod(margin.shape[:-1]), margin.shape[-1]))  # a lone body has no joints
     free = np.ones(margin.shape[1])
-    if robot.tree.shape.direct:
+    by_joint = robot.tree.shape.direct and not robot.tree.shape.armed
+    if by_joint:
         free[: len(driven)] = 1.0 - driven
     bad = ~(margin > LEAST_INERTIA) & (free > 0)
     if not bad.any():
         return
     sample = int(np.argwhere(bad)[0, 0])
     where = f" at sample {sample}" if len(margin) > 1 else ""
-    names = [joint.name for joint in robot.moving_joints] if robot.tree.shape.direct else []
+    names = [joint.name for joint in robot.moving_joints] if by_joint else []
     joints = np.flatnonzero(bad[sample, : len(names)])
     if not joints.size:
         message = f"some motion of the joints or of the free base has no inertia{where}: it has no acceleration"

@@ -10,12 +10,12 @@ from jaxtyping import Float
 from jounce.errors import RobotError, check_choice, flag
 from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked, total
-from jounce.robot.algorithms.base_motion import BaseMotion, base_arrays, base_body, falling, scene_axes
-from jounce.robot.algorithms.equations_of_motion import drive_forces
+from jounce.robot.algorithms.base_motion import BaseMotion, base_arrays, base_body, falling, in_base, scene_axes
 from jounce.robot.algorithms.wrenches import FRAMES, Wrench, wrench_arrays
 from jounce.robot.model.arguments import checked_coordinates
 from jounce.robot.model.tree import Frame, Tree
 from jounce.robot.recursions.batches import Batched
+from jounce.robot.recursions.drive_forces import inertial_forces, passive_forces
 from jounce.robot.recursions.kinematics import body_frames, frame_at
 from jounce.robot.recursions.newton_euler import BodyWrenches, inertial_wrench, recursive_newton_euler
 from jounce.robot.recursions.tree_scan import of_one_body, to_coordinates
@@ -142,17 +142,27 @@ def _on_bodies(
 ) -> BodyWrenches | None:
     """Return external wrenches about the origins of bodies, in their frames, that of the base last; None without any.
 
-    The axes of the scene are given, in those of the base, where that turns.
+    What bears bodies that gravity does not pull at is one of them. The axes of the scene are given, in those of the
+    base, where that turns.
     """
     q, *wrenches = arrays
-    if not wrenches:
+    lifted = tree.shape.lifted
+    if not wrenches and not lifted:
         return None
     levels = q.shape[0] - 2
-    frames: Any = body_frames(tree, q[:levels]) if any(global_axes) else None
+    frames: Any = body_frames(tree, q[:levels]) if any(global_axes) or lifted else None
     whole = jnp.zeros((levels, tree.shape.bodies + 1, 6, q.shape[-1]))
-    for values, (body, point, rotation), in_base in zip(wrenches, link_frames, global_axes, strict=True):
+    if lifted:
+        down = jnp.asarray(tree.gravity)[:, None]
+        fall = Jet.constant(down, levels - 1) if scene is None else in_base(scene, down).truncate(levels - 1)
+        local = frames.to_body(fall.map(lambda c: c[:, None]))
+        force = local * (-jnp.asarray(tree.lift))[:, None]
+        moment = cross(local, jnp.swapaxes(jnp.asarray(tree.lift_moment), 0, 1)[:, :, None])
+        lifts = stacked(concatenate([force, moment]))  # levels, components, bodies, batch
+        whole = whole + jnp.swapaxes(jnp.broadcast_to(lifts, (*lifts.shape[:-1], q.shape[-1])), 1, 2)
+    for values, (body, point, rotation), in_scene in zip(wrenches, link_frames, global_axes, strict=True):
         force, torque = Jet(tuple(values[:, :3])), Jet(tuple(values[:, 3:]))
-        if in_base:
+        if in_scene:
             frame = frames.take(body)
             if scene is not None:
                 force, torque = (total(u * part[i : i + 1] for i, u in enumerate(scene)) for part in (force, torque))
@@ -176,8 +186,11 @@ def _generalized_forces(
 
 
 def _of_drives(tree: Tree, q: Any) -> Any:
-    acceleration = Jet(tuple(q)).differentiate().differentiate()
-    return stacked(acceleration * jnp.asarray(tree.armature)[:, None]) + drive_forces(tree, q, q.shape[0] - 2)
+    coordinates = Jet(tuple(q))
+    rate = coordinates.differentiate()
+    acceleration = rate.differentiate()
+    needed = inertial_forces(tree, coordinates, rate, acceleration)
+    return stacked(needed + passive_forces(tree, coordinates, rate, acceleration.order))
 
 
 @Batched

@@ -68,9 +68,10 @@ def mechanism(
         Instants to solve for, s; of a trajectory, its own unless given.
     drives : bool, default True
         Count the armature inertia of the joints, each as that of a rotor on the ground, the body ``A_rotor``, that the
-        constraint ``A_gear`` turns with the joint; their viscous damping and Coulomb friction, as forces named
-        ``A_damping`` and ``A_friction``. Friction has the sign of the velocity and is zero at rest. Without, all three
-        are left out.
+        constraint ``A_gear`` turns with the joint; their viscous damping, Coulomb friction and springs, as forces
+        named ``A_damping``, ``A_friction`` and ``A_spring``, and what the drives of balls have, ``A_ball``. Friction
+        has the sign of the velocity and is zero at rest. Without, all are left out. What bears links that feel less
+        than all of gravity is a force ``LINK_lift`` in any case.
     redundant_reactions : {"unique", "least_norm"} or dict of str to dict, optional
         As of `Mechanism`: reactions without a unique value are NaN, those of least norm, or as stiffnesses of joints
         share them. The redundant equations of closures must then agree, as those of any mechanism: to 1e-9.

@@ -10,20 +10,24 @@ from jounce.constraints.drivers import RotationDriver, SpatialSlideDriver
 from jounce.errors import RobotError, check_name
 from jounce.forces import AbstractForce
 from jounce.forces.actuators import SlideForce, SpatialTorque
+from jounce.forces.loads import SpatialPointForce
 from jounce.forces.springs import SlideSpring, SpatialTorsionalSpring
 from jounce.mechanism import AbstractOutput, Body, RelativeAngleOutput
 from jounce.mechanism.mechanism import GROUND
 from jounce.rigid.euler_parameters import from_rotation_matrices
 from jounce.rigid.inertia import Inertia
+from jounce.robot.closed_loops.ball_damper import BallDamper
 from jounce.robot.closed_loops.closures import LinkClosure
 from jounce.robot.closed_loops.coupling import JointPlacement, SlideOutput, coupled
 from jounce.robot.model.abstract_robot import AbstractRobot
+from jounce.robot.model.couplings import BallDrive, Tendon
 from jounce.robot.model.links_and_joints import Closure, Mimic
 from jounce.robot.model.tree import axes_with_z_along
 from jounce.robot.recursions.kinematics import forward_kinematics
 
-DAMPING, FRICTION, ROTOR, GEAR = "_damping", "_friction", "_rotor", "_gear"
-DRIVES = ("armature", "damping", "friction")
+DAMPING, FRICTION, SPRING, BALL, LIFT = "_damping", "_friction", "_spring", "_ball", "_lift"
+ROTOR, GEAR = "_rotor", "_gear"
+DRIVES = ("armature", "damping", "friction", "stiffness")
 
 
 def on_body(robot: AbstractRobot, link: str) -> tuple[str, np.ndarray, np.ndarray]:
@@ -50,10 +54,13 @@ class RobotParts:
     forces, outputs
         What may name links that are otherwise merged.
     drives : bool
-        Whether armature, damping and friction of the joints are wanted.
+        Whether armature, damping, friction and springs of the joints are wanted.
     """
 
     def __init__(self, robot: AbstractRobot, needed: set[str], forces: Any, outputs: Any, drives: bool):
+        self.balls = [x for x in robot.couplings.values() if isinstance(x, BallDrive)] if drives else []
+        if drives:
+            _check_couplings(robot)
         self.robot, self.tree = robot, robot.opened().tree
         self.moving = robot.moving_joints
         self.driven = [x for x in self.moving if any(getattr(x, field) for field in DRIVES)] if drives else []
@@ -180,18 +187,40 @@ class RobotParts:
         return SlideOutput(at.bodies, at.point, np.zeros(3), at.axis_i)
 
     def losses(self) -> dict[str, AbstractForce]:
-        """Return the dampers of the joints, and their dry friction."""
-        forces_found: dict[str, AbstractForce] = {}
+        """Return the dampers and springs of the joints, their dry friction, and what bears weightless links."""
+        forces_found: dict[str, AbstractForce] = self._lifts()
+        for ball in self.balls:
+            if ball.damping or ball.friction:
+                parent = on_body(self.robot, self.robot.joints[ball.joints[0]].parent)[0]
+                bodies = (parent, self.robot.joints[ball.joints[-1]].child)
+                forces_found[ball.name + BALL] = BallDamper(bodies, damping=ball.damping, friction=ball.friction)
         for joint in self.driven:
-            at, law = self._named(joint.name), f"-{joint.friction!r}*sign(v)"
+            at, law = self._named(joint.name), friction_law(joint.friction)
             turn = {"axis_i": at.axis_i, "vector_i": at.vector_i, "vector_j": at.vector_j}
             ends = {"point_i": at.point, "point_j": np.zeros(3), "vector_i": at.axis_i}
             if joint.damping:
                 kind, fields = (SpatialTorsionalSpring, turn) if at.turning else (SlideSpring, ends)
                 forces_found[joint.name + DAMPING] = kind(at.bodies, **fields, stiffness=0.0, damping=joint.damping)
+            if joint.stiffness:
+                kind, fields = (SpatialTorsionalSpring, turn) if at.turning else (SlideSpring, ends)
+                free = {"angle" if at.turning else "length": joint.spring_reference}
+                forces_found[joint.name + SPRING] = kind(at.bodies, **fields, stiffness=joint.stiffness, **free)
             if joint.friction:
                 kind, fields = (SpatialTorque, turn) if at.turning else (SlideForce, ends)
                 forces_found[joint.name + FRICTION] = kind(at.bodies, **fields, law=law)
+        return forces_found
+
+    def _lifts(self) -> dict[str, AbstractForce]:
+        """Return the forces that bear links which feel less than all of gravity."""
+        forces_found: dict[str, AbstractForce] = {}
+        for name, link in self.robot.links.items():
+            body, position, rotation = on_body(self.robot, name)
+            if link.inertia is None or link.gravity == 1 or body == GROUND:
+                continue
+            weight = link.inertia.mass * (1.0 - link.gravity) * np.asarray(self.robot.gravity)
+            center = position + rotation @ np.asarray(link.inertia.center_of_mass)
+            law = [repr(float(-x)) for x in weight]
+            forces_found[name + LIFT] = SpatialPointForce((body,), center, law)
         return forces_found
 
     def bodies(self, q: np.ndarray) -> dict[str, Body]:
@@ -206,6 +235,10 @@ class RobotParts:
             body, position, rotation = on_body(robot, name)
             if link.inertia is not None and body != GROUND:
                 masses[body].append(link.inertia.moved(position, rotation))
+        for ball in self.balls:  # of which the parent does not turn, so that it is as inertia of the link
+            if ball.armature:
+                turned = Inertia(0.0, tensor=ball.armature * np.eye(3), strict=False)
+                masses[robot.joints[ball.joints[-1]].child].append(turned)
         bodies = {}
         for name, parts in masses.items():
             at = forward_kinematics(tree, q[None], name)
@@ -224,6 +257,36 @@ class RobotParts:
             inertia = [robot.joints[name].armature] * 3
             bodies[rotor] = Body([0.0] * 3, orientation=attitude, mass=0.0, inertia=inertia)
         return bodies
+
+
+def friction_law(friction: Any) -> str:
+    """Return the law of Coulomb friction, which may differ by direction."""
+    forward, backward = np.broadcast_to(friction, 2).tolist()
+    if forward == backward:
+        return f"-{forward!r}*sign(v)"
+    return f"-{(forward + backward) / 2!r}*sign(v) - {(forward - backward) / 2!r}*abs(sign(v))"
+
+
+def _check_couplings(robot: AbstractRobot) -> None:
+    """Refuse what is of several joints at once and that no force or inertia of a mechanism stands for.
+
+    Raises
+    ------
+    RobotError
+        A tendon has a spring, damping or friction, or a ball with armature is carried by a link that turns.
+    """
+    advice = "leave it out with drives=False, or take its stiffness, damping and friction from the robot"
+    for coupling in robot.couplings.values():
+        where = f"couplings.{coupling.name}"
+        if isinstance(coupling, Tendon):
+            if coupling.stiffness or coupling.damping or coupling.friction:
+                raise RobotError(f"a tendon along joints has no counterpart in a mechanism; {advice}", name=where)
+            continue
+        body = robot.frames[robot.joints[coupling.joints[0]].parent].body
+        turns = robot.opened().tree.ancestors[body] * robot.opened().tree.turning if body >= 0 else np.zeros(1)
+        if coupling.armature and np.any(turns):
+            message = "the armature of a ball whose parent turns has no counterpart in a mechanism"
+            raise RobotError(f"{message}; {advice}", name=f"{where}.armature", value=coupling.armature)
 
 
 def _unused(name: str, taken: Container[str]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from jounce.display import Displayed
 from jounce.errors import RobotError, check_name, did_you_mean
 from jounce.rigid.inertia import Inertia, TracedInertia, finite_numbers
+from jounce.robot.model.couplings import BallDrive, Coupling, Tendon, check_coupling
 from jounce.robot.model.floating_base import floating_joints
 from jounce.robot.model.links_and_joints import Closure, Joint, Limits, Link, limits_with_followers
 from jounce.robot.model.tree import Tree, arrange, ordered, turn_about
@@ -32,6 +33,7 @@ class AbstractRobot(Displayed, abc.ABC):
         gravity: Any = (0.0, 0.0, -STANDARD_GRAVITY),
         closures: Sequence[Closure] = (),
         strict: bool = True,
+        couplings: Sequence[Coupling] = (),
     ):
         self.name, self.strict = name, strict
         self.gravity = finite_numbers("gravity", gravity, (3,))
@@ -42,7 +44,11 @@ class AbstractRobot(Displayed, abc.ABC):
         self.joint_names = tuple(joint.name for joint in self.moving_joints if joint.mimic is None)
         for joint in self.moving_joints:
             self._check_mimic(joint)
-        self._tree, self.frames = arrange(self.base, self.links, in_order, self.gravity)
+        self.couplings: Mapping[str, Coupling] = MappingProxyType(_by_name("couplings", couplings, (Tendon, BallDrive)))
+        for coupling in self.couplings.values():
+            check_coupling(coupling, self.joints, self.joint_names)
+        parts = (in_order, self.gravity, list(self.couplings.values()))
+        self._tree, self.frames = arrange(self.base, self.links, *parts)
         if strict and (massless := self.massless_joints):
             message = (
                 "this joint moves no mass; give its link, or one that it carries, an inertia, or keep it with "
@@ -63,7 +69,7 @@ class AbstractRobot(Displayed, abc.ABC):
     def __reduce__(self) -> tuple[Any, ...]:
         closures = list(self.closures.values())
         parts = (list(self.links.values()), list(self.joints.values()))
-        return type(self), (self.name, *parts, self.gravity, closures, self.strict)
+        return type(self), (self.name, *parts, self.gravity, closures, self.strict, list(self.couplings.values()))
 
     def __repr__(self) -> str:
         count = len(self.joint_names)
@@ -174,15 +180,15 @@ class AbstractRobot(Displayed, abc.ABC):
 
     def with_gravity(self: Made, gravity: ArrayLike) -> Made:
         """Return the same robot under another acceleration of free fall, m/s^2 in the frame of the base."""
-        return self._changed(gravity=gravity)
+        return self.changed(gravity=gravity)
 
     def with_closures(self: Made, closures: Sequence[Closure]) -> Made:
         """Return the robot with more closures."""
-        return self._changed(closures=[*self.closures.values(), *closures])
+        return self.changed(closures=[*self.closures.values(), *closures])
 
     def opened(self: Made) -> Made:
         """Return the tree without closures; its coordinates do not depend on one another."""
-        return self._changed(closures=())
+        return self.changed(closures=())
 
     def with_payload(self: Made, link: str, payload: Inertia) -> Made:
         """Return the robot with a load fixed to a link, given in the frame of that link: Q_SU of Negrean 2025, 125.
@@ -195,8 +201,8 @@ class AbstractRobot(Displayed, abc.ABC):
         check_name("link", link, self.links, RobotError, name="link")
         inertia = self.links[link].inertia
         whole = payload if inertia is None else Inertia.total([inertia, payload])
-        links = {**self.links, link: Link(link, whole)}
-        return self._changed(links=list(links.values()))
+        links = {**self.links, link: dataclasses.replace(self.links[link], inertia=whole)}
+        return self.changed(links=list(links.values()))
 
     def with_inertia(
         self: Made,
@@ -249,8 +255,8 @@ class AbstractRobot(Displayed, abc.ABC):
             inertia = TracedInertia(**values)
         else:
             inertia = Inertia(**values, strict=self.strict)
-        links = {**self.links, link: Link(link, inertia)}
-        return self._changed(links=list(links.values()))
+        links = {**self.links, link: dataclasses.replace(self.links[link], inertia=inertia)}
+        return self.changed(links=list(links.values()))
 
     def locked(self: Made, positions: Mapping[str, float]) -> Made:
         """Return the robot with joints held at given coordinates, rad or m; joints that follow them are held too.
@@ -263,13 +269,16 @@ class AbstractRobot(Displayed, abc.ABC):
         for name, value in positions.items():
             check_name("moving joint", name, self.joint_names, RobotError, name="locked")
             finite_numbers(f"locked.{name}", value, ())
-        joints = []
+        joints, held = [], {}
         for joint in self.joints.values():
             coordinate = positions.get(joint.name)
             if joint.moving and joint.mimic is not None and joint.mimic.joint in positions:
                 coordinate = joint.mimic.multiplier * positions[joint.mimic.joint] + joint.mimic.offset
+            if coordinate is not None:
+                held[joint.name] = float(coordinate)
             joints.append(joint if coordinate is None else _fixed_at(joint, float(coordinate)))
-        return self._changed(joints=joints)
+        couplings = [left for x in self.couplings.values() if (left := x.locked(held)) is not None]
+        return self.changed(joints=joints, couplings=couplings)
 
     def with_floating_base(self: Made, sequence: str = "ZYX") -> Made:
         """Return the robot on a base that moves freely: three slides along x, y, z, then three turns.
@@ -289,7 +298,7 @@ class AbstractRobot(Displayed, abc.ABC):
         while world in self.links:
             world += "_"
         links, joints = floating_joints(self.base, sequence, world=world)
-        return self._changed(links=[*links, *self.links.values()], joints=[*joints, *self.joints.values()])
+        return self.changed(links=[*links, *self.links.values()], joints=[*joints, *self.joints.values()])
 
     @abc.abstractmethod
     def mechanism(self, q: Any = None, **settings: Any) -> Any:
@@ -301,9 +310,10 @@ class AbstractRobot(Displayed, abc.ABC):
             check_name("moving joint", name, self.joint_names, RobotError, name="joint")
         return np.array([finite_numbers(name, values.get(name, 0.0), ()) for name in self.joint_names])
 
-    def _changed(self: Made, **parts: Any) -> Made:
-        """Return the robot with other links, joints, gravity or closures."""
-        current = {name: list(getattr(self, name).values()) for name in ("links", "joints", "closures")}
+    def changed(self: Made, **parts: Any) -> Made:
+        """Return the robot with other links, joints, closures or couplings, each a list, or another name or gravity."""
+        parts_by_name = ("links", "joints", "closures", "couplings")
+        current = {name: list(getattr(self, name).values()) for name in parts_by_name}
         return type(self)(**{"name": self.name, "gravity": self.gravity, "strict": self.strict, **current, **parts})
 
     def _checked_closure(self, closure: Closure) -> Closure:
@@ -333,11 +343,12 @@ class AbstractRobot(Displayed, abc.ABC):
             raise RobotError(message, name=f"joints.{joint.name}.mimic", value=joint.mimic.joint)
 
 
-def _by_name(kind: str, parts: Sequence[Any], expected: type) -> dict[str, Any]:
+def _by_name(kind: str, parts: Sequence[Any], expected: type | tuple[type, ...]) -> dict[str, Any]:
     by_name: dict[str, Any] = {}
     for k, part in enumerate(parts):
         if not isinstance(part, expected):
-            raise RobotError(f"must be a {expected.__name__}", name=f"{kind}[{k}]", value=part)
+            names = " or a ".join(x.__name__ for x in (expected if isinstance(expected, tuple) else (expected,)))
+            raise RobotError(f"must be a {names}", name=f"{kind}[{k}]", value=part)
         if part.name in by_name:
             raise RobotError("this name is given twice", name=kind, value=part.name)
         by_name[part.name] = part

@@ -121,19 +121,23 @@ class Link:
         Name of the link, and of its frame.
     inertia : Inertia or None
         In the frame of the link.
+    gravity : float, default 1
+        Share of gravity that the link feels: 0 where that is switched off, or held by something else.
 
     Raises
     ------
     RobotError
-        If the inertia is none.
+        If the inertia is none, or the share is not finite.
     """
 
     name: str
     inertia: Inertia | None = None
+    gravity: float = 1.0
 
     def __post_init__(self) -> None:
         if self.inertia is not None and not isinstance(self.inertia, Inertia):
             raise RobotError("must be an Inertia or None", name=f"links.{self.name}.inertia", value=self.inertia)
+        object.__setattr__(self, "gravity", float(finite_numbers(f"links.{self.name}.gravity", self.gravity, ())))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -163,14 +167,18 @@ class Joint:
         count through the multiplier.
     damping : float, default 0
         Viscous friction, N m s/rad or N s/m.
-    friction : float, default 0
-        Coulomb friction, N m or N.
+    friction : float or sequence of two floats, default 0
+        Coulomb friction, N m or N; of two, against positive velocities and against negative ones.
+    stiffness : float, default 0
+        Of a spring that holds the joint, N m/rad or N/m.
+    spring_reference : float, default 0
+        Coordinate at which the spring is free, rad or m.
 
     Raises
     ------
     RobotError
         If the type is not known, a value is not finite or has another shape, the axis has no length, the rotation is
-        none, or armature, damping or friction is negative.
+        none, or armature, damping, friction or stiffness is negative.
     """
 
     name: str
@@ -184,7 +192,9 @@ class Joint:
     mimic: Mimic | None = None
     armature: float = 0.0
     damping: float = 0.0
-    friction: float = 0.0
+    friction: Any = 0.0
+    stiffness: float = 0.0
+    spring_reference: float = 0.0
 
     def __post_init__(self) -> None:
         where = f"joints.{self.name}"
@@ -197,11 +207,18 @@ class Joint:
             if length < 1e-9:
                 raise RobotError("must have a direction", name=f"{where}.axis", value=self.axis.tolist())
             object.__setattr__(self, "axis", self.axis if abs(length - 1) < 1e-15 else unchanging(self.axis / length))
-        for field in ("armature", "damping", "friction"):
+        for field in ("armature", "damping", "stiffness"):
             value = float(finite_numbers(f"{where}.{field}", getattr(self, field), ()))
             if value < 0:
                 raise RobotError("must be zero or greater", name=f"{where}.{field}", value=value)
             object.__setattr__(self, field, value)
+        friction = finite_numbers(f"{where}.friction", self.friction, (), (2,))
+        if np.any(friction < 0):
+            raise RobotError("must be zero or greater", name=f"{where}.friction", value=friction.tolist())
+        forward, backward = (float(x) for x in np.broadcast_to(friction, 2))
+        object.__setattr__(self, "friction", forward if forward == backward else (forward, backward))
+        reference = float(finite_numbers(f"{where}.spring_reference", self.spring_reference, ()))
+        object.__setattr__(self, "spring_reference", reference)
 
     @property
     def moving(self) -> bool:

@@ -12,9 +12,11 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia
+from jounce.robot.model.couplings import OF_BALL, BallDrive, Coupling, Tendon
 from jounce.robot.model.links_and_joints import Joint, Link, Mimic
 
 MASSLESS = Inertia(0.0, strict=False)
+FORWARD_BACKWARD = np.array([[0.5, 0.5], [0.5, -0.5]])  # mean and half of the difference of two numbers
 
 
 @dataclasses.dataclass(frozen=True)
@@ -29,6 +31,10 @@ class Shape:
         Whether any joint turns, or slides.
     direct : bool
         Whether body k has coordinate k for its own, as where no joint follows another.
+    tendons, balls : int
+        Springs and tendons; balls with drives.
+    armed, lifted : bool
+        Whether drives of balls have armature; whether some bodies feel less than all of gravity.
     """
 
     bodies: int
@@ -37,6 +43,46 @@ class Shape:
     turning: bool
     sliding: bool
     direct: bool
+    tendons: int = 0
+    balls: int = 0
+    armed: bool = False
+    lifted: bool = False
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Tendons:
+    """Springs of joints, and tendons along them: lengths that are weighted sums of coordinates.
+
+    Parameters
+    ----------
+    weights : array of shape (tendons, coordinates)
+    stiffness, rest, damping, friction : array of shape (tendons,)
+    """
+
+    weights: Any
+    stiffness: Any
+    rest: Any
+    damping: Any
+    friction: Any
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Balls:
+    """Drives of balls.
+
+    Parameters
+    ----------
+    select : array of shape (3, balls, coordinates)
+        1 where a coordinate is the first, second or third turn of a ball.
+    armature, damping, friction : array of shape (balls,)
+    """
+
+    select: Any
+    armature: Any
+    damping: Any
+    friction: Any
 
 
 @jax.tree_util.register_dataclass
@@ -62,6 +108,13 @@ class Tree:
         1 where joint j moves body i; the last row is the base.
     armature, damping, friction : array of shape (coordinates,)
         Of the drives, those of joints that follow included.
+    friction_skew : array of shape (coordinates,)
+        By how much friction against positive rates exceeds the mean of both directions.
+    tendons : Tendons
+    balls : Balls
+    lift, lift_moment : array of shape (bodies + 1,) and (bodies + 1, 3)
+        Mass that gravity does not pull at, and its first moment about the origin, in the frame of the body; the last is
+        the base.
     gravity : array of shape (3,)
         m/s^2.
     """
@@ -81,6 +134,11 @@ class Tree:
     armature: Any
     damping: Any
     friction: Any
+    friction_skew: Any
+    tendons: Any
+    balls: Any
+    lift: Any
+    lift_moment: Any
     gravity: Any
     shape: Shape = dataclasses.field(metadata={"static": True})
 
@@ -132,7 +190,11 @@ def ordered(links: Mapping[str, Link], joints: Mapping[str, Joint]) -> list[Join
 
 
 def arrange(
-    base: str, links: Mapping[str, Link], joints: Sequence[Joint], gravity: np.ndarray
+    base: str,
+    links: Mapping[str, Link],
+    joints: Sequence[Joint],
+    gravity: np.ndarray,
+    couplings: Sequence[Coupling] = (),
 ) -> tuple[Tree, dict[str, Frame]]:
     """Merge fixed links, turn the axes of all joints to z, and lay the bodies out for the scans.
 
@@ -141,6 +203,8 @@ def arrange(
     identity, zero = np.eye(3), np.zeros(3)
     frames = {base: Frame(-1, zero, identity)}
     parents, placements, masses, moving = [], [], [], []
+    lifted: dict[int, list[tuple[Any, Any]]] = {}
+    _lift(lifted, frames[base], links[base])
     for joint in joints:
         body, position, rotation = frames[joint.parent]
         position, rotation = position + rotation @ joint.position, rotation @ joint.rotation
@@ -152,6 +216,7 @@ def arrange(
             masses.append([])
             body, position, rotation = len(moving) - 1, zero, aligned.T
         frames[joint.child] = Frame(body, position, rotation)
+        _lift(lifted, frames[joint.child], links[joint.child])
         inertia = links[joint.child].inertia
         if inertia is not None and body >= 0:
             masses[body].append(inertia.moved(position, rotation))
@@ -161,11 +226,15 @@ def arrange(
     mimics = [joint.mimic or Mimic(joint.name) for joint in moving]  # each follows another, or itself
     coordinate = np.array([order.index(mimic.joint) for mimic in mimics], int)
     multiplier = np.array([mimic.multiplier for mimic in mimics], float)
-    weights = {"armature": multiplier**2, "damping": multiplier**2, "friction": np.abs(multiplier)}
-    drives = {  # what those of all joints make together at each coordinate, by virtual work
-        field: np.bincount(coordinate, weight * [getattr(joint, field) for joint in moving], len(order)).astype(float)
-        for field, weight in weights.items()
+    friction = np.array([np.broadcast_to(joint.friction, 2) for joint in moving]).reshape(-1, 2) @ FORWARD_BACKWARD
+    parts = {  # by virtual work of those of each joint
+        "armature": multiplier**2 * [joint.armature for joint in moving],
+        "damping": multiplier**2 * [joint.damping for joint in moving],
+        "friction": np.abs(multiplier) * friction[:, 0],
+        "friction_skew": multiplier * friction[:, 1],
     }
+    drives = {field: np.bincount(coordinate, part, len(order)).astype(float) for field, part in parts.items()}
+    tendons, balls = _tendons(moving, order, couplings), _balls(order, couplings)
     turning = np.array([joint.turning for joint in moving], float)
     tree = Tree(
         rotation=np.array([rotation for _, rotation in placements]).reshape(bodies, 3, 3),
@@ -181,6 +250,10 @@ def arrange(
         parent_slot=np.array(parent_slots, int),
         ancestors=_ancestors(parents),
         **drives,
+        tendons=tendons,
+        balls=balls,
+        lift=_array([sum((mass for mass, _ in lifted.get(k, ())), 0.0) for k in (*range(bodies), -1)]),
+        lift_moment=_array([sum((at for _, at in lifted.get(k, ())), zero) for k in (*range(bodies), -1)]),
         gravity=gravity,
         shape=Shape(
             bodies=bodies,
@@ -189,9 +262,49 @@ def arrange(
             turning=bool(turning.any()),
             sliding=bool((turning == 0).any()),
             direct=len(order) == bodies,
+            tendons=len(tendons.weights),
+            balls=balls.select.shape[1],
+            armed=bool(balls.armature.any()),
+            lifted=bool(lifted),
         ),
     )
     return tree, frames
+
+
+def _lift(lifted: dict[int, list[tuple[Any, Any]]], frame: Frame, link: Link) -> None:
+    """Note mass and first moment of a link, in its body, as far as gravity does not pull at it."""
+    if link.inertia is None or link.gravity == 1:
+        return
+    inertia = link.inertia.moved(frame.position, frame.rotation)
+    mass = inertia.mass * (1.0 - link.gravity)
+    lifted.setdefault(frame.body, []).append((mass, mass * inertia.center_of_mass))
+
+
+def _tendons(moving: Sequence[Joint], order: Sequence[str], couplings: Sequence[Coupling]) -> Tendons:
+    """Return springs of joints and tendons; a joint that follows counts through the one that it follows."""
+    rows = [
+        ({joint.name: 1.0}, joint.stiffness, joint.spring_reference, 0.0, 0.0) for joint in moving if joint.stiffness
+    ]
+    lines = [line for line in couplings if isinstance(line, Tendon)]
+    rows += [(line.weights, line.stiffness, line.rest, line.damping, line.friction) for line in lines]
+    by_name = {joint.name: joint for joint in moving}
+    weights, numbers = np.zeros((len(rows), len(order))), []
+    for k, (given, stiffness, rest, *others) in enumerate(rows):
+        for name, weight in given.items():
+            mimic = by_name[name].mimic or Mimic(name)
+            weights[k, order.index(mimic.joint)] += weight * mimic.multiplier
+            rest -= weight * mimic.offset
+        numbers.append((stiffness, rest, *others))
+    return Tendons(weights, *np.array(numbers, float).reshape(-1, 4).T)
+
+
+def _balls(order: Sequence[str], couplings: Sequence[Coupling]) -> Balls:
+    drives = [drive for drive in couplings if isinstance(drive, BallDrive)]
+    select = np.zeros((3, len(drives), len(order)))
+    for b, drive in enumerate(drives):
+        for k, name in enumerate(drive.joints):
+            select[k, b, order.index(name)] = 1.0
+    return Balls(select, *(np.array([getattr(x, key) for x in drives], float) for key in OF_BALL))
 
 
 def _array(parts: list[Any]) -> Any:

@@ -19,6 +19,7 @@ from jounce.modules import Module
 from jounce.rigid.spatial import body_axes, quaternion_spins
 from jounce.robot.model.tree import Frame, Tree
 from jounce.robot.recursions.articulated_bodies import ArticulatedBodies, RigidInertia
+from jounce.robot.recursions.drive_forces import ball_spin, inertial_forces, passive_forces, spring_energy
 from jounce.robot.recursions.newton_euler import Turn
 from jounce.robot.recursions.tree_scan import fill_slots, of_one_body, read_slot, to_coordinates, write_slot
 from jounce.robot.recursions.tree_sums import sums_at_parents, totals
@@ -140,7 +141,7 @@ class TreeEquations(Module):
         tree = self.tree
         armature = jnp.asarray(tree.armature) if self.drives else jnp.zeros(tree.shape.coordinates)
         free = 1.0 - jnp.asarray(self.driven)
-        if tree.shape.direct:
+        if tree.shape.direct and not tree.shape.armed:
             inertia = _turned_inertia(motion.axes, tree.mass, tree.center, tree.inertia)
             base = None
             if self.base is not None and motion.base is not None:
@@ -150,7 +151,7 @@ class TreeEquations(Module):
         return TreeFactor(None, self._coupled(motion, free), free, motion.base)
 
     def _coupled(self, motion: TreeState, free: Any) -> tuple[DenseFactor, Any]:
-        """Return the factored mass matrix of a tree in which joints follow others, scaled, and the scales."""
+        """Return the factored mass matrix of a tree whose drives or followers couple joints, scaled, and the scales."""
         lanes, count = motion.axes.shape[-1], self.tree.shape.coordinates
         size = count + (6 if motion.base is not None else 0)
         zero = Unknowns(jnp.zeros((count, lanes)), None if motion.base is None else jnp.zeros((6, lanes)))
@@ -206,10 +207,9 @@ class TreeEquations(Module):
             along = turning[0] * along + (1 - turning[0]) * jnp.sum(z * force, axis=0)
         forces = to_coordinates(tree, along[None])[0]
         if self.drives:
-            armature, damping, friction = (
-                jnp.asarray(x)[:, None] for x in (tree.armature, tree.damping, tree.friction)
-            )
-            forces = forces + armature * unknowns.joints + damping * motion.rates + friction * jnp.sign(motion.rates)
+            q, rate, acceleration = (Jet([x]) for x in (motion.coordinates, motion.rates, unknowns.joints))
+            needed = inertial_forces(tree, q, rate, acceleration) + passive_forces(tree, q, rate, 0)
+            forces = forces + needed.coefficients[0]
         if base is None or self.base is None:
             return Unknowns(forces, None)
         own = _of_inertia(base.axes, dataclasses.astuple(self.base), spin0, spin_rate0, shift0)
@@ -239,7 +239,7 @@ class TreeEquations(Module):
         return TreeState(motion.rates, unknowns.joints, axes, arm, moved)
 
     def energy(self, motion: TreeState) -> tuple[Float[Numbers, " batch"], Float[Numbers, " batch"]]:
-        """Return kinetic energy, that of the armatures of drives included, and potential energy in gravity, J."""
+        """Return kinetic energy, that of armatures included, and potential energy in gravity and springs, J."""
         tree, base = self.tree, motion.base
         turning = jnp.asarray(tree.turning)[None, :, None]
         nothing = jnp.zeros((3, motion.axes.shape[-1]))
@@ -259,9 +259,20 @@ class TreeEquations(Module):
             own = dataclasses.astuple(self.base)
             parts.append(_energies(base.axes, own, spin0, velocity0, place0, tree.gravity))
         kinetic, potential = (total(part[k] for part in parts) for k in (0, 1))
+        if tree.shape.lifted:
+            axes, places = (_with_base(a, b, base) for a, b in ((motion.axes, "axes"), (position, "position")))
+            first = places * jnp.asarray(tree.lift)[None, :, None]
+            first = first + _combined(axes, jnp.swapaxes(jnp.asarray(tree.lift_moment), 0, 1)[:, :, None])
+            potential = potential + jnp.sum(jnp.asarray(tree.gravity)[:, None, None] * first, axis=(0, 1))
         if self.drives:
             armature = jnp.asarray(tree.armature)[:, None]
             kinetic = kinetic + 0.5 * jnp.sum(armature * motion.rates * motion.rates, axis=0)
+            if tree.shape.balls:
+                spin = ball_spin(tree, Jet([motion.coordinates]), Jet([motion.rates])).coefficients[0]
+                inertia = jnp.asarray(tree.balls.armature)[None, :, None]
+                kinetic = kinetic + 0.5 * jnp.sum(inertia * spin * spin, axis=(0, 1))
+            if tree.shape.tendons:
+                potential = potential + spring_energy(tree, motion.coordinates)
         return kinetic, potential
 
     def _at_joints(self, values: Coordinates) -> Float[Numbers, "body batch"]:
@@ -270,13 +281,19 @@ class TreeEquations(Module):
         return jnp.take(values, jnp.asarray(self.tree.coordinate), axis=0) * jnp.asarray(self.tree.multiplier)[:, None]
 
     def _pushed(self, motion: TreeState, wrenches: Wrenches) -> Any:
-        """Return forces and moments from outside about the origins of the bodies and, last, of the base."""
-        if not wrenches:
+        """Return forces and moments from outside about the origins of the bodies and, last, of the base.
+
+        What bears bodies that gravity does not pull at is one of them.
+        """
+        tree = self.tree
+        if not wrenches and not tree.shape.lifted:
             return None
-        axes = motion.axes
-        last = axes[:, :, :1] if motion.base is None else motion.base.axes[:, :, None]
-        axes = jnp.concatenate([axes, last], axis=2)
+        axes = _with_base(motion.axes, "axes", motion.base)
         whole = jnp.zeros((6, *axes.shape[2:]))
+        if tree.shape.lifted:
+            down = jnp.broadcast_to(jnp.asarray(tree.gravity)[:, None, None], (3, *axes.shape[2:]))
+            moment = _combined(axes, jnp.swapaxes(jnp.asarray(tree.lift_moment), 0, 1)[:, :, None])
+            whole = whole - jnp.concatenate([down * jnp.asarray(tree.lift)[None, :, None], cross(moment, down)])
         for value, (body, point, rotation), in_scene in zip(wrenches, self.frames, self.global_axes, strict=True):
             own = jax.lax.dynamic_index_in_dim(axes, body, 2, keepdims=False)
             force, torque = value[:3], value[3:]
@@ -321,6 +338,16 @@ class TreeFactor(Module):
         joints, base = self.bodies.solve(missing.joints, jnp.concatenate([moment, force]))
         assert base is not None
         return Unknowns(joints, jnp.concatenate([_local(axes, base[3:]), _local(axes, base[:3])]))
+
+
+def _with_base(values: Any, field: str, base: FreeBase | None) -> Any:
+    """Return axes or positions of the bodies and, last, of the base, whose frame is the scene unless it is free."""
+    if base is not None:
+        last = getattr(base, field)
+    else:
+        start = jnp.eye(3) if field == "axes" else jnp.zeros(3)
+        last = jnp.broadcast_to(start[..., None], (*start.shape, values.shape[-1]))
+    return jnp.concatenate([values, last[..., None, :]], axis=-2)
 
 
 def free_base(position: Any, quaternion: Any, twist: Any) -> FreeBase:

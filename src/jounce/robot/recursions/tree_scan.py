@@ -36,7 +36,8 @@ def to_coordinates(tree: Tree, forces: BodySeries) -> Series:
 
 def entries(tree: Tree) -> Tree:
     """Return the arrays that have one entry for each body, which a scan takes apart."""
-    fields = ("armature", "damping", "friction", "gravity", "ancestors")
+    fields = ("armature", "damping", "friction", "friction_skew", "tendons", "balls", "gravity", "ancestors")
+    fields += ("lift", "lift_moment")
     return dataclasses.replace(jax.tree.map(jnp.asarray, tree), **dict.fromkeys(fields))
 
 

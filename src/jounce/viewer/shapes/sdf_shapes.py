@@ -9,7 +9,8 @@ from shapely.geometry import Polygon
 from trimesh import Trimesh
 
 from jounce.errors import RobotFileError
-from jounce.io.robots.sdf import model_frames
+from jounce.io.robots.faults import Faults
+from jounce.io.robots.sdf_models import chosen_model, named
 from jounce.io.robots.sdf_poses import FramePose, Frames, number_of, pose_of, text_of
 from jounce.io.robots.xml_elements import Element
 from jounce.viewer.shapes.appearance import ColoredMesh
@@ -20,7 +21,7 @@ from jounce.viewer.shapes.shapes import Shapes, colored, upright_capsule, words_
 __all__ = ["sdf_shapes"]
 
 
-def sdf_shapes(root: Element, files: MeshFiles) -> Shapes:
+def sdf_shapes(root: Element, files: MeshFiles, model: str | None = None) -> Shapes:
     """Return the shapes of an SDF file by link, in its frame; planes, height maps and what cannot be read are left out.
 
     Parameters
@@ -29,8 +30,14 @@ def sdf_shapes(root: Element, files: MeshFiles) -> Shapes:
         The element ``<sdf>`` of a file that describes a robot.
     files : MeshFiles
         Where it lies.
+    model : str, optional
+        The model of the file that is shown, needed where several of them move.
     """
-    frames = model_frames(root)[0]
+    try:
+        chosen = chosen_model(root, Faults(root.path), model, files.allow).model
+    except RobotFileError:  # several models move, and nobody says here which one is meant
+        return {}
+    frames = Frames(chosen, named(chosen))
     shapes_of_links: Shapes = {}
     for name, link in frames.elements.items():
         shown = shapes_of_links.setdefault(name, []) if link.tag == "link" else []

@@ -1,0 +1,236 @@
+"""What a robot file leaves out: loops, springs and rotors, from a small file beside it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import RobotError, no_such
+from jounce.io.files.located_data import Location, Source
+from jounce.io.files.source import read_source
+from jounce.robot.closed_loops.closures import Loops
+from jounce.robot.model.links_and_joints import CLOSURES, Closure, Joint
+from jounce.robot.robot import Robot
+from jounce.units.dimensions import Dimension, describe_dimension, dimension_of
+
+CLOSED_BY = {"fixed": "weld", "revolute": "pin", "continuous": "pin", "prismatic": "slider"}
+CLOSED_BY |= {"ball": "connect", "spherical": "connect"}
+TYPES = {**{name: name for name in CLOSURES}, **CLOSED_BY}
+OF_CLOSURE = ("type", "frames", "axis")
+OF_FRAME = ("link", "xyz", "rpy")
+OF_JOINT = ("stiffness", "reference", "damping", "friction", "rotor_inertia", "gear_ratio")
+STARTS = 16  # positions from which loops are closed before they are taken for such that cannot be
+ANGLE, LENGTH = dimension_of(angle=1), dimension_of(length=1)
+
+
+def with_closures(robot: Robot, path: str | PathLike[str]) -> Robot:
+    """Return a robot with the loops, springs and rotors of a file.
+
+    The file has the keys ``closures``, by name of the loop joint, and ``joints``, by name of a moving joint, or one of
+    them. A closure has a ``type``: revolute, continuous or pin; prismatic or slider; ball or connect; fixed or weld.
+    Its two ``frames``, each a link, or ``{link: NAME, xyz: [x, y, z], rpy: [r, p, y]}`` with the place in that link,
+    coincide where the loop is closed but for what the type leaves free. ``axis``, in the first frame, is z unless
+    given. A joint has ``stiffness`` and ``reference`` of a spring, ``damping``, ``friction`` (one value, or ``[forward,
+    backward]``), and ``rotor_inertia`` of its motor with ``gear_ratio``: what is seen at the joint is the inertia times
+    the square of the ratio. These take the place of what the robot file says. Values are numbers in SI units or have
+    a unit.
+
+    Parameters
+    ----------
+    robot : Robot
+        As its file has it.
+    path
+        A file ending in .yaml, .yml, .toml or .json.
+
+    Raises
+    ------
+    RobotError
+        The file cannot be read, something in it is wrong, or the loops cannot be closed from any of several positions:
+        the message names the file, the line and the entry.
+    """
+    return _ClosureFile(read_source(path, kind="closures", error_type=RobotError), robot).robot()
+
+
+def loop_closure(
+    name: str,
+    kind: str,
+    frames: Sequence[tuple[str, Sequence[float], Sequence[float]]],
+    axis: Sequence[float] | None = None,
+) -> Closure:
+    """Return what holds two frames together, but for what a type of joint leaves free.
+
+    Parameters
+    ----------
+    name : str
+    kind : str
+        Of a closure, or of a joint.
+    frames : sequence of two tuples of str and two sequences of 3 floats
+        Each the link, the origin in it, m, and turns about its fixed axes x, y, z, rad.
+    axis : sequence of 3 floats, optional
+        In the first frame; z unless given.
+
+    Raises
+    ------
+    RobotError
+        The links are one, or the axis has no direction.
+    """
+    from scipy.spatial.transform import Rotation
+
+    kind = TYPES[kind]
+    links, origins, turns = zip(*frames, strict=True)
+    first, second = (Rotation.from_euler("xyz", turn).as_matrix() for turn in turns)
+    direction = first @ np.asarray([0.0, 0.0, 1.0] if axis is None else axis, float)
+    axis_of = direction if kind in ("pin", "slider") else None
+    rotation = None if kind == "connect" else first @ second.T
+    return Closure(name, links, kind, np.array(origins, float), axis_of, rotation)
+
+
+class _ClosureFile:
+    """Reads closures, springs and rotors from the plain data of a file; every error has its line."""
+
+    def __init__(self, source: Source, robot: Robot):
+        self.source, self.given = source, robot
+
+    def robot(self) -> Robot:
+        """Return the robot with all that the file has."""
+        data = self.source.mapping((), ("title", "closures", "joints"))
+        if not {"closures", "joints"} & data.keys():
+            raise self.source.error("the file has neither closures nor joints", value=list(data))
+        robot = self.given
+        if "joints" in data:
+            changed = {name: self._joint(name) for name in self.source.mapping(("joints",))}
+            robot = robot.changed(joints=[changed.get(name, joint) for name, joint in robot.joints.items()])
+        if "closures" not in data:
+            return robot
+        closures = []
+        for name in self.source.mapping(("closures",)):
+            if name in robot.closures or name in robot.joints:
+                raise self.source.error("a joint or closure of the robot file has this name", ("closures", name))
+            closures.append(self._closure(name))
+        try:
+            robot = robot.with_closures(closures)
+            _check_closed(robot)
+        except RobotError as error:
+            at = tuple((error.name or "closures").split(".")[:2])
+            raise self.source.error(error.message, at if self.source.at(at) is not None else ("closures",)) from None
+        return robot
+
+    def _joint(self, name: str) -> Joint:
+        at = ("joints", name)
+        joint = self.given.joints.get(name)
+        moving = [x.name for x in self.given.moving_joints]
+        if joint is None or not joint.moving:
+            raise self.source.error(no_such("moving joint", name, moving), at)
+        entry = self.source.mapping(at, OF_JOINT)
+        changes: dict[str, Any] = {}
+        for key in ("stiffness", "damping"):
+            if key in entry:
+                changes[key] = self._number((*at, key), entry[key], _dimensions(key, joint.turning))
+        if "reference" in entry:
+            kind = (ANGLE,) if joint.turning else (LENGTH,)
+            changes["spring_reference"] = self._number((*at, "reference"), entry["reference"], kind)
+        if "friction" in entry:
+            raw, place = entry["friction"], (*at, "friction")
+            parts = raw if isinstance(raw, list) else [raw]
+            numbers = [self._number(place, part, _dimensions("friction", joint.turning)) for part in parts]
+            if len(numbers) not in (1, 2):
+                raise self.source.error("must be one value, or two: forward and backward", place, value=raw)
+            changes["friction"] = numbers if len(numbers) > 1 else numbers[0]
+        if "gear_ratio" in entry and "rotor_inertia" not in entry:
+            raise self.source.error("is of no use without rotor_inertia", (*at, "gear_ratio"))
+        if "rotor_inertia" in entry:
+            kinds = _dimensions("rotor_inertia", joint.turning)
+            inertia = self._number((*at, "rotor_inertia"), entry["rotor_inertia"], kinds)
+            ratio = self._number((*at, "gear_ratio"), entry.get("gear_ratio", 1.0), ())
+            changes["armature"] = inertia * ratio**2
+        try:
+            return dataclasses.replace(joint, **changes)
+        except RobotError as error:
+            key = {"spring_reference": "reference", "armature": "rotor_inertia"}
+            last = (error.name or "").rpartition(".")[2]
+            raise self.source.error(error.message, (*at, key.get(last, last)), value=error.value) from None
+
+    def _closure(self, name: str) -> Closure:
+        at = ("closures", name)
+        entry = self.source.mapping(at, OF_CLOSURE)
+        kind = entry.get("type")
+        if kind not in TYPES:
+            raise self.source.error(no_such("closure", kind, TYPES, "type"), (*at, "type"), value=kind)
+        frames = entry.get("frames")
+        if not isinstance(frames, list) or len(frames) != 2:
+            raise self.source.error(
+                "must be two frames, each a link or {link, xyz, rpy}", (*at, "frames"), value=frames
+            )
+        placed = [self._frame((*at, "frames"), frame) for frame in frames]
+        axis = None
+        if "axis" in entry:
+            if TYPES[kind] not in ("pin", "slider"):
+                raise self.source.error(f"a closure of type {kind} has no axis", (*at, "axis"), value=entry["axis"])
+            axis = self._vector((*at, "axis"), entry["axis"], ())
+        try:
+            return loop_closure(name, kind, placed, axis)
+        except RobotError as error:
+            raise self.source.error(error.message, at, value=error.value) from None
+
+    def _frame(self, at: Location, frame: Any) -> tuple[str, list[float], list[float]]:
+        given: Mapping[str, Any] = {"link": frame} if isinstance(frame, str) else frame
+        if not isinstance(given, Mapping) or not set(given) <= set(OF_FRAME) or "link" not in given:
+            raise self.source.error("a frame is a link or {link, xyz, rpy}", at, value=frame)
+        if given["link"] not in self.given.links:
+            raise self.source.error(no_such("link", given["link"], self.given.links), at, value=given["link"])
+        xyz, rpy = (
+            self._vector(at, given.get(key, [0.0] * 3), kinds) for key, kinds in (("xyz", (LENGTH,)), ("rpy", (ANGLE,)))
+        )
+        return given["link"], xyz, rpy
+
+    def _vector(self, at: Location, raw: Any, kinds: tuple[Dimension, ...]) -> list[float]:
+        if not isinstance(raw, list) or len(raw) != 3:
+            raise self.source.error("must be three numbers", at, value=raw)
+        return [self._number(at, part, kinds) for part in raw]
+
+    def _number(self, at: Location, raw: Any, kinds: tuple[Dimension, ...]) -> float:
+        parsed = self.source.value(at, raw)
+        if parsed.dimension and parsed.dimension not in kinds:
+            of = " or ".join(describe_dimension(kind) for kind in kinds) or "a number without unit"
+            message = f"the unit is that of {describe_dimension(parsed.dimension)}; needed is {of}"
+            raise self.source.error(message, at, value=raw)
+        if not isinstance(parsed.value, float) or not math.isfinite(parsed.value):
+            raise self.source.error("must be a finite number", at, value=raw)
+        return parsed.value
+
+
+def _dimensions(key: str, turning: bool) -> tuple[Dimension, ...]:
+    """Return the dimensions that the unit of a value of a joint may have."""
+    time = {"stiffness": -2, "damping": -1, "friction": -2, "rotor_inertia": 0}[key]
+    length = 0 if not turning else 2
+    if key == "friction":
+        length = 2 if turning else 1
+    base = dimension_of(mass=1, length=length, time=time)
+    per_angle = key in ("stiffness", "damping") and turning
+    return (base, dimension_of(mass=1, length=length, time=time, angle=-1)) if per_angle else (base,)
+
+
+def _check_closed(robot: Robot) -> None:
+    """Raise RobotError if loops cannot be closed from any of several positions within the limits of the joints."""
+    loops, random = Loops(robot), np.random.default_rng(1)
+    limits = [robot.joints[name].limits for name in robot.joint_names]
+    lower = np.array([-math.pi / 2 if x.lower is None else x.lower for x in limits])
+    upper = np.array(
+        [max(math.pi / 2, low) if x.upper is None else x.upper for x, low in zip(limits, lower, strict=True)]
+    )
+    lower = np.minimum(lower, upper)
+    first: RobotError | None = None
+    for k in range(STARTS):
+        q = np.zeros(len(lower)) if k == 0 else random.uniform(lower, upper)
+        try:
+            loops.closed(q)
+            return
+        except RobotError as error:
+            first = first or error
+    assert first is not None
+    raise first

@@ -1,0 +1,134 @@
+"""What drives the joints of a compiled MJCF model: armature, damping, friction, springs, and tendons along joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.robot.model.couplings import BallDrive, Tendon
+
+OF_BALL = {"armature": "armature", "damping": "damping", "friction": "frictionloss"}
+
+
+class Drives:
+    """Drives of joints, as MuJoCo computes them.
+
+    Parameters
+    ----------
+    model, mujoco
+        The compiled model, and the package.
+    names : sequence of str
+        Of the joints, by number.
+    """
+
+    def __init__(self, model: Any, mujoco: Any, names: Sequence[str]):
+        self.model, self.mujoco, self.names = model, mujoco, names
+        self.efforts = _efforts(model, mujoco)
+
+    def works(self, part: str) -> bool:
+        """Whether no flag of the file takes a part of the dynamics away."""
+        return not self.model.opt.disableflags & int(getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{part}"))
+
+    @property
+    def passive(self) -> bool:
+        """Whether there are passive forces; MuJoCo leaves all out where it leaves out springs and dampers both."""
+        return self.works("SPRING") or self.works("DAMPER")
+
+    def of_joint(self, j: int) -> tuple[dict[str, float], str]:
+        """Return what drives a hinge or a slide, and which part of it is no single number, empty if none is.
+
+        Armature and damping are with those of its actuators times the square of the gear.
+        """
+        model, dof = self.model, self.model.jnt_dofadr[j]
+        armature, damping = float(model.dof_armature[dof]), float(model.dof_damping[dof])
+        several = "damping" if model.dof_dampingpoly[dof].any() else ""
+        for k in np.flatnonzero(model.actuator_trnid[:, 0] == j):
+            gear = float(model.actuator_gear[k, 0]) ** 2
+            if np.any(model.actuator_dampingpoly[k]):
+                several = "damping of an actuator"
+            armature += gear * float(model.actuator_armature[k])
+            damping += gear * float(np.ravel(model.actuator_damping[k])[0])
+        given = {
+            "armature": armature,
+            "damping": damping if self.works("DAMPER") else 0.0,
+            "friction": float(model.dof_frictionloss[dof]) if self.works("FRICTIONLOSS") else 0.0,
+        }
+        if single_spring(model, j) and self.works("SPRING"):
+            given["stiffness"] = float(model.jnt_stiffness[j])
+            given["spring_reference"] = float(model.qpos_spring[model.jnt_qposadr[j]])
+        return given, several
+
+    def of_several(self, j: int) -> dict[str, float]:
+        """Return what drives a ball or free joint, alike along all that it leaves free."""
+        dof = self.model.jnt_dofadr[j]
+        on = {"armature": True, "damping": self.works("DAMPER"), "friction": self.works("FRICTIONLOSS")}
+        values = {key: float(getattr(self.model, f"dof_{name}")[dof]) for key, name in OF_BALL.items()}
+        return {key: value if on[key] else 0.0 for key, value in values.items()}
+
+    def ball(self, name: str, turns: Sequence[str], given: Mapping[str, float]) -> list[BallDrive]:
+        """Return the drive of three turns, none if nothing drives them."""
+        return [BallDrive(name, turns, **given)] if any(given.values()) else []
+
+    def compensated(self, body: int) -> float:
+        """Return the share of gravity that is taken off a body."""
+        known = self.passive and not self.model.jnt_actgravcomp.any()
+        return float(self.model.body_gravcomp[body]) if known else 0.0
+
+    def tendons(self, fixed: Mapping[str, float]) -> list[Tendon]:
+        """Return the tendons along joints that have a spring, damping or friction, but for joints that are held."""
+        model, made = self.model, []
+        for k in range(model.ntendon):
+            if not along_joints(model, k, self.mujoco):
+                continue
+            parts = range(int(model.tendon_adr[k]), int(model.tendon_adr[k]) + int(model.tendon_num[k]))
+            weights: dict[str, float] = {}
+            for part in parts:
+                name = self.names[int(model.wrap_objid[part])]
+                weights[name] = weights.get(name, 0.0) + float(model.wrap_prm[part])
+            rest = model.tendon_lengthspring[k]
+            springs = self.works("SPRING") and rest[0] == rest[1]
+            given = {
+                "stiffness": float(model.tendon_stiffness[k]) if springs else 0.0,
+                "damping": float(model.tendon_damping[k]) if self.works("DAMPER") else 0.0,
+                "friction": float(model.tendon_frictionloss[k]) if self.works("FRICTIONLOSS") else 0.0,
+            }
+            if any(given.values()) and not set(weights) <= set(fixed):
+                name = model.tendon(k).name or f"tendon_{k}"
+                made.append(Tendon(name, weights, rest=float(rest[0]), **given))
+        return made
+
+
+def single_spring(model: Any, j: int) -> bool:
+    """Whether the spring of a joint is linear and holds one coordinate."""
+    single = model.jnt_type[j] >= 2
+    return bool(single and not model.jnt_stiffnesspoly[j].any())
+
+
+def along_joints(model: Any, tendon: int, mujoco: Any) -> bool:
+    """Whether a tendon runs along joints, and not between points."""
+    first = int(model.tendon_adr[tendon])
+    kinds = model.wrap_type[first : first + int(model.tendon_num[tendon])]
+    return bool(np.all(kinds == int(mujoco.mjtWrap.mjWRAP_JOINT)))
+
+
+def _efforts(model: Any, mujoco: Any) -> dict[int, float]:
+    """Return the largest force of each joint where its own range, or that of its only actuator, is symmetric."""
+    efforts: dict[int, float] = {}
+    for j in range(model.njnt):
+        actuators = np.flatnonzero(model.actuator_trnid[:, 0] == j)
+        ranges = [model.jnt_actfrcrange[j]] if model.jnt_actfrclimited[j] else []
+        if len(actuators) == 1:
+            k = actuators[0]
+            gear = float(model.actuator_gear[k, 0])
+            types = [int(getattr(model, f"actuator_{name}type")[k]) for name in ("gain", "bias", "dyn")]
+            simple = (mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtDyn.mjDYN_NONE)
+            if model.actuator_forcelimited[k]:
+                ranges.append(model.actuator_forcerange[k] * gear)
+            elif types == [int(kind) for kind in simple] and model.actuator_ctrllimited[k]:
+                ranges.append(model.actuator_ctrlrange[k] * model.actuator_gainprm[k, 0] * gear)
+        symmetric = [float(abs(high)) for low, high in ranges if low == -high and high != 0]
+        if symmetric:
+            efforts[j] = min(symmetric)
+    return efforts

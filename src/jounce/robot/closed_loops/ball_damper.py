@@ -1,0 +1,40 @@
+"""Damping and friction of a ball, against the angular velocity of one body relative to another."""
+
+import jax.numpy as jnp
+
+from jounce.constraints.base import Scalar
+from jounce.forces.base import AbstractForce
+from jounce.jet import Jet, sign
+from jounce.rigid import SpatialPose
+
+
+class BallDamper(AbstractForce, space="spatial"):
+    """Moment against the angular velocity of body j relative to body i, alike about all axes.
+
+    ``M = -damping w - friction sign(w)``, each component along an axis of body j.
+    """
+
+    damping: Scalar  # N m s/rad
+    friction: Scalar = 0.0  # N m
+
+    unit = "N*m"
+    dimensions = {"damping": "torsional damping", "friction": "torque"}
+    symbol = "rotation"
+
+    def displacement(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:  # noqa: ARG002
+        """Return nothing that changes."""
+        # no vector changes at the rate of an angular velocity: what the moment works on is told by the rates below
+        return Jet.constant(jnp.zeros_like(body_j.position.coefficients[0]), body_j.order)
+
+    def velocity(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:  # noqa: ARG002
+        """Return the relative angular velocity in axes of body j."""
+        return body_j.to_body(body_j.global_angular_velocity() - body_i.global_angular_velocity())
+
+    def variation(self, bodies: tuple[SpatialPose, ...], changes: tuple[SpatialPose, ...], time: Jet) -> Jet:  # noqa: ARG002
+        """Return the relative turn in axes of body j."""
+        carried = bodies[0].direction(bodies[0].turning(changes[0]))
+        return bodies[1].turning(changes[1]) - bodies[1].to_body(carried)
+
+    def force(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:  # noqa: ARG002
+        """Return the moment on body j."""
+        return -(velocity * self.damping + sign(velocity) * self.friction)

@@ -1,0 +1,169 @@
+"""What acts on several joints at once: tendons along joints, and drives of balls."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import RobotError, check_name
+from jounce.rigid.inertia import finite_numbers
+
+OF_TENDON = ("stiffness", "rest", "damping", "friction")
+OF_BALL = ("armature", "damping", "friction")
+
+
+def _check_numbers(coupling: Any, fields: Sequence[str]) -> None:
+    """Replace the values of fields by numbers, all but ``rest`` zero or greater."""
+    for field in fields:
+        where = f"couplings.{coupling.name}.{field}"
+        value = float(finite_numbers(where, getattr(coupling, field), ()))
+        if value < 0 and field != "rest":
+            raise RobotError("must be zero or greater", name=where, value=value)
+        object.__setattr__(coupling, field, value)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Tendon:
+    """A line along joints, whose length is a weighted sum of their coordinates, with a spring, a damper and friction.
+
+    Parameters
+    ----------
+    name : str
+        Name of the tendon.
+    weights : dict of str to float
+        What a unit of each coordinate adds to the length, m/rad or 1.
+    stiffness : float, default 0
+        Of the spring, N by the unit of the length.
+    rest : float, default 0
+        Length at which the spring is free.
+    damping : float, default 0
+        Viscous friction.
+    friction : float, default 0
+        Coulomb friction, N.
+
+    Raises
+    ------
+    RobotError
+        If a value is not finite, or one but `rest` is negative.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> links = [jn.Link("base"), jn.Link("a", jn.Inertia(1.0)), jn.Link("b", jn.Inertia(1.0))]
+    >>> joints = [jn.Joint("x", "base", "a", "prismatic"), jn.Joint("y", "a", "b", "prismatic")]
+    >>> line = jn.robot.Tendon("line", {"x": 1.0, "y": 2.0}, stiffness=10.0)
+    >>> robot = jn.Robot("two", links, joints, gravity=[0, 0, 0], couplings=[line])
+    >>> jn.inverse_dynamics(robot, [[0.0, 0.5], [0, 0], [0, 0]]).round(9).tolist()  # 10 * (2 * 0.5) by each weight
+    [[10.0, 20.0]]
+    """
+
+    name: str
+    weights: Mapping[str, float]
+    stiffness: float = 0.0
+    rest: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, OF_TENDON)
+        where = f"couplings.{self.name}.weights"
+        numbers = {joint: float(finite_numbers(f"{where}.{joint}", x, ())) for joint, x in self.weights.items()}
+        object.__setattr__(self, "weights", numbers)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints that it runs along."""
+        return tuple(self.weights)
+
+    def locked(self, positions: Mapping[str, float]) -> Tendon | None:
+        """Return the tendon of a robot some of whose joints are held; None if all of its own are."""
+        held = {joint for joint in self.weights if joint in positions}
+        left = {joint: weight for joint, weight in self.weights.items() if joint not in held}
+        rest = self.rest - sum(self.weights[joint] * positions[joint] for joint in held)
+        return dataclasses.replace(self, weights=left, rest=rest) if left else None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class BallDrive:
+    """Armature, damping and friction against the relative angular velocity of three turns that are one ball.
+
+    Parameters
+    ----------
+    name : str
+        Name of the ball.
+    joints : sequence of str
+        Its three turns, each about an axis of the frame moved by those before: z, y and x.
+    armature : float, default 0
+        Inertia against the relative angular acceleration, alike about all axes, kg m^2.
+    damping : float, default 0
+        Viscous friction, N m s/rad.
+    friction : float, default 0
+        Coulomb friction about each axis of the moved link, N m.
+
+    Raises
+    ------
+    RobotError
+        If there are not three joints, or a value is not finite or negative.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> drive = jn.robot.BallDrive("hip", ("hip_z", "hip_y", "hip_x"), damping=0.2)
+    >>> drive.damping
+    0.2
+    """
+
+    name: str
+    joints: Sequence[str]
+    armature: float = 0.0
+    damping: float = 0.0
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_numbers(self, OF_BALL)
+        joints = () if isinstance(self.joints, str) else tuple(self.joints)
+        if len(set(joints)) != 3:
+            raise RobotError("must be three joints", name=f"couplings.{self.name}.joints", value=self.joints)
+        object.__setattr__(self, "joints", joints)
+
+    def locked(self, positions: Mapping[str, float]) -> BallDrive | None:
+        """Return the drive of a robot some of whose joints are held; None if all three turns are."""
+        held = [joint for joint in self.joints if joint in positions]
+        if held and len(held) < 3:
+            message = f"is one turn of the ball {self.name}, which has armature, damping or friction; hold all three"
+            raise RobotError(message, name=f"locked.{held[0]}", value=positions[held[0]])
+        return None if held else self
+
+
+Coupling = Tendon | BallDrive
+
+
+def check_coupling(coupling: Any, joints: Mapping[str, Any], free: Collection[str]) -> None:
+    """Raise RobotError unless a coupling is of joints that move, and those of a ball are turns z, y, x of it.
+
+    Parameters
+    ----------
+    coupling : Tendon or BallDrive
+    joints : dict of str to Joint
+        Of the robot.
+    free : collection of str
+        Those that follow no other.
+    """
+    moving = [name for name, joint in joints.items() if joint.moving]
+    names = free if isinstance(coupling, BallDrive) else moving
+    where = f"couplings.{coupling.name}"
+    for name in coupling.joints:
+        check_name("moving joint", name, names, RobotError, name=where)
+    if not isinstance(coupling, BallDrive):
+        return
+    turns = [joints[name] for name in coupling.joints]
+    chained = all(first.child == second.parent for first, second in itertools.pairwise(turns))
+    beside = any(np.any(turn.position) or np.any(turn.rotation != np.eye(3)) for turn in turns[1:])
+    axes = np.array([turn.axis for turn in turns])
+    if not chained or beside or not all(turn.turning for turn in turns) or np.any(axes != np.eye(3)[::-1]):
+        message = "must be three turns in a row about z, y and x at one point, as those of a ball"
+        raise RobotError(message, name=f"{where}.joints", value=list(coupling.joints))

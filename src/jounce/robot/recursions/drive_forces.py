@@ -1,0 +1,135 @@
+"""What the drives of joints need: armature, damping, Coulomb friction, springs and tendons, and drives of balls.
+
+Written once on jets; the equations of motion of an instant are jets of order zero.
+"""
+
+from typing import Any
+
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from jounce.jet import Jet, cos, sin
+from jounce.jet.algebra import stacked, total
+from jounce.robot.model.tree import Tree
+from jounce.shapes import Numbers
+
+
+def passive_forces(tree: Tree, q: Jet, rate: Jet, order: int) -> Jet:
+    """Return what damping, friction and springs need, of shape (coordinates, batch); friction jumps at rest.
+
+    Parameters
+    ----------
+    tree : Tree
+        Arrays of the robot.
+    q, rate : Jet of shape (coordinates, batch)
+        Coordinates and their rates, to the order of the result or beyond.
+    order : int
+        Of the result.
+    """
+    q, rate = q.truncate(order), rate.truncate(order)
+    forces = rate * jnp.asarray(tree.damping)[:, None] + _held(_dry(tree.friction, rate, tree.friction_skew), order)
+    if tree.shape.tendons:
+        line = tree.tendons
+        weights = jnp.asarray(line.weights)
+        length = q.map(lambda x: weights @ x) - jnp.asarray(line.rest)[:, None]
+        lengthening = rate.map(lambda x: weights @ x)
+        along = length * jnp.asarray(line.stiffness)[:, None] + lengthening * jnp.asarray(line.damping)[:, None]
+        along = along + _held(_dry(line.friction, lengthening), order)
+        forces = forces + along.map(lambda x: weights.T @ x)
+    if tree.shape.balls:
+        ball = tree.balls
+        axes = _ball_axes(tree, q)
+        spin = [_product(axis, _turns_of(tree, rate)) for axis in axes]
+        moments = [part * jnp.asarray(ball.damping)[:, None] + _held(_dry(ball.friction, part), order) for part in spin]
+        forces = forces + _at_turns(tree, axes, moments)
+    return forces
+
+
+def inertial_forces(tree: Tree, q: Jet, rate: Jet, acceleration: Jet) -> Jet:
+    """Return what armatures need, of shape (coordinates, batch), to the order of the accelerations."""
+    forces = acceleration * jnp.asarray(tree.armature)[:, None]
+    if not tree.shape.armed:
+        return forces
+    order = acceleration.order
+    q, rate = q.truncate(order), rate.truncate(order)
+    angle = _turns_of(tree, q)[1]
+    sine, cosine = sin(angle), cos(angle)
+    (psi, theta, phi), (psi2, theta2, phi2) = _turns_of(tree, rate), _turns_of(tree, acceleration)
+    inertia = jnp.asarray(tree.balls.armature)[:, None]
+    moments = [
+        psi2 - phi2 * sine - phi * theta * cosine,
+        theta2 + phi * psi * cosine,
+        phi2 - psi2 * sine - psi * theta * cosine,
+    ]
+    return forces + _to_coordinates(tree, [part * inertia for part in moments])
+
+
+def armature_matrix(tree: Tree, q: Jet) -> Float[Numbers, "order coordinate coordinate batch"]:
+    """Return what armatures add to the mass matrix, as Taylor coefficients."""
+    diagonal = jnp.diag(jnp.asarray(tree.armature))[:, :, None]
+    constant = Jet.constant(jnp.broadcast_to(diagonal, (*diagonal.shape[:2], q.shape[-1])), q.order)
+    if not tree.shape.armed:
+        return stacked(constant)
+    select, inertia = jnp.asarray(tree.balls.select), jnp.asarray(tree.balls.armature)
+    same = jnp.einsum("kbi,kbj,b->ij", select, select, inertia)[:, :, None]
+    across = jnp.einsum("bi,bj,b->ijb", select[0], select[2], inertia)
+    across = across + jnp.swapaxes(across, 0, 1)
+    mixed = sin(_turns_of(tree, q)[1]).map(lambda x: jnp.einsum("ijb,bs->ijs", across, x))
+    return stacked(constant + same - mixed)
+
+
+def spring_energy(tree: Tree, q: Float[Numbers, "coordinate batch"]) -> Float[Numbers, " batch"]:
+    """Return the energy that springs have stored, J."""
+    line = tree.tendons
+    length = jnp.asarray(line.weights) @ q - jnp.asarray(line.rest)[:, None]
+    return 0.5 * jnp.sum(jnp.asarray(line.stiffness)[:, None] * length * length, axis=0)
+
+
+def ball_spin(tree: Tree, q: Jet, rate: Jet) -> Jet:
+    """Return the relative angular velocity of balls in the axes of the link that carries them, (3, balls, batch)."""
+    first, second, _ = _turns_of(tree, q)
+    psi, theta, phi = _turns_of(tree, rate)
+    s_theta, c_theta, s_psi, c_psi = sin(second), cos(second), sin(first), cos(first)
+    parts = [phi * c_theta * c_psi - theta * s_psi, phi * c_theta * s_psi + theta * c_psi, psi - phi * s_theta]
+    return Jet(jnp.stack(level) for level in zip(*(part.dense().coefficients for part in parts), strict=True))
+
+
+def _held(values: Any, order: int) -> Jet:
+    return Jet.constant(values, order)
+
+
+def _dry(friction: Any, rate: Jet, skew: Any = None) -> Any:
+    """Return Coulomb friction for the sign that the rate has, zero at rest."""
+    sign = jnp.sign(rate.coefficients[0])
+    force = jnp.asarray(friction)[:, None] * sign
+    return force if skew is None else force + jnp.asarray(skew)[:, None] * jnp.abs(sign)
+
+
+def _turns_of(tree: Tree, values: Jet) -> list[Jet]:
+    """Return what belongs to the three turns of each ball, each of shape (balls, batch)."""
+    select = jnp.asarray(tree.balls.select)
+    return [values.map(lambda x, k=k: select[k] @ x) for k in range(3)]
+
+
+def _product(a: list[Jet], b: list[Jet]) -> Jet:
+    return total(x * y for x, y in zip(a, b, strict=True))
+
+
+def _ball_axes(tree: Tree, q: Jet) -> list[list[Jet]]:
+    """Return what the rates of the turns z, y, x add to each component of the spin in the axes of the moved link."""
+    _, theta, phi = _turns_of(tree, q)
+    s, c, s_phi, c_phi = sin(theta), cos(theta), sin(phi), cos(phi)
+    zero, one = Jet.constant(jnp.zeros(theta.shape), q.order), Jet.constant(jnp.ones(theta.shape), q.order)
+    return [[-s, zero, one], [c * s_phi, c_phi, zero], [c * c_phi, -s_phi, zero]]
+
+
+def _at_turns(tree: Tree, axes: list[list[Jet]], moments: list[Jet]) -> Jet:
+    """Return forces of coordinates that do the work of moments in the axes of the moved links."""
+    each = [_product([axes[i][k] for i in range(3)], moments) for k in range(3)]
+    return _to_coordinates(tree, each)
+
+
+def _to_coordinates(tree: Tree, moments: list[Jet]) -> Jet:
+    select = jnp.asarray(tree.balls.select)
+    parts = [part.map(lambda x, k=k: select[k].T @ x) for k, part in enumerate(moments)]
+    return parts[0] + parts[1] + parts[2]

@@ -1,0 +1,145 @@
+"""Worlds of several models, nested and included ones: each is where SDF places it, and one is chosen by its name."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import jounce as jn
+
+BODY = "<inertial><pose>0.1 0 0 0 0 0</pose><mass>2</mass>"
+BODY += "<inertia><ixx>0.1</ixx><iyy>0.2</iyy><izz>0.2</izz></inertia></inertial>"
+
+
+def link(name, pose="", more=""):
+    return f'<link name="{name}">{f"<pose>{pose}</pose>" if pose else ""}{BODY}{more}</link>'
+
+
+def joint(name, parent, child, axis="0 1 0", kind="revolute", more=""):
+    inside = "" if kind == "fixed" else f"<axis><xyz>{axis}</xyz>{more}</axis>"
+    return f'<joint name="{name}" type="{kind}"><parent>{parent}</parent><child>{child}</child>{inside}</joint>'
+
+
+def arm(name="arm", pose="0 0 0 0 0 0", attributes="", axis="0 1 0"):
+    parts = link("base") + link("rod", "0.5 0 0.2 0.1 0.2 0.3") + joint("j", "base", "rod", axis)
+    return f'<model name="{name}"{attributes}><pose>{pose}</pose>{parts}</model>'
+
+
+STILL = f'<model name="table"><static>true</static>{link("top")}</model>'
+
+
+def read(tmp_path, inside, version="1.9", name="robot.sdf", **options):
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(f'<?xml version="1.0"?>\n<sdf version="{version}">{inside}</sdf>')
+    return jn.load_robot(path, **options)
+
+
+def world(*parts):
+    return f'<world name="w">{"".join(parts)}</world>'
+
+
+def test_the_one_model_that_moves_is_taken(tmp_path):
+    robot = read(tmp_path, world(STILL, arm(pose="1 2 3 0 0 0"), f'<model name="box">{link("cube")}</model>'))
+    assert (robot.name, robot.joint_names) == ("arm", ("j",))
+    q = np.array([[0.3], [0.1], [0.2]])
+    np.testing.assert_allclose(
+        jn.inverse_dynamics(robot, q), jn.inverse_dynamics(read(tmp_path, arm()), q), rtol=0, atol=1e-14
+    )
+
+
+def test_of_several_one_is_named(tmp_path):
+    several = world(arm("left"), arm("right", axis="1 0 0"))
+    with pytest.raises(
+        jn.errors.RobotFileError, match=r"holds 2 models that move, got .*; choose one with model=NAME"
+    ) as caught:
+        read(tmp_path, several)
+    assert (caught.value.line, caught.value.value) == (2, ["left", "right"])
+    np.testing.assert_allclose(read(tmp_path, several, model="right").joints["j"].axis, [1, 0, 0], atol=1e-15)
+    with pytest.raises(jn.errors.RobotFileError, match=r"no model has this name.*did you mean .right."):
+        read(tmp_path, several, model="rigth")
+    with pytest.raises(jn.errors.RobotFileError, match="two models of one world have this name, the first in line 2"):
+        read(tmp_path, world(arm("left"), arm("left")))
+
+
+@pytest.mark.parametrize("placement", ["", ' placement_frame="rod"'])
+@pytest.mark.parametrize("version", ["1.4", "1.9"])
+def test_a_nested_model_is_where_it_is_placed(tmp_path, version, placement):
+    pose = [0.3, -0.2, 0.5, 0.4, -0.3, 0.2]
+    nested = arm("inner", " ".join(map(str, pose)), placement)
+    whole = read(
+        tmp_path,
+        f'<model name="outer">{link("root")}{nested}{joint("mount", "root", "inner::base", kind="fixed")}</model>',
+        version=version,
+    )
+    assert whole.joint_names == ("inner::j",)
+    turn, at = Rotation.from_euler("xyz", pose[3:]), np.array(pose[:3])
+    own_turn, own_at = Rotation.from_euler("xyz", [0.1, 0.2, 0.3]), np.array([0.5, 0, 0.2])
+    if placement:  # the pose is that of the rod
+        turn, at = turn * own_turn.inv(), at - (turn * own_turn.inv()).apply(own_at)
+    frame = whole.frames["inner::base"]
+    np.testing.assert_allclose(frame.position, at, atol=1e-12)
+    np.testing.assert_allclose(frame.rotation, turn.as_matrix(), atol=1e-12)
+    moved = jn.forward_kinematics(whole, np.zeros((1, 1)), "inner::rod")
+    np.testing.assert_allclose(moved.position[0], at + turn.apply(own_at), atol=1e-12)
+    along = [0, 1, 0] if version == "1.4" else own_turn.apply([0, 1, 0])  # of old, in the axes of the model
+    axis = moved.rotation[0] @ whole.joints["inner::j"].axis
+    np.testing.assert_allclose(axis, turn.apply(along), atol=1e-12)
+
+
+def test_included_models_are_read_where_they_lie(tmp_path):
+    read(tmp_path, arm(), name="part/model.sdf")
+    include = "<include><uri>model://part</uri><name>second</name><pose>1 0 0 0 0 0</pose></include>"
+    whole = read(tmp_path, f'<model name="outer">{link("root")}{include}{joint("m", "root", "second::base")}</model>')
+    assert whole.joint_names == ("m", "second::j")
+    np.testing.assert_allclose(whole.frames["second::base"].body, 0)
+    assert read(tmp_path, world(STILL, include)).name == "second"
+
+
+def test_a_merged_model_keeps_its_names(tmp_path):
+    read(tmp_path, arm(), name="part/model.sdf")
+    include = '<include merge="true"><uri>part</uri><pose>1 0 0 0 0 0</pose></include>'
+    whole = read(tmp_path, f'<model name="outer">{link("root")}{include}{joint("m", "root", "base")}</model>')
+    assert whole.joint_names == ("m", "j")
+    np.testing.assert_allclose(
+        jn.forward_kinematics(whole, np.zeros((1, 2)), "base").position[0], [1, 0, 0], atol=1e-12
+    )
+
+
+def test_what_is_included_and_not_there_is_told(tmp_path):
+    with pytest.warns(
+        jn.errors.RobotWarning, match=r"models that the world includes and that are not there: model://sun"
+    ):
+        read(tmp_path, world("<include><uri>model://sun</uri></include>", arm()))
+    with pytest.raises(jn.errors.RobotFileError, match=r"there is no such model, got .*; put it beside the file"):
+        read(tmp_path, f'<model name="outer">{link("root")}<include><uri>model://arm</uri></include></model>')
+
+
+def test_models_that_include_one_another_are_refused(tmp_path):
+    circle = f'<model name="again">{link("a")}<include><uri>robot.sdf</uri><name>in</name></include></model>'
+    with pytest.raises(jn.errors.RobotFileError, match="include one another without end"):
+        read(tmp_path, circle)
+
+
+def test_joints_of_a_world_join_models(tmp_path):
+    joined = joint("hinge", "table::top", "arm::base", axis="0 0 1")
+    robot = read(tmp_path, world(STILL, arm(pose="0 0 1 0 0 0"), joined))
+    assert robot.joint_names == ("hinge", "arm::j")
+    assert robot.base == "world"
+    with pytest.raises(jn.errors.RobotFileError, match="no model of this world has this name"):
+        read(tmp_path, world(arm(), joint("hinge", "tabel::top", "arm::base")))
+
+
+def test_links_out_of_gravity_weigh_nothing(tmp_path):
+    parts = link("base") + link("rod", "0.5 0 0 0 0 0", "<gravity>false</gravity>") + link("tip", "1 0 0 0 0 0")
+    parts += joint("w", "world", "base", kind="fixed") + joint("j", "base", "rod") + joint("k", "rod", "tip")
+    robot = read(tmp_path, f'<model name="m">{parts}</model>')
+    torque = np.asarray(jn.inverse_dynamics(robot, np.zeros((3, 2))))[0]
+    np.testing.assert_allclose(torque, [-2 * 9.81 * 0.6, -2 * 9.81 * 0.1], rtol=1e-13)  # of the tip alone
+
+
+def test_springs_of_joints(tmp_path):
+    spring = "<dynamics><spring_stiffness>30</spring_stiffness><spring_reference>0.2</spring_reference></dynamics>"
+    parts = link("base") + link("rod") + joint("j", "base", "rod", axis="0 0 1", more=spring)
+    robot = read(tmp_path, f'<model name="m">{parts}</model>')
+    torque = np.asarray(jn.inverse_dynamics(robot, np.array([[0.5], [0.0], [0.0]])))
+    np.testing.assert_allclose(torque, [[30 * 0.3]], rtol=1e-13)
