@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from jounce.cli.options import AMONG_THE_OTHERS, RobotReading, TableOutput, errors_about, spare_inputs
 from jounce.errors import JounceError, RobotError
 from jounce.reporting.terminal import Bar, say, show_peaks
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from jounce.integrate import AbstractMethod
     from jounce.robot import Robot
 
@@ -64,6 +64,8 @@ class RobotRun:
         JounceError
             The end or their number cannot be.
         """
+        import numpy as np
+
         from jounce.units.values import parse_value
 
         if self.until is None:
@@ -80,6 +82,8 @@ class RobotRun:
 
     def state(self, robot: Robot) -> np.ndarray:
         """Return the coordinates at the start, at rest."""
+        import numpy as np
+
         from jounce.io.files.assignments import assignments
         from jounce.units.values import parse_value
 
