@@ -95,6 +95,8 @@ PICTURES = {
         module="own_joint.py",
         outline=("cam", pitch_curve),
     ),
+    "belt_drive": Picture(("rim",), 0.3, points={"rim": ("tool", (0.0, 0.064))}),
+    "block_and_tackle": Picture(("load",), 1.0, order=2),
     "camshaft": Picture(("roller",), 0.04, outline=("shaft", disc_cam)),
     "bicycle": Picture(("seat", "track"), 0.3, view=(-70.0, 14.0), stop=0.6),
     "bennett": Picture(("B", "C"), 0.25, points={"B": ("BC", (0, 0, 0))}, view=(-60.0, 30.0)),

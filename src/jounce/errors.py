@@ -400,7 +400,14 @@ class SolveError(JounceError):
 
 
 class AssemblyError(SolveError):
-    """The bodies cannot be put together from the starting guess."""
+    """The bodies cannot be put together from the starting guess.
+
+    ``details`` is all that is known of it, where the message is a short one; the command tells it with ``--verbose``.
+    """
+
+    def __init__(self, message: str, *, details: str = "", **place: Any) -> None:
+        super().__init__(message, **place)
+        self.details = details
 
 
 class DesignError(SolveError):

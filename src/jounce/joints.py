@@ -4,6 +4,7 @@ import jounce.robot as _robot
 from jounce.constraints import (
     AbstractConstraint as AbstractConstraint,
     Cam as Cam,
+    Rope as Rope,
     Scalar as Scalar,
     Vector as Vector,
     drivers as drivers,

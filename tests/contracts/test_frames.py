@@ -341,6 +341,51 @@ def teeth():
     )
 
 
+def lines():
+    """Belts on a swinging arm and to a wheel that slides away, and a rope over a crank to a weight, unbalanced."""
+    o, x = [0.0, 0.0], [1.0, 0.0]
+    massive = {"mass": 1.3, "inertia": 0.2, "center_of_mass": [0.1, -0.05]}
+    places = {"arm": o, "motor": o, "tool": [1.0, 0], "sled": [-1.5, 0.2], "weight": [2.0, -1.0], "pulley": [-1.5, 0.2]}
+    return jn.Mechanism(
+        space="planar",
+        gravity=[0.3, -9.81],
+        bodies={body: jn.Body(at, **massive) for body, at in places.items()},
+        joints={
+            "A": planar.Revolute(("ground", "arm"), o, o),
+            "M": planar.Revolute(("ground", "motor"), o, o),
+            "T": planar.Revolute(("arm", "tool"), x, o),
+            "guide": planar.Prismatic(("ground", "sled"), [0, 0.2], o, x, x),
+            "P": planar.Revolute(("sled", "pulley"), o, o),
+            "post": planar.Prismatic(("ground", "weight"), [2.0, 0], o, [0, 1], [0, 1]),
+            "open": planar.Belt(("motor", "tool"), o, o, 0.3, 0.2),
+            "wide": planar.Belt(("motor", "pulley"), o, o, 0.4, 0.1, crossed=True),
+            "rope": jn.joints.Rope(("tool", "ground", "weight"), [[0.1, 0.05], [2.0, 1.5], [0.1, 0.2]], 4.5),
+        },
+        drivers={
+            "swing": drivers.CoordinateDriver(("ground", "arm"), "angle", "0.5*t + 0.3*sin(2*t)"),
+            "spin": drivers.CoordinateDriver(("ground", "motor"), "angle", "2*t + sin(3*t)"),
+            "slide": drivers.SlideDriver(("ground", "sled"), [0, 0.2], o, x, "-1.5 + 0.2*sin(2*t)"),
+        },
+        forces={"wind": forces.PointForce("pulley", [0.1, 0.2], ["t - x", "0.3 - vx"])},
+    )
+
+
+def ropes():
+    """A lever in space that lifts a weight by a rope through two rings of the ground."""
+    return in_space(
+        6,
+        {"lever": ZERO, "weight": [1.0, 1.0, -0.6]},
+        joints={
+            "A": spatial.Revolute(("ground", "lever"), ZERO, ZERO, Z, Z),
+            "post": spatial.Prismatic(
+                ("ground", "weight"), [1, 1, 0], ZERO, [0, 0, 1], [0, 0, 1], [1, 0, 0], [1, 0, 0]
+            ),
+            "rope": jn.joints.Rope(("lever", "ground", "weight"), [C, [1.0, 1.1, 0.5], [0.1, 0.2, 0.1]], 2.0),
+        },
+        drivers={"motor": drivers.RotationDriver(("ground", "lever"), Z, wave(0.2, 0.3, 0.2, 2.0))},
+    )
+
+
 def all_in_the_plane():
     """The same in the plane."""
     o, x, y = [0.0, 0.0], [1.0, 0.1], [-0.1, 1.0]
@@ -465,7 +510,7 @@ MECHANISMS = {
     "couplings": couplings,
     "tracks": tracks,
 }
-MECHANISMS |= {"shafts": shafts, "teeth": teeth}
+MECHANISMS |= {"shafts": shafts, "teeth": teeth, "lines": lines, "ropes": ropes}
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """What cannot be solved: said by name and time, never silently wrong."""
 
 import dataclasses
+import re
 
 import jax.numpy as jnp
 import numpy as np
@@ -190,6 +191,55 @@ def test_degrees_of_freedom_are_explained(bodies, joints, drivers, message):
     )
     with pytest.raises(jn.errors.MobilityError, match=message):
         jn.solve(mechanism, [0.0])
+
+
+def wiper(**joints):
+    """A four-bar with a second arm on a tie; `joints` replaces or adds some, None takes one out."""
+    pin = jn.planar.Revolute
+    found = {
+        "O": PIN,
+        "B": pin(("crank", "rod"), [0.045, 0], [0, 0]),
+        "C": pin(("rod", "left"), [0.31, 0], [0.075, 0]),
+        "D": pin(("ground", "left"), [0.3, 0], [0, 0]),
+        "E": pin(("left", "tie"), [0.075, 0], [0, 0]),
+        "F": pin(("tie", "right"), [0.42, 0], [0.075, 0]),
+        "G": pin(("ground", "right"), [0.72, 0], [0, 0]),
+        **joints,
+    }
+    places = {"crank": (0, 0, 0), "rod": (0.045, 0, 0.26), "left": (0.3, 0, 1.6), "tie": (0.3, 0.075, 0)}
+    places["right"] = (0.72, 0, 1.6)
+    return jn.Mechanism(
+        space="planar",
+        bodies={name: jn.Body([x, y], angle) for name, (x, y, angle) in places.items()},
+        joints={name: joint for name, joint in found.items() if joint is not None},
+        drivers={"turn": TURN},
+    )
+
+
+def test_a_joint_that_was_forgotten_is_asked_for():
+    with pytest.raises(jn.errors.MobilityError) as told:
+        jn.solve(wiper(F=None), [0.0])
+    words = str(told.value)
+    assert "2 degrees of freedom are left" in words
+    assert re.search("tie (is held )?by E alone", words)
+    assert re.search("right (is held )?by G alone", words)
+    assert "is a revolute joint missing between them, bodies: [" in words
+    with pytest.raises(jn.errors.MobilityError, match=r"right (is held )?by no joint.*is a joint missing"):
+        jn.solve(wiper(F=None, G=None), [0.0])
+    with pytest.raises(jn.errors.MobilityError) as told:  # a driver is missing of the crank, and no joint
+        jn.solve(dataclasses.replace(wiper(), drivers={}), [0.0])
+    assert "missing" not in str(told.value)
+
+
+def test_constraints_that_contradict_each_other_are_told_in_one_sentence():
+    extra = jn.planar.Revolute(("ground", "tie"), [0.3, 0.0], [0, 0])
+    with pytest.raises(jn.errors.AssemblyError) as told:
+        jn.solve(wiper(extra=extra), [0.0])
+    words = str(told.value)
+    assert words.startswith("over-constrained at t = 0 s: joints.")
+    assert words.endswith("; correct lengths, or take out a joint")
+    assert len(words) < 200
+    assert "2 equations more than coordinates" in told.value.details
 
 
 @pytest.mark.slow

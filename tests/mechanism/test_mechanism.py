@@ -377,3 +377,29 @@ def test_elements_of_which_some_values_are_traced_are_grouped_as_those_of_number
     jax.eval_shape(lambda length: traced.append(bodies(mechanism.with_parameters(L=length))) or length, 0.3)
     assert traced == [bodies(mechanism)]
     assert [len(slots[0]) for slots in bodies(mechanism)] == [2, 2]
+
+
+class Rolls(jn.joints.AbstractConstraint, space="planar"):
+    """A condition on velocities, which is no function of how bodies lie."""
+
+    radius: jn.joints.Scalar
+
+    def residual(self, body_i, body_j, time):
+        return body_j.position.differentiate()[0] - self.radius * body_j.angle.differentiate()
+
+
+class Spins(jn.joints.AbstractConstraint, space="spatial"):
+    """The same of the angular velocity in space."""
+
+    def residual(self, body_i, body_j, time):
+        return body_j.angular_velocity[2]
+
+
+@pytest.mark.parametrize("space, joint", [("planar", Rolls(("ground", "a"), 0.3)), ("spatial", Spins(("ground", "a")))])
+def test_a_residual_that_uses_velocities_is_refused_by_name(space, joint):
+    body = jn.Body([0.0] * (2 if space == "planar" else 3))
+    mechanism = jn.Mechanism(space=space, bodies={"a": body}, joints={"roll": joint})
+    with pytest.raises(
+        jn.errors.UnsupportedError, match=rf"joints\.roll: the residual of {type(joint).__name__} uses velocities"
+    ):
+        jn.solve(mechanism, [0.0, 1.0], 1)

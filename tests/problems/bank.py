@@ -41,6 +41,9 @@ GEARS = {
 }
 
 
+BELTS = {word: {"radius_i": 0.8, "radius_j": 1.3, "crossed": word == "crossed"} for word in ("open", "crossed")}
+
+
 @dataclasses.dataclass(frozen=True)
 class Case:
     """A class of the catalogue, with or without its optional values, and its word where it takes one."""
@@ -62,18 +65,22 @@ class Case:
     @property
     def joined(self):
         """How many bodies it is between, where that is not told by its class."""
-        return {"teeth": 2, "ring": 2, "ratio": 3}.get(self.word)
+        return 3 if self.kind is jn.joints.Rope else {"teeth": 2, "ring": 2, "ratio": 3}.get(self.word)
 
     @property
     def period(self):
         """Of its last row, where that is known up to whole periods: a number, or the field that has it."""
         if self.word in ("teeth", "ring"):
             return 2 * np.pi * (1 + self.given["radius_i"] / self.given["radius_j"])
+        if self.word in BELTS:
+            return 2 * np.pi * (1 + (0.8 if self.word == "crossed" else -0.8) / 1.3)
         return {"screw": "lead", "constant_velocity": 2 * np.pi}.get(self.kind.type_name)
 
     @property
     def given(self):
-        """The values that are not random: its word, or what makes gears of one form."""
+        """The values that are not random: its word, or what makes gears and belts of one form."""
+        if self.word in BELTS:
+            return BELTS[self.word]
         if self.word in GEARS:
             return GEARS[self.word]
         if self.kind is jn.planar.Rolling and self.optional:
@@ -96,5 +103,7 @@ def cases():
                 variants = [(False, "angle"), (True, "angle"), (False, "x"), (True, "y")]
             if kind is jn.planar.Gear:
                 variants = [(False, word) for word in GEARS]
+            if kind is jn.planar.Belt:
+                variants = [(False, word) for word in BELTS]
             found += [Case(kind, space, *variant) for variant in variants]
     return found

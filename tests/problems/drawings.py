@@ -152,8 +152,7 @@ def redrawn(mechanism, drawings, moved):
                 drawing = drawings[_holder(mechanism, it, key)]
                 convert = drawing.point if key.partition("_")[0] in POINTS else drawing.direction
                 changed[key] = convert(resolve(value, values))
-            if field_kind(field) == "curve":
-                changed[key] = redrawn_curve(value, drawings[it.bodies[0]])
+            changed |= redrawn_shape(it, key, field_kind(field), drawings, values)
         if hasattr(it, "wrenches"):  # of a closure, and the attitude in which it is closed
             first, second = (drawings[body].axes for body in it.bodies)
             changed["wrenches"] = (np.asarray(it.wrenches) @ np.kron(np.eye(2), first)).tolist()
@@ -184,6 +183,16 @@ def redrawn(mechanism, drawings, moved):
         gravity=gravity,
         **{kind: {name: element(name, it) for name, it in getattr(mechanism, kind).items()} for kind in kinds},
     )
+
+
+def redrawn_shape(it, key, kind, drawings, values):
+    """Return a curve, or points on each of the bodies, in other frames, by its key; nothing for what is neither."""
+    if kind == "curve":
+        return {key: redrawn_curve(getattr(it, key), drawings[it.bodies[0]])}
+    if kind != "points":
+        return {}
+    places = zip(it.bodies, resolve(getattr(it, key), values), strict=True)
+    return {key: [drawings[body].point(place) for body, place in places]}
 
 
 def redrawn_curve(expressions, drawing):

@@ -48,7 +48,7 @@ from jounce.cli.viewing import view
 from jounce.cli.written_equations import equations
 from jounce.errors import JounceError, SolveError
 from jounce.interrupts import end_on_signals, is_command
-from jounce.reporting.terminal import cautions, complain, unexpected
+from jounce.reporting.terminal import cautions, complain, detail, unexpected
 
 
 def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = False, out: Path | None = None) -> int:
@@ -85,7 +85,7 @@ FIRST = """\
   jounce view four-bar.yaml                    # moving, in the browser
   jounce convert robot.urdf robot.yaml         # a robot as a mechanism
 
-jounce COMMAND --help explains a command, with examples."""
+jounce COMMAND --help explains a command, with examples; --verbose tells more of what is wrong."""
 STATUS = """\
 Exit status:
   0  success
@@ -117,8 +117,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not re.fullmatch("[1-9][0-9]{0,3}", os.environ.get(name, "1")):  # 0 is "unknown" to some, nothing to others
             del os.environ[name]
     as_json = "--json" in given
+    verbose, given = "--verbose" in given, [each for each in given if each != "--verbose"]
     with failsafe_streams() as output, cautions(json=as_json):
-        status = _status(given, as_json)
+        status = _status(given, as_json, verbose)
         output.flush()
         if output.failure is None:
             if arguments is None and status:
@@ -151,8 +152,8 @@ def _end_at_once(status: int) -> None:
         os._exit(status)
 
 
-def _status(given: list[str], as_json: bool) -> int:
-    """Return the exit status of a command, whose errors are told."""
+def _status(given: list[str], as_json: bool, verbose: bool) -> int:
+    """Return the exit status of a command, whose errors are told, with all that is known of them if verbose."""
     try:
         with _settings():
             return _dispatch(given)
@@ -160,6 +161,8 @@ def _status(given: list[str], as_json: bool) -> int:
         return 130
     except SolveError as error:
         complain(error, json=as_json)
+        if details := getattr(error, "details", ""):
+            detail(details if verbose else "--verbose tells more", json=as_json)
         return 2 if error.motion is None else 1
     except JounceError as error:
         complain(error, json=as_json)

@@ -10,6 +10,7 @@ from jounce.constraints.base import (
     rows as rows,
 )
 from jounce.constraints.cams import Cam as Cam
+from jounce.constraints.ropes import Rope as Rope
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
 _compute_under_own_settings(__name__)

@@ -2,7 +2,7 @@
 
 import abc
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
@@ -29,6 +29,8 @@ Vector = Annotated[Any, "vector"]
 MotionLaw = Annotated[Any, "motion"]
 Wrenches = Annotated[Any, "wrenches"]
 Whole = Annotated[int, "whole"]
+Flag = Annotated[bool, "flag"]
+Points = Annotated[Any, "points"]  # one on each body
 Nested = Annotated[Any, "nested"]  # an element within another
 Curve = Annotated[Any, "curve"]
 Part = Annotated[Any, "part"]  # another joint or driver within one
@@ -124,7 +126,8 @@ class AbstractConstraint(Module):
     role: ClassVar[str] = ""
     type_name: ClassVar[str] = ""
     body_count: ClassVar[int] = 2
-    body_counts: ClassVar[tuple[int, ...]] = ()  # where more than one number is right
+    body_counts: ClassVar[Sequence[int]] = ()  # where more than one number is right
+    may_repeat: ClassVar[bool] = False  # whether a body may be named more than once
     hidden: ClassVar[tuple[str, ...]] = ()  # coordinates besides those of bodies, which a carriage of its own has
     periodic: ClassVar[bool] = False  # whether its residual forgets whole turns, which the law must not skip then
     nonholonomic: ClassVar[bool] = False  # whether rows of it hold velocities, which no positions fulfill
@@ -228,12 +231,22 @@ def by_ratio_alone(element: AbstractConstraint) -> bool:
     return given and len({*element.bodies} - {"ground"}) > 1 and not placed
 
 
-def check_bodies(element: Any, counts: tuple[int, ...], does: str = "joins", must: str = "join") -> None:
+def counted(counts: Sequence[int]) -> str:
+    """Word the numbers that are right.
+
+    Examples
+    --------
+    >>> counted((2, 3)), counted(range(2, 101))
+    ('2 or 3', '2 to 100')
+    """
+    return f"{counts[0]} to {counts[-1]}" if isinstance(counts, range) else " or ".join(map(str, counts))
+
+
+def check_bodies(element: Any, counts: Sequence[int], does: str = "joins", must: str = "join") -> None:
     """Raise MechanismError unless a joint, driver, force or output has as many bodies as it needs, all different."""
     name = getattr(element, "type_name", "") or type(element).__name__
     if len(element.bodies) not in counts:
-        noun = "body" if counts == (1,) else "bodies"
-        message = f"{name} {does} {' or '.join(map(str, counts))} {noun}"
+        message = f"{name} {does} {counted(counts)} {'body' if counts == (1,) else 'bodies'}"
         raise MechanismError(message, name="bodies", value=list(element.bodies))
     if len(set(element.bodies)) != len(element.bodies) and not getattr(element, "may_repeat", False):
         message = f"{name} must {must} different bodies, not a body with itself"

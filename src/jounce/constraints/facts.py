@@ -22,6 +22,8 @@ WORDS = (
     "Laws",
     "Wrenches",
     "Whole",
+    "Flag",
+    "Points",
     "Nested",
     "Curve",
     "Part",
@@ -30,7 +32,7 @@ BODY_ENDINGS = ("_i", "_j", "_m")  # of fields, by the body that they are fixed 
 
 USUAL_DIMENSIONS: Mapping[str, str] = MappingProxyType(
     {
-        **dict.fromkeys(("point", "length", "radius", "lead"), "length"),
+        **dict.fromkeys(("point", "points", "length", "radius", "lead"), "length"),
         **dict.fromkeys(("vector", "axis", "normal"), "direction"),
     }
 )
@@ -64,7 +66,7 @@ SIGNS: Mapping[str, str] = MappingProxyType(
 """Signs that values may have to have, and what is said of a value that has another."""
 
 _MACHINES = {
-    "planar": ("revolute", "rod", "slot", "prismatic", "coordinate", "gear", "rolling", "curve"),
+    "planar": ("revolute", "rod", "slot", "prismatic", "coordinate", "gear", "rolling", "curve", "belt", "rope"),
     "spatial": (
         "spherical",
         "rod",
@@ -78,6 +80,7 @@ _MACHINES = {
         "curve",
         "surface",
         "wheel",
+        "rope",
     ),
 }
 _DRIVES = ("coordinate", "slide", "distance", "rotation")
@@ -234,7 +237,7 @@ def symbols(kind: type[Any]) -> tuple[str, ...]:
     >>> from jounce import planar
     >>> from jounce.constraints.facts import symbols
     >>> symbols(planar.Revolute)
-    ('revolute', 'rod', 'slot', 'prismatic', 'coordinate', 'gear', 'rolling', 'curve')
+    ('revolute', 'rod', 'slot', 'prismatic', 'coordinate', 'gear', 'rolling', 'curve', 'belt', 'rope')
     """
     if kind.role in ("driver", "force"):
         return _DRIVES if kind.role == "driver" else _LOADS
@@ -303,8 +306,8 @@ def field_kinds(kind: type[Any]) -> Mapping[str, str]:
 
 
 def field_kind(field: dataclasses.Field) -> str:
-    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``nested``,
-    ``curve``, ``part`` or ``text``.
+    """Return ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``flag``, ``points``,
+    ``nested``, ``curve``, ``part`` or ``text``.
     """
     if isinstance(field.type, str):  # under ``from __future__ import annotations``
         word = field.type.rpartition(".")[2].strip()

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.constraints.base import AbstractConstraint, Curve, Scalar, Vector, rows
+from jounce.constraints.base import AbstractConstraint, Curve, Flag, Scalar, Vector, rows
 from jounce.errors import MechanismError
 from jounce.jet import Jet, atan2, cross, dot, sqrt, wrap
 from jounce.jet.turns import brought_near
@@ -20,6 +20,7 @@ from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
 
 COORDINATES = ("angle", "x", "y")
+FAR = 1e300  # a period that is never gone through
 Vectors = Float[Numbers, "components *batch"]
 
 
@@ -221,16 +222,11 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
         carries them: it counts the turns of the line of centers.
         """
         if self.ratio is not None:
-            return self._turned(body_i, body_j, others[0].angle, self.ratio)
+            return _turned(self, body_i, body_j, others[0].angle, self.ratio)
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         ratio, apart = -self.radius_i / self.radius_j, self.radius_i + self.radius_j
         d = d + _aside(d, apart)
-        line = atan2(d[1], d[0])
-        if self.arm is None:
-            excess = wrap(self._turned(body_i, body_j, line, ratio), 2 * jnp.pi * (1.0 - ratio))
-        else:
-            line = brought_near(line, others[0].angle.coefficients[0] + self.arm)
-            excess = self._turned(body_i, body_j, line, ratio)
+        excess = _turned_on_line(self, body_i, body_j, others, d, ratio)
         if self.flank is None or self.pressure_angle is None:
             return excess
         # how far the centers may part, which they never do: across it, the tooth force is along the line of action
@@ -238,8 +234,22 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
         side = -self.flank * jnp.sign(apart) / jnp.abs(self.radius_j)
         return excess + side * jnp.tan(self.pressure_angle) * parted
 
-    def _turned(self, body_i: PlanarPose, body_j: PlanarPose, line: Jet, ratio: Any) -> Jet:
-        return (body_j.angle - line) - ratio * (body_i.angle - line) - self.offset
+
+def _turned_on_line(
+    joint: Any, body_i: PlanarPose, body_j: PlanarPose, others: tuple[Any, ...], d: Jet, ratio: Any
+) -> Jet:
+    """Return what body j lacks of turning by a ratio relative to the line of centers, whose turns the arm counts."""
+    line = atan2(d[1], d[0])
+    if joint.arm is None:
+        period = 2 * jnp.pi * (1.0 - ratio)
+        period = jnp.where(period == 0, FAR, period)  # then the line does not count
+        return wrap(_turned(joint, body_i, body_j, line, ratio), period)
+    line = brought_near(line, others[0].angle.coefficients[0] + joint.arm)
+    return _turned(joint, body_i, body_j, line, ratio)
+
+
+def _turned(joint: Any, body_i: PlanarPose, body_j: PlanarPose, line: Jet, ratio: Any) -> Jet:
+    return (body_j.angle - line) - ratio * (body_i.angle - line) - joint.offset
 
 
 def _aside(d: Jet, distance: Any) -> Any:
@@ -247,6 +257,45 @@ def _aside(d: Jet, distance: Any) -> Any:
     value = d.coefficients[0]
     together = (value == 0).all(axis=0)
     return jnp.where(together, jnp.abs(distance), 0.0)[None] * np.array([1.0, 0.0]).reshape(2, *[1] * together.ndim)
+
+
+class Belt(AbstractConstraint, type="belt", space="planar"):
+    """Belt or chain around two pulleys, open or crossed, that neither slips nor stretches.
+
+    Pulleys turn relative to the line of centers in the ratio of their radii: where the centers move round each other,
+    the belt wraps on one and off the other. Both strands give by as much where the centers part, as under a tensioner.
+    What the belt exerts is the difference of the pulls of its strands, along these; their mean, which presses the
+    pulleys together, is that of the tension with which the belt was put on, and no matter of motion.
+    """
+
+    point_i: Vector  # m, center of each pulley in its frame
+    point_j: Vector
+    radius_i: Scalar  # m, to the middle of the belt, or of the pitch circle
+    radius_j: Scalar
+    crossed: Flag = eqx.field(static=True, default=False)
+    offset: Scalar = None  # rad
+    arm: Any = eqx.field(default=None, init=False)  # rad, of the line of centers in the frame of a body that has both
+
+    dimensions = {"offset": "angle"}
+    symbol = "belt"
+
+    @property
+    def ratio(self) -> Any:
+        """Turns of pulley j to those of pulley i, relative to the line of centers."""
+        return (-1.0 if self.crossed else 1.0) * self.radius_i / self.radius_j
+
+    def residual(self, body_i: PlanarPose, body_j: PlanarPose, *others: Any) -> Jet:
+        """Return what body j lacks of turning as body i says; others are as those of a gear with teeth."""
+        d = body_j.point(self.point_j) - body_i.point(self.point_i)
+        d = d + _aside(d, self.radius_i + self.radius_j)
+        return _turned_on_line(self, body_i, body_j, others, d, self.ratio)
+
+    def line_force(self) -> Any:
+        """Return the pull of the strand on the left of the line of centers less that of the other, N, for a multiplier.
+
+        Left is seen from pulley i to pulley j, where the strand leaves pulley i.
+        """
+        return (1.0 if self.crossed else -1.0) / self.radius_j
 
 
 class Rolling(AbstractConstraint, type="rolling", space="planar"):

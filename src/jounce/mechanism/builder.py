@@ -358,6 +358,8 @@ def _size(groups: tuple[Group, ...], places: Float[Numbers, "component body 1"])
                 continue
             if kind == "vector" and name.startswith("point"):
                 points.append(value[..., 0])
+            elif kind == "points":
+                points += list(value[..., 0])
             elif kind == "scalar" and facts.signs[name] == "positive":
                 sizes.append(np.max(value))
     farthest = np.linalg.norm(np.concatenate(points, axis=1), axis=0).max()

@@ -1,8 +1,9 @@
 """What carries gears: the body that both centers are pinned to, the axes of shafts in the frame that they turn in.
 
-Centers of toothed gears keep their distance where one body has both. It is found by the pins: a center stands on every
-body that is pinned there. So is the axis of a shaft in the frame m, by the joints that hold directions parallel. Where
-JAX traces values, points and directions are the same that are given by the same numbers or expressions.
+Centers of toothed gears, and of the pulleys of most belts, keep their distance where one body has both. It is found by
+the pins: a center stands on every body that is pinned there. So is the axis of a shaft in the frame m, by the joints
+that hold directions parallel. Where JAX traces values, points and directions are the same that are given by the same
+numbers or expressions.
 """
 
 import dataclasses
@@ -17,11 +18,14 @@ from jax.core import Tracer
 from jounce.constraints import planar, spatial
 from jounce.constraints.angles import Datum, coaxial
 from jounce.constraints.facts import PAIRS, facts_of
+from jounce.constraints.ropes import Rope, distinct, shares_points
 from jounce.errors import JounceError, MechanismError, UnsupportedError
 from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.resolve import along_instances, resolve
+from jounce.mechanism.rope_lengths import check_ropes
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements, holding
 
+LEAST_DIFFERENCE = 0.05  # of the radii of a belt's pulleys where no body carries both: less is a tiny part of a turn
 LARGEST_GAP = 1e-6  # of the distance of centers, as written numbers are rounded
 SAME_DIRECTION = 1e-9  # largest sine
 LARGEST_WHOLE = 1000  # of the whole numbers in a ratio of turns in space
@@ -54,8 +58,13 @@ def is_toothed(element: Any) -> bool:
     return isinstance(element, planar.Gear) and element.ratio is None
 
 
+def on_line(element: Any) -> bool:
+    """Tell whether an element turns planar bodies relative to the line of their centers: teeth, or a belt."""
+    return is_toothed(element) or isinstance(element, planar.Belt)
+
+
 def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None:
-    """Raise MechanismError unless what carries the gears of all groups was found.
+    """Raise MechanismError unless what carries the gears of all groups was found, and ropes are as long as can be.
 
     Parameters
     ----------
@@ -64,6 +73,7 @@ def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None
     names : sequence of sequence of str
         Of the elements of each, with their kinds before them.
     """
+    check_ropes(groups, names)
     for group, members in zip(groups, names, strict=True):
         if is_toothed(group.element) and group.element.arm is None:
             message = (
@@ -71,6 +81,8 @@ def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None
                 "one body, such as a carrier or the ground, so that the centers keep their distance"
             )
             raise MechanismError(message, name=f"{members[0]}.points")
+        if isinstance(group.element, planar.Belt) and group.element.arm is None:
+            _check_belts(group.element, members)
         if isinstance(group.element, spatial.Gear) and None in (group.element.held_i, group.element.held_j):
             slot = 0 if group.element.held_i is None else 1
             message = (
@@ -89,6 +101,21 @@ def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None
                 raise MechanismError(message, name=f"{members[odd[0]]}.ratio", value=value)
 
 
+def _check_belts(belts: planar.Belt, names: Sequence[str]) -> None:
+    """Raise MechanismError where belts cannot count the turns of their lines of centers."""
+    if isinstance(belts.ratio, Tracer):
+        return
+    apart = np.abs(1.0 - np.asarray(belts.ratio)).ravel()
+    odd = np.flatnonzero((apart > 0) & (apart < LEAST_DIFFERENCE))
+    if odd.size:
+        message = (
+            "radii that are nearly the same need one body that carries both pulleys, which counts the turns of the "
+            "line of centers: pin both to it, or make the radii equal"
+        )
+        values = [float(np.asarray(x).ravel()[odd[0]]) for x in (belts.radius_i, belts.radius_j)]
+        raise MechanismError(message, name=f"{names[odd[0]]}.radii", value=values)
+
+
 def check_ratios(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None:
     """Raise UnsupportedError if JAX differentiates by a ratio of turns in space: whole turns are not known to it."""
     for group, members in zip(groups, names, strict=True):
@@ -101,26 +128,31 @@ def grouped_with_frames(mechanism: Mechanism, elements: Mapping[str, Any]) -> Gr
     """Return the groups of some elements of a mechanism, by name with their kinds; gears with what carries them."""
     index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
     arms = _arms(mechanism, elements)
-    given = _with_arms(elements, arms)
+    given = _with_arms(_with_slots(elements), arms)
     groups, names = group_elements(given, mechanism.parameter_values, index, POSITION_COMPONENTS[mechanism.space])
     found = zip(groups, names, strict=True)
     return tuple(_carried(group, members, arms, mechanism, elements) for group, members in found), names
 
 
 def check_distances(mechanism: Mechanism) -> None:
-    """Raise MechanismError unless centers of gears with teeth are as far apart as their pitch radii say."""
-    _arms(mechanism, {f"joints.{name}": joint for name, joint in mechanism.joints.items()})
+    """Raise MechanismError where centers of gears are not as far apart as their radii say, or those of pulleys are
+    nearer, and where a rope is longer or shorter than it can be.
+    """
+    joints = {f"joints.{name}": joint for name, joint in mechanism.joints.items()}
+    if any(isinstance(joint, Rope) for joint in joints.values()):
+        check_ropes(*grouped_with_frames(mechanism, joints))
+    _arms(mechanism, joints)
 
 
 def _arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, Arm]:
-    """Return what carries the toothed gears among some elements, by their names with kinds; none that is not found.
+    """Return what carries the toothed gears and the belts among some elements, by their names; none that is not found.
 
     Raises
     ------
     MechanismError
-        If the centers are not as far apart as the pitch radii say.
+        If the centers are not as far apart as the pitch radii say, or those of pulleys nearer.
     """
-    toothed = {name: element for name, element in elements.items() if is_toothed(element)}
+    toothed = {name: element for name, element in elements.items() if on_line(element)}
     if not toothed:
         return {}
     pins = _joined(mechanism, _pinned)
@@ -128,7 +160,7 @@ def _arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, Arm]:
     return {name: arm for name, arm in found.items() if arm is not None}
 
 
-def _arm(name: str, gear: planar.Gear, parameters: Mapping[str, Any], pins: Joined) -> Arm | None:
+def _arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[str, Any], pins: Joined) -> Arm | None:
     try:
         radii = [resolve(radius, parameters) for radius in (gear.radius_i, gear.radius_j)]
         points = [
@@ -155,10 +187,12 @@ def _arm(name: str, gear: planar.Gear, parameters: Mapping[str, Any], pins: Join
     body = GROUND if GROUND in shared else shared[0]
     line = [b - a for a, b in zip(first[body].value, second[body].value, strict=True)]
     if plain and not any(isinstance(x, Tracer) for x in line):
-        _check_gap(name, body, math.hypot(*line), [float(radius) for radius in radii])
+        check = _check_gap if is_toothed(gear) else _check_overlap
+        check(name, body, math.hypot(*line), [float(radius) for radius in radii])
         return Arm(body, math.atan2(line[1], line[0]))
-    apart = jnp.abs(radii[0] + radii[1])  # of a design that JAX traces: it fails where there is a gap
-    meshes = jnp.abs(jnp.hypot(*line) - apart) <= LARGEST_GAP * apart
+    apart = jnp.abs(radii[0] + radii[1])  # of a design that JAX traces: it fails where there is a gap, or an overlap
+    gap = jnp.hypot(*line) - apart
+    meshes = jnp.abs(gap) <= LARGEST_GAP * apart if is_toothed(gear) else gap > 0
     return Arm(body, jnp.where(meshes, jnp.arctan2(line[1], line[0]), jnp.nan))
 
 
@@ -179,20 +213,39 @@ def _check_gap(name: str, body: str, distance: float, radii: Sequence[float]) ->
         raise MechanismError(message, name=f"{name}.radii", value=radii)
 
 
-def _with_arms(elements: Mapping[str, Any], arms: Mapping[str, Arm]) -> dict[str, Any]:
-    """Return elements of which toothed gears have a third body, that carries them."""
+def _check_overlap(name: str, body: str, distance: float, radii: Sequence[float]) -> None:
+    """Raise MechanismError unless pulleys on a body have room for each other."""
+    if not distance > sum(radii):
+        message = (
+            f"the centers are {distance:.9g} m apart on '{body}', and the pulleys overlap below {sum(radii):.9g} m, "
+            "the sum of the radii: move a center, or change a radius"
+        )
+        raise MechanismError(message, name=f"{name}.radii", value=radii)
+
+
+def _with_slots(elements: Mapping[str, Any]) -> dict[str, Any]:
+    """Return elements of which ropes with several points on a body have it once."""
     found = dict(elements)
-    for name, arm in arms.items():
-        slots = (*found[name].bodies, arm.body)
-        found[name] = _holding_bodies(found[name], slots)
+    for name, element in elements.items():
+        if shares_points(element):
+            bodies, slots = distinct(element.bodies)
+            found[name] = unchecked_copy(element, bodies=bodies, slots=slots)
     return found
 
 
-def _holding_bodies(element: Any, bodies: tuple[str, ...]) -> Any:
-    """Return an element with other bodies, which are not checked."""
+def _with_arms(elements: Mapping[str, Any], arms: Mapping[str, Arm]) -> dict[str, Any]:
+    """Return elements of which gears with teeth and belts have a third body, that carries them."""
+    found = dict(elements)
+    for name, arm in arms.items():
+        found[name] = unchecked_copy(found[name], bodies=(*found[name].bodies, arm.body))
+    return found
+
+
+def unchecked_copy(element: Any, **changed: Any) -> Any:
+    """Return an element with other values in some fields, which are not checked."""
     copy = object.__new__(type(element))
     for field in dataclasses.fields(element):
-        object.__setattr__(copy, field.name, bodies if field.name == "bodies" else getattr(element, field.name))
+        object.__setattr__(copy, field.name, changed.get(field.name, getattr(element, field.name)))
     return copy
 
 
@@ -200,8 +253,10 @@ def _carried(
     group: Group, members: Sequence[str], arms: Mapping[str, Arm], mechanism: Mechanism, elements: Mapping[str, Any]
 ) -> Group:
     """Return a group of gears with what is found of what carries them; others as they are."""
-    if is_toothed(group.element) and all(name in arms for name in members):
+    if on_line(group.element) and all(name in arms for name in members):
         return holding(group, "arm", along_instances(*(_number(arms[name].angle) for name in members)))
+    if shares_points(elements[members[0]]):
+        return holding(group, "slots", distinct(elements[members[0]].bodies)[1])
     if isinstance(group.element, spatial.Gear):
         return _on_frames(group, [elements[name] for name in members], mechanism)
     return group

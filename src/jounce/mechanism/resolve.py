@@ -235,6 +235,8 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
                 # in a file the follower of a cam is the cam
                 place = name if field_name == "follower" else f"{name}.{field_name}"
                 value = unchecked(type(value), _of_part(value, parameters, components, place))
+            elif kind == "points":
+                value = _points(resolve(value, parameters), len(element.slots or element.bodies), components)
             elif kind == "wrenches":
                 value = _wrenches(resolve(value, parameters))
             elif kind == "nested" and value is not None:  # the bodies are those of the whole
@@ -259,6 +261,20 @@ def _of_part(element: Element, parameters: Mapping[str, Any], components: int, n
     """Return the values of an element within another one, which has its bodies."""
     rest = {field.name: field.default for field in dataclasses.fields(type(element)) if not field.init}
     return {"bodies": ()} | rest | resolve_element(element, parameters, components, name)
+
+
+def _points(value: Any, count: int, components: int) -> Any:
+    """Return rows of numbers, one for each body, checked."""
+    if isinstance(value, Tracer):
+        return value
+    if not (isinstance(value, np.ndarray) and value.dtype.kind == "f" and value.shape == (count, components)):
+        raise MechanismError(
+            f"must be {count} points of {components} numbers, one for each body in the order of bodies",
+            value=_plain(value),
+        )
+    if not np.isfinite(value).all():
+        raise MechanismError("must be finite", value=_plain(value))
+    return value
 
 
 def _wrenches(value: Any) -> Any:

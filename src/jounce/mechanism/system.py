@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
+from jounce.errors import UnsupportedError
 from jounce.jet import Jet, concatenate
 from jounce.jet.algebra import stacked
 from jounce.linear_algebra.fronts import Fronts
@@ -182,7 +183,11 @@ def group_elements(
     found: dict[Any, list[tuple[str, Any, dict]]] = {}
     for name, element in elements.items():
         values = resolve_element(element, parameters, components, name)
-        if readings := readings_of(element, values, components):
+        try:
+            readings = readings_of(element, values, components)
+        except UnsupportedError as error:
+            raise error.located(name=name) from None
+        if readings:
             values[READINGS] = readings
         found.setdefault(group_key(element, values), []).append((name, element, values))
     groups, names = [], []

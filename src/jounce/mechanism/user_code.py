@@ -19,6 +19,7 @@ from jax.core import Tracer
 
 from jounce.constraints import AbstractConstraint
 from jounce.constraints.base import field_kinds, value_fields
+from jounce.errors import UnsupportedError
 from jounce.forces import AbstractForce
 from jounce.forces.laws import AbstractLaw, ReadLaw, is_users_law
 from jounce.jet import Jet
@@ -58,6 +59,8 @@ def readings_of(element: Any, values: Mapping[str, Any], components: int) -> dic
     if not names:
         return {}
     reader = _Reader(element, values, components)
+    if "residual" in names and not kind.nonholonomic:
+        reader.check_positions()
     return {name: reader.reading(name) for name in names} | {"": Verbatim(_words(kind), old=False)}
 
 
@@ -209,6 +212,26 @@ class _Reader:
         self.settled = all(field.init for field in dataclasses.fields(self.kind))
         self.poses = [_example(components) for _ in element.bodies]
         self.time = _series((), ORDER)
+
+    def check_positions(self) -> None:
+        """Raise UnsupportedError where a residual uses velocities: it has fewer derivatives than its bodies then."""
+        example = (*self.poses, self.time)
+
+        def residual() -> Any:
+            poses = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), example)
+            return self.kind.residual(self.element, *poses)
+
+        try:
+            found = jax.eval_shape(residual)
+        except Exception:  # noqa: BLE001 - what is wrong with it is told where it is used
+            return
+        if isinstance(found, Jet) and found.order < ORDER:
+            message = (
+                f"the residual of {self.kind.__qualname__} uses velocities, which no joint of your own may: it must "
+                "be a function of the positions and attitudes of its bodies and of time, such as body.point, "
+                "body.direction and body.angle; write a condition on velocities by its integral, if it has one"
+            )
+            raise UnsupportedError(message)
 
     def reading(self, name: str) -> Reading:
         written, arguments = getattr(self.kind, name), self._arguments(name)

@@ -84,6 +84,8 @@ class Symbol:
         Of gears: whether the smaller one turns inside the larger one.
     curve : CurveLines
         Lines on the first body that the point on the second stays on.
+    crossed : bool, default False
+        Of belts: whether the strands cross.
     """
 
     name: str
@@ -94,6 +96,7 @@ class Symbol:
     radii: tuple[float | None, ...]
     internal: bool = False
     curve: CurveLines = NONE
+    crossed: bool = False
 
     @property
     def moving_slot(self) -> int:
@@ -269,6 +272,8 @@ def _values(element: Any, parameters: Mapping[str, Any], components: int, name: 
             except JounceError as error:
                 raise error.located(name=f"{name}.{field_name}") from None
             values[field_name] = np.asarray(value, float)
+        if kind == "points":
+            values[field_name] = np.asarray(resolve(value, parameters), float)
     return values
 
 
@@ -280,7 +285,9 @@ def _touched(elements: Mapping[str, Any], values: Values) -> Iterator[tuple[str,
     """Return the name of each element, the body and the place in its frame, for all points of elements."""
     for name, element in elements.items():
         for field_name, value in values[name].items():
-            if field_name.startswith("point") and _slot(field_name) < len(element.bodies):
+            if value.ndim == 2:
+                yield from ((name, body, point) for body, point in zip(element.bodies, value, strict=True))
+            elif field_name.startswith("point") and _slot(field_name) < len(element.bodies):
                 yield name, element.bodies[_slot(field_name)], value
 
 
@@ -351,7 +358,9 @@ def _symbol(
     radii: list[float | None] = [None] * len(bodies)
     for field_name, value in values.items():
         slot = _slot(field_name)
-        if slot < len(bodies) and field_name.startswith("point"):
+        if value.ndim == 2:
+            points = list(value)
+        elif slot < len(bodies) and field_name.startswith("point"):
             points[slot] = value
         if slot < len(bodies) and facts.dimensions[field_name] == "direction" and axes[slot] is None:
             axes[slot] = value
@@ -368,7 +377,8 @@ def _symbol(
         return replace(symbol, points=(*centers, *symbol.points[2:]), radii=(*wheels, *symbol.radii[2:]))
     if "radius_j" in values:
         signed = [float(values[name]) for name in ("radius_i", "radius_j")]
-        return replace(symbol, radii=tuple(map(abs, signed)), internal=min(signed) < 0)
+        crossed = getattr(element, "crossed", False)
+        return replace(symbol, radii=tuple(map(abs, signed)), internal=min(signed) < 0, crossed=crossed)
     if element.role == "joint" and facts.symbol in ("gear", "coordinate"):
         return _geared(mechanism, symbol, coordinate, float(values.get("ratio", 1.0)))
     return symbol

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.mechanism import Mechanism
+from jounce.mechanism.belts import belt_course, belt_outline
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot import symbol_parts as parts
 from jounce.plot.curve_lines import shown
@@ -28,7 +29,7 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
         drawing.owner = f"joints.{symbol.name}"
         (_PLANAR if drawing.planar else _SPATIAL).get(symbol.kind, _unknown)(drawing, symbol)
         if symbol.kind not in _UNNAMED:
-            center = np.mean(drawing.ends(symbol), axis=0) if symbol.kind == "rod" else drawing.point(symbol)
+            center = np.mean(drawing.ends(symbol), axis=0) if symbol.kind in _BETWEEN else drawing.point(symbol)
             drawing.name(symbol.name, center, INK)
     for kind, symbols in (("drivers", seen.drivers), ("forces", seen.forces)):
         for symbol in symbols:
@@ -138,6 +139,25 @@ def _rolling(drawing: Drawing, symbol: Symbol) -> None:
     parts.rail(drawing, body, touch, axis, start=start)
 
 
+def _belt(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw a belt around its pulleys, which are drawn as wheels."""
+    centers = [drawing.global_point(symbol, slot).T for slot in (0, 1)]
+    radii = [radius or 0.0 for radius in symbol.radii]
+    course = belt_course(centers[0], centers[1], radii, symbol.crossed)
+    outline = belt_outline(course, centers, radii, symbol.crossed)
+    drawing.curve(outline, closed=True, stroke="#444444", width=2.2, layer=GUIDES)
+
+
+def _rope(drawing: Drawing, symbol: Symbol) -> None:
+    """Draw a rope through its points, with its ends, and the places where it goes round."""
+    places = [drawing.point(symbol, slot) for slot in range(len(symbol.bodies))]
+    drawing.line(*places, width=1.4, stroke="#8A5A2B", layer=GUIDES)
+    for k, (body, place) in enumerate(zip(symbol.bodies, places, strict=True)):
+        end = k in (0, len(places) - 1)
+        color = drawing.colors.get(body, INK)
+        drawing.disc(place, (0.35 if end else 0.7) * drawing.unit, stroke=color, fill=parts.PAPER, layer=SYMBOLS)
+
+
 def _spherical(drawing: Drawing, symbol: Symbol) -> None:
     parts.stand(drawing, symbol)
     point = drawing.point(symbol)
@@ -235,6 +255,7 @@ def _unknown(drawing: Drawing, symbol: Symbol) -> None:
 
 
 _UNNAMED = ("none", "coordinate", "gear", "rack", "rolling", "wheel")
+_BETWEEN = ("rod", "belt", "rope")  # named between their first two points
 _PLANAR: dict[str, Callable[[Drawing, Symbol], None]] = {
     "revolute": _revolute,
     "rod": _rod,
@@ -245,6 +266,8 @@ _PLANAR: dict[str, Callable[[Drawing, Symbol], None]] = {
     "rack": _rack,
     "rolling": _rolling,
     "curve": _curve,
+    "belt": _belt,
+    "rope": _rope,
     "none": _nothing,
 }
 _SPATIAL: dict[str, Callable[[Drawing, Symbol], None]] = {
@@ -260,5 +283,6 @@ _SPATIAL: dict[str, Callable[[Drawing, Symbol], None]] = {
     "surface": _curve,
     "gear": _shafts,
     "wheel": _shafts,
+    "rope": _rope,
     "none": _nothing,
 }

@@ -216,6 +216,12 @@ def complain(error: object, *, json: bool = False) -> None:
     _write_message("error", "bold red", error, json)
 
 
+def detail(words: str, *, json: bool = False) -> None:
+    """Print what more there is to know of an error on standard error, in one line; JSON has it in no other."""
+    if not json:
+        _write_message("note", "bold", words, json)
+
+
 def caution(warning: object, *, json: bool = False) -> None:
     """Print a warning on standard error, in one line: of words, or of JSON."""
     _write_message("warning", "bold yellow", warning, json)

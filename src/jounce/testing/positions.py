@@ -159,7 +159,7 @@ def _dimensions(subject: Subject, element: Any, motion: Motion) -> None:
         if kind == "curve" and dimension == "length":
             changed[name] = tuple(f"{STRETCH}*({entry})" for entry in value)
             continue
-        if kind not in ("scalar", "vector", "motion") or (value is None and not stretched):
+        if kind not in ("scalar", "vector", "points", "motion") or (value is None and not stretched):
             continue
         if value is None or not (stretched or dimension in ("angle", "ratio")):
             return  # nothing is said of a field, or it stands for a length that is not seen

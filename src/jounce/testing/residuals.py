@@ -181,6 +181,8 @@ def expressions(subject: Subject) -> None:
             replaced[name] = f"2*{name}"
         elif kind == "vector" and value is not None:
             replaced[name] = [Expression(f"unit*{float(entry)!r}") for entry in value]
+        elif kind == "points" and value is not None:
+            replaced[name] = [[Expression(f"unit*{float(entry)!r}") for entry in point] for point in value]
         elif kind == "motion" and isinstance(value, str):
             replaced[name] = value.replace("0.9", "law")
     if not replaced:
@@ -210,6 +212,6 @@ def one_program(subject: Subject) -> None:
     first, second = (run(group_of([element], subject.space), pose, time_jet(1)) for element in elements)
     if len(calls) > 1:
         raise Broken("the residual is compiled anew for other values; does it look at them in Python?")
-    numbers = [kind in ("scalar", "vector") for kind in field_kinds(subject.samples.kind).values()]
+    numbers = [kind in ("scalar", "vector", "points") for kind in field_kinds(subject.samples.kind).values()]
     if any(numbers) and not subject.samples.given and np.array_equal(first[0], second[0]):
         raise Broken("the residual does not depend on the values of its fields")

@@ -83,6 +83,10 @@ class Samples:
             return CURVES[self.space, len(self.kind.hidden)]
         if kind == "vector":
             return random.uniform(0.2, 1.0, POSITION_COMPONENTS[self.space]).tolist()
+        if kind == "points":
+            return random.uniform(0.2, 1.0, (self.count, POSITION_COMPONENTS[self.space])).tolist()
+        if kind == "flag":
+            return True
         if kind == "scalar":
             return float(random.uniform(0.5, 1.5))
         if name in facts.choices:

@@ -53,6 +53,10 @@ def values_of(kind, size):
             "laws": [0.1, 0.2, 0.3][:size],
             "wrenches": [[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]],
         }.get(key.kind)
+        if key.kind == "points":
+            one = [[0.4, 0.5, 0.6][:size], [0.3, 0.2, 0.1][:size]]
+        if key.kind == "flag":
+            one = True
         if key.kind == "text":
             one = WORDS.get(key.key)
         if key.kind == "curve":
@@ -131,7 +135,7 @@ def slots(node, path=()):
         return [slot for key, entry in node.items() for slot in slots(entry, (*path, key))]
     if isinstance(node, list):
         return [slot for key, entry in enumerate(node) for slot in slots(entry, (*path, key))]
-    return [path] if isinstance(node, (int, float)) else []
+    return [path] if isinstance(node, (int, float)) and not isinstance(node, bool) else []
 
 
 def at(node, path):
@@ -222,6 +226,7 @@ def test_the_walk_meets_every_key_of_the_schema():
         "units",
         "expressions",
         "closed",
+        "crossed",
         "surface",
     }
     laws = {"profile", "duration", "to", "by", "begin", "end", "limits", "initial", "output"}  # in test_segment_laws.py

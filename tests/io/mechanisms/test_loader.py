@@ -74,7 +74,15 @@ def test_toml_and_json_say_the_same(tmp_path):
 PAIR = {"points": "[[1 cm, 0], [AB, 0]]", "vectors": "[[1, 0], [0, 3 mm]]", "vector": "[1, AB]", "point": "[0, 0]"}
 TRIPLE = {"points": "[[1 cm, 0, 0], [AB, 0, 1]]", "vectors": "[[1, 0, 0], [0, 1, 0]]", "vector": "[1, 2, 3]"}
 TRIPLE |= {"axes": "[[0, 0, 1], [0, 0, 1]]", "axis": "[0, 0, 1]", "normals": "[[1, 0, 0], [1, 0, 0]]"}
-SCALARS = {"length": "14.23 cm", "ratio": "2", "radius": "AB", "lead": "5 mm", "coordinate": "angle", "motion": "t"}
+SCALARS = {
+    "length": "14.23 cm",
+    "ratio": "2",
+    "radius": "AB",
+    "radii": "[AB, 2 cm]",
+    "lead": "5 mm",
+    "coordinate": "angle",
+    "motion": "t",
+}
 PAIR["curve"], TRIPLE["curve"], TRIPLE["surface"] = "[s, s**2 + s]", "[s, sin(s), 0.1*s]", "[u, v, u*v]"
 TRIPLE["point"], TRIPLE["plane"] = "[0, 0, 0]", "{point: [0, 0, 1 mm], normal: [0, 0, 1]}"
 
@@ -88,6 +96,8 @@ KEYS = {  # the table of the documentation
     ("planar", "joint", "gear"): "ratio? offset? points? radii? pressure_angle?",
     ("planar", "joint", "rolling"): "points vector radius offset? pressure_angle?",
     ("planar", "joint", "fixed"): "points offset?",
+    ("planar", "joint", "belt"): "points radii crossed? offset?",
+    ("planar", "joint", "rope"): "points length",
     ("planar", "joint", "curve"): "curve point start?",
     ("planar", "driver", "coordinate"): "coordinate ratio? offset? motion",
     ("planar", "driver", "slide"): "points vector motion",
@@ -110,6 +120,7 @@ KEYS = {  # the table of the documentation
     ("spatial", "joint", "surface"): "surface point start_u? start_v?",
     ("spatial", "joint", "gear"): "axes ratio offset?",
     ("spatial", "joint", "wheel"): "point axis radius plane",
+    ("spatial", "joint", "rope"): "points length",
     ("spatial", "driver", "rotation"): "axis vectors? motion",
     ("spatial", "driver", "slide"): "points vector motion",
     ("spatial", "driver", "distance"): "points motion",

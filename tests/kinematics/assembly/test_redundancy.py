@@ -1,6 +1,7 @@
 """Linkages that move although they have too many equations, against their closed forms; and those that must not."""
 
 import dataclasses
+import re
 
 import mpmath
 import numpy as np
@@ -97,10 +98,13 @@ def test_random_bennett_linkages_from_bad_guesses_in_any_unit():
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 def test_what_is_nearly_a_bennett_linkage_is_refused_and_what_is_one_to_rounding_is_not(size):
+    with pytest.raises(
+        jn.errors.AssemblyError, match=r"over-constrained at t = .* joints.R3, joints.R1 and others contradict"
+    ) as told:
+        jn.solve(overconstrained.bennett(off=1e-3, size=size).mechanism, TIMES)
     joints = "joints.R3, joints.R1, joints.R4, joints.R2 stay open, by .* mm and .* deg"
     wanted = rf"{joints}.*; 3 equations more than coordinates .* contradict each other by that much"
-    with pytest.raises(jn.errors.AssemblyError, match=wanted):
-        jn.solve(overconstrained.bennett(off=1e-3, size=size).mechanism, TIMES)
+    assert re.search(wanted, told.value.details)
     moves_as_told(overconstrained.bennett(off=1e-12, size=size), order=6, tolerance=1e-10)
 
 

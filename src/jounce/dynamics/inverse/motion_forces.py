@@ -225,6 +225,12 @@ class MotionForces:
 
         return self._once(chunk, "driver", index.group)[:, index.instance : index.instance + 1]
 
+    def line_force(self, name: str) -> Float[Numbers, "order 1 time"]:
+        """Return the tension of a rope, or the pull of a belt, as Taylor coefficients."""
+        index = self.indices[name]
+        sizes = self._of_group(index)[:, 0] * self.model.system.groups[index.group].element.line_force()
+        return sizes[:, index.instance : index.instance + 1]
+
     def reaction(self, name: str, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
         """Return what a joint, driver or applied force does to a body, as force and moment about a point of it.
 
@@ -264,6 +270,8 @@ class MotionForces:
         """Return the point of a joint, driver or force on a body, or the origin of the body where it has none there."""
         group, instance = self._member(name)
         slots = [slot for slot, its in enumerate(group.bodies) if its[instance] == body]
+        if slots and hasattr(group.element, "first_on"):  # of the points of a rope
+            return group.element.first_on(slots[0])[:, instance, 0]
         names = [f"point_{'ijmn'[slot : slot + 1]}" for slot in slots[:1]] + ["point"] * (len(group.bodies) == 1)
         given = [value for key in names if (value := getattr(group.element, key, None)) is not None]
         size = self.pose_type.shifts

@@ -6,8 +6,9 @@ from typing import Any, ClassVar
 import equinox as eqx
 import numpy as np
 
-from jounce.constraints import Cam
+from jounce.constraints import Cam, Rope
 from jounce.constraints.base import Vector, by_ratio_alone
+from jounce.constraints.planar import Belt
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.inverse.tooth_flanks import flank_words
 from jounce.dynamics.masses import check_loads
@@ -128,6 +129,30 @@ class _Reaction(AbstractForceOutput):
         return self.unit == "N" or mechanism.space == "spatial"
 
 
+def slack_words(time: np.ndarray, tensions: np.ndarray) -> str:
+    """Say at which instants a rope would have to push, where it is slack; nothing where it pulls.
+
+    Examples
+    --------
+    >>> slack_words(np.array([0.0, 0.1, 0.2]), np.array([3.0, 1.0, -0.5]))
+    'is below zero at t = 0.2 s: the rope is slack there, and holds nothing'
+    >>> slack_words(np.array([0.0, 0.1, 0.2, 0.3]), np.array([-3.0, -1.0, 0.5, -1.0]))
+    'is below zero from t = 0 s to 0.1 s, at 0.3 s: the rope is slack there, and holds nothing'
+    """
+    known = np.isfinite(tensions)
+    times, pushes = time[known], tensions[known] < -ROUNDING * np.max(np.abs(tensions[known]), initial=0.0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], pushes, [False]]).astype(int)))
+    parts = []
+    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+        alone = first == last
+        parts.append(f"at {times[first]:.4g} s" if alone else f"from {times[first]:.4g} s to {times[last]:.4g} s")
+    if not parts:
+        return ""
+    parts[0] = parts[0].replace(" ", " t = ", 1)
+    more = ", ..." if len(parts) > MOST_SHOWN else ""
+    return f"is below zero {', '.join(parts[:MOST_SHOWN])}{more}: the rope is slack there, and holds nothing"
+
+
 class _JointOutput(_Reaction):
     joint: str = eqx.field(static=True)
     body: str | None = eqx.field(
@@ -155,9 +180,11 @@ class _JointOutput(_Reaction):
         cams = [
             name for name, x in joints.items() if isinstance(x, Cam) and name != self.joint and bodies & {*x.bodies}
         ]
+        belts = [name for name, x in joints.items() if isinstance(x, Belt) and bodies & {*x.bodies}]
         forces = MotionForces.of(motion)
-        loaded, pressed = ([x for x in names if forces.is_loaded(x)] for names in (gears, cams))
-        words = super().remark(motion, values), ratio_words(loaded), cam_words(pressed), flank_words(forces, bodies)
+        loaded, pressed, pulled = ([x for x in names if forces.is_loaded(x)] for names in (gears, cams, belts))
+        told = ratio_words(loaded), cam_words(pressed), belt_words(pulled), flank_words(forces, bodies)
+        words = super().remark(motion, values), *told
         return "; ".join(filter(None, words))
 
     def _values(self, motion: Motion, point: ArrayLike | None, part: int, size: float) -> Numbers:
@@ -187,6 +214,12 @@ def cam_words(names: Sequence[str]) -> str:
     return f"{', '.join(names)} {verb} between coordinates: bearings show no contact force" if names else ""
 
 
+def belt_words(names: Sequence[str]) -> str:
+    """Say of belts what the reactions of bearings leave out; nothing where there are none."""
+    words = "bearings show the difference of the pulls of its strands, not the tension with which it is put on"
+    return f"{', '.join(names)}: {words}" if names else ""
+
+
 def _exerting(mechanism: Mechanism, name: str) -> Any:
     """Return the joint or driver of a name, or the applied force if there is none."""
     return {**mechanism.forces, **mechanism.joints, **mechanism.drivers}[name]
@@ -198,14 +231,61 @@ def _is_load(element: Any) -> bool:
 
 
 class JointForceOutput(_JointOutput):
-    """Reaction force of a joint, driver or force between bodies on one of its bodies, or on the ground, N."""
+    """Reaction force of a joint, driver or force between bodies on one of its bodies, or on the ground, N.
+
+    Of a rope, unless the body is given, it is the tension; of a belt, the pull of the strand on the left of the line
+    of centers, seen from the first pulley to the second where it leaves that, less the pull of the other strand.
+    """
 
     unit = "N"
     rate_names = ("force", *RATES)
 
+    def _is_line(self, mechanism: Mechanism) -> bool:
+        return self.body is None and hasattr(mechanism.joints.get(self.joint), "line_force")
+
+    def is_vector(self, mechanism: Mechanism) -> bool:
+        """Tell whether the force has components: that along a rope or a belt has none."""
+        return not self._is_line(mechanism)
+
+    def check(self, mechanism: Mechanism) -> None:
+        """Raise MechanismError unless the mechanism has the joint, its body and masses or applied forces."""
+        super().check(mechanism)
+        if self._is_line(mechanism) and self.frame != "global":
+            message = "a force along a rope or a belt has no frame; give the body for the force on it"
+            raise MechanismError(message, name="frame", value=self.frame)
+
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
+        if self._is_line(motion.mechanism):
+            return MotionForces.of(motion).unique(lambda forces: forces.line_force(self.joint))
         return self._values(motion, None, 0, 1.0)
+
+    def remark(self, motion: Motion, values: np.ndarray) -> str:
+        """Return why values are NaN, what they leave out, and where a rope is slack."""
+        if not self._is_line(motion.mechanism):
+            return super().remark(motion, values)
+        rope = isinstance(motion.mechanism.joints[self.joint], Rope)
+        slack = slack_words(motion.time, values[:, 0]) if rope else ""
+        return "; ".join(filter(None, [AbstractForceOutput.remark(self, motion, values), slack]))
+
+
+def slack_ropes(motion: Motion) -> dict[str, str]:
+    """Return of each rope that has no output of its tension where it is slack in a motion; nothing where none is.
+
+    What rests on a rope that would have to push is wrong there, whatever is asked for. Nothing is told of a mechanism
+    without masses and applied forces, nor of a motion without accelerations.
+    """
+    mechanism, found = motion.mechanism, {}
+    ropes = [name for name, joint in mechanism.joints.items() if isinstance(joint, Rope)]
+    told = {x.joint for x in mechanism.outputs.values() if isinstance(x, JointForceOutput) and x.body is None}
+    loaded = mechanism.forces or any(body.mass is not None for body in mechanism.rigid_bodies.values())
+    if not loaded or len(motion.poses[1]["position"]) < 3:
+        return {}
+    for name in (name for name in ropes if name not in told):
+        tension = JointForceOutput(name).coefficients(motion)
+        if words := slack_words(motion.time, np.asarray(tension)[0, 0]):
+            found[name] = f"its tension {words}"
+    return found
 
 
 class JointTorqueOutput(_JointOutput):

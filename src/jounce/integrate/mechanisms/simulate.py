@@ -31,6 +31,7 @@ from jounce.kinematics import Status, raise_for_status
 from jounce.kinematics.position_analysis.curve_ends import beyond_end, ends_of
 from jounce.kinematics.results.motion import check_output, output_group
 from jounce.mechanism import Mechanism, Model, ParameterOutput, ParametersOutput, check_mechanism
+from jounce.mechanism.belts import check_room
 from jounce.mechanism.element_indices import force_names
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete_or
@@ -202,6 +203,7 @@ def simulate(
     run.note_ends(len(events))
     outcome = run.ending, run.events.happened[: len(events)], joined(run.backends)
     simulation = Simulation(mechanism, start, run.dense_output, instants, order, *outcome)
+    check_room(simulation)
     if strict and run.events.stopped_at is None:
         raise_for_status(simulation)
     return simulation

@@ -33,7 +33,8 @@ class FileKey:
     fields : tuple of str
         Fields of the class that it fills; more than one when the key holds a list with an entry for each body.
     kind : str
-        ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``curve``, ``text``, ``parts``.
+        ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``flag``, ``points``, ``curve``,
+        ``text`` or ``parts``.
     quantity : str
         Kind of unit that the class states: one of ``units.KINDS``; or ``direction`` (any unit, the same in all
         components), or ``of coordinate`` and ``per angle``, which follow the key ``coordinate`` beside it.

@@ -7,13 +7,14 @@ a file is loaded, since pydantic takes a while.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Annotated, Any, Literal, Union
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, create_model
 
 from jounce.constraints import catalogue
+from jounce.constraints.base import counted
 from jounce.constraints.facts import facts_of
 from jounce.errors import JounceError, MechanismFileError, no_such
 from jounce.io.mechanisms.curve_values import curve
@@ -25,6 +26,7 @@ from jounce.io.mechanisms.values import (
     Checked,
     orientation,
     parts,
+    points,
     problem,
     redundant_reactions,
     scalar,
@@ -45,6 +47,12 @@ _Types = tuple[tuple[str, type[Any]], ...]
 def _text(raw: object, _info: Any) -> str:
     if not isinstance(raw, str):
         raise problem("must be text")
+    return raw
+
+
+def _flag(raw: object, _info: Any) -> bool:
+    if not isinstance(raw, bool):
+        raise problem("must be true or false")
     return raw
 
 
@@ -93,12 +101,12 @@ def _assembly(raw: object, info: Any) -> Any:
     raise problem(f"must be a number from 1, {NEAREST}, or for bodies one of {', '.join(SIDES)}")
 
 
-def _names(*counts: int) -> Any:
+def _names(counts: Sequence[int]) -> Any:
     """Return the annotation of a list of names of bodies, as many as one of the counts."""
 
     def check(raw: object, info: Any) -> tuple[str, ...]:
         if not isinstance(raw, (list, tuple)) or len(raw) not in counts:
-            raise problem(f"must be a list of {' or '.join(map(str, counts))} names of bodies")
+            raise problem(f"must be a list of {counted(counts)} names of bodies")
         for index, name in enumerate(raw):
             _check_body(name, info, index)
         return tuple(raw)
@@ -148,6 +156,13 @@ def _model(name: str, doc: str | None, fields: dict[str, tuple[Any, Any]]) -> ty
     return create_model(name, __config__=config, __doc__=" ".join(summary.split()), **aliased)  # type: ignore[call-overload]
 
 
+_PLAIN = {
+    "flag": Annotated[Any, Checked(_flag, {"type": "boolean"})],
+    "whole": Annotated[Any, Checked(_whole, {"type": "integer", "minimum": 0})],
+    "wrenches": wrenches(),
+}
+
+
 def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
     match key.kind:
         case "law":
@@ -164,15 +179,15 @@ def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
             return vector(size, key.quantity)
         case "vector":
             return vectors(len(key.fields), size, key.quantity)
-        case "wrenches":
-            return wrenches()
         case "curve":
             return curve(kind.hidden, size)
         case "parts":
             kinds = {name: facts_of(kind).dimensions[field] for name, field in zip(key.names, key.fields, strict=True)}
             return parts(kinds, size)
-        case "whole":
-            return Annotated[Any, Checked(_whole, {"type": "integer", "minimum": 0})]
+        case "points":
+            return points(size, key.quantity)
+        case "flag" | "whole" | "wrenches":
+            return _PLAIN[key.kind]
     choices = facts_of(kind).choices.get(key.fields[0])
     words = {"enum": list(choices)} if choices else {"type": "string"}
     return Annotated[Any, Checked(_text, words)]
@@ -186,7 +201,7 @@ def _values(kind: type[Any], size: int) -> dict[str, tuple[Any, Any]]:
 def _bodies(kind: type[Any]) -> dict[str, tuple[Any, Any]]:
     """Return the key of the bodies of a class: ``body`` for one alone."""
     if kind.body_count > 1:
-        return {"bodies": (_names(*(getattr(kind, "body_counts", ()) or (kind.body_count,))), ...)}
+        return {"bodies": (_names(getattr(kind, "body_counts", ()) or (kind.body_count,)), ...)}
     return {"body": (Annotated[Any, Checked(_check_body, {"type": "string"})], ...)}
 
 

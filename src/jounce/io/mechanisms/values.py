@@ -174,6 +174,18 @@ def parts(kinds: dict[str, str], size: int) -> Any:
     return Annotated[Any, Checked(check, schema)]
 
 
+def points(size: int, quantity: str) -> Any:
+    """Return the annotation of points, one on each body of a list of any length."""
+
+    def check(raw: object, info: Any) -> tuple[Any, ...]:
+        count = len(info.data.get("key_bodies") or ())
+        if not isinstance(raw, (list, tuple)) or (count and len(raw) != count):
+            raise problem(f"must be a list of {count or 'several'} points, one for each body in the order of bodies")
+        return tuple(vector_value(item, size, quantity, info, index) for index, item in enumerate(raw))
+
+    return Annotated[Any, Checked(check, {"type": "array", "items": vector_schema(size, quantity), "minItems": 2})]
+
+
 def wrenches() -> Any:
     """Return the annotation of rows of six values: a force and a moment."""
 

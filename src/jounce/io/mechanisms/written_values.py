@@ -17,7 +17,7 @@ def plain(value: Any, location: str) -> Any:
     """Return a value as numbers, text and lists; whole numbers without a point."""
     if isinstance(value, Expression):
         return value.text
-    if isinstance(value, str):
+    if isinstance(value, str | bool):
         return value
     if isinstance(value, numbers.Real) or (np.shape(value) == () and hasattr(value, "dtype")):
         return plain_number(float(value), location)

@@ -20,6 +20,7 @@ from jounce.kinematics.assembly.initial_revolutions import (
     nearest_turns,
     turned_to_laws,
 )
+from jounce.kinematics.assembly.loose_bodies import missing_joint_words
 from jounce.kinematics.assembly.redundancy import Redundancy, redundancy
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
@@ -223,11 +224,17 @@ def check_assembled(model: Model, found: AssemblyAttempt, instant: float, *, fre
         message += " (`assembly: nearest` looks from random starts)"
     extra = _structural_excess(model, found, instant)
     if extra:
-        message += (
-            f"; {_count(extra, 'equation')} more than coordinates are among them, and redundant constraints contradict "
-            "each other by that much: correct lengths and axes, free a direction there, or raise the tolerance if the "
-            "numbers are no more exact"
+        details = (
+            f"{message}; {_count(extra, 'equation')} more than coordinates are among them, and redundant constraints "
+            "contradict each other by that much: correct lengths and axes, free a direction there, or raise the "
+            "tolerance if the numbers are no more exact"
         )
+        others = " and others" if len(open_rows) > 2 else ""
+        message = (
+            f"over-constrained at t = {instant:g} s: {', '.join(open_rows[:2])}{others} "
+            f"contradict each other, by {wide[open_rows[0]]}; correct lengths, or take out a joint"
+        )
+        raise AssemblyError(message, status=Status.NOT_ASSEMBLED, details=details)
     missing = found.jacobian.shape[1] - len(model.rows)
     if missing > 0 and not free:
         message += f"; {_count(missing, 'equation')} too few for all coordinates: a joint may be missing"
@@ -309,6 +316,8 @@ def check_mobility(model: Model, found: Redundancy, *, free: bool = False) -> No
         moving = freely_moving(model, found.jacobian.free_directions)
         remedy = f"add {_count(left_over, 'driver')}, or simulate it under its forces"
         parts.append(f"{left_over} {noun} left, with which {moving} can move: {remedy}")
+        if hint := missing_joint_words(model, moving_bodies(model, found.jacobian.free_directions), left_over):
+            parts.append(hint)
     if found.count:
         parts.append(f"{found}, which is no fault as they agree")
     if found.is_singular:
@@ -323,16 +332,18 @@ def check_mobility(model: Model, found: Redundancy, *, free: bool = False) -> No
 
 def freely_moving(model: Model, directions: Float[np.ndarray, "direction column"]) -> str:
     """Name the bodies that move along directions of the coordinates, shape (directions, columns)."""
-    sizes = np.linalg.norm(directions.reshape(len(directions), len(model.bodies), -1), axis=(0, 2))
-    own = [k for k, name in enumerate(model.bodies) if not name.endswith(ENDING)]  # carriages move with the bodies
-    return _concerned(sizes[own], tuple(model.bodies[k] for k in own))
-
-
-def _concerned(weights: Float[np.ndarray, " name"], names: tuple[str, ...]) -> str:
-    order = np.argsort(-weights, kind="stable")
-    chosen = [names[k] for k in order if weights[k] > 0.05 * weights[order[0]]]
+    chosen = moving_bodies(model, directions)
     shown = ", ".join(chosen[:6])
     return shown + (f" and {len(chosen) - 6} more" if len(chosen) > 6 else "")
+
+
+def moving_bodies(model: Model, directions: Float[np.ndarray, "direction column"]) -> list[str]:
+    """Return the bodies that move along directions of the coordinates, the one that moves most first."""
+    sizes = np.linalg.norm(directions.reshape(len(directions), len(model.bodies), -1), axis=(0, 2))
+    own = [k for k, name in enumerate(model.bodies) if not name.endswith(ENDING)]  # carriages move with the bodies
+    weights, names = sizes[own], [model.bodies[k] for k in own]
+    order = np.argsort(-weights, kind="stable")
+    return [names[k] for k in order if weights[k] > 0.05 * weights[order[0]]]
 
 
 def _count(number: int, noun: str) -> str:

@@ -116,9 +116,10 @@ class Designs:
             signs = facts_of(type(group.element)).signs
             for name, kind in field_kinds(type(group.element)).items():
                 value = getattr(group.element, name)
-                if kind not in ("scalar", "vector") or value is None:
+                if kind not in ("scalar", "vector", "points") or value is None:
                     continue
-                entries = value if kind == "vector" else np.asarray(value)[None]
+                entries = np.asarray(value)
+                entries = entries if kind == "vector" else entries.reshape(-1, *entries.shape[-2:])
                 entries = np.broadcast_to(entries, (*np.shape(entries)[:-1], len(lanes)))
                 bad |= _unfit(signs[name], entries)
         return bad

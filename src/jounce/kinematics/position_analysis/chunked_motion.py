@@ -13,6 +13,7 @@ from jounce.kinematics.results.actuation import actuated
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism
+from jounce.mechanism.belts import check_room
 from jounce.mechanism.time import Instants, instants_of
 
 
@@ -72,7 +73,9 @@ class Stretches:
             self.status[first + failed] = part.status[failed]
             self.faults |= {first + lane: fault for lane, fault in part.faults.items()}
             outcome = part.status, part.faults, self.passages, history, self.backend
-            yield actuated(Motion(self.mechanism, model, part.time, self.order, part.state, *outcome))
+            motion = actuated(Motion(self.mechanism, model, part.time, self.order, part.state, *outcome))
+            check_room(motion)
+            yield motion
 
 
 def takes_stretches(mechanism: Mechanism) -> bool:

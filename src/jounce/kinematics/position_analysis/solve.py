@@ -38,6 +38,7 @@ from jounce.mechanism import (
     with_outputs_held,
 )
 from jounce.mechanism.axis_angles import AttitudeHistory, lost_count
+from jounce.mechanism.belts import check_room
 from jounce.mechanism.builder import group_rows
 from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
@@ -154,6 +155,7 @@ def solve(
     told = path.history(), _backend(solver, path, instants)
     _check_count(solver.model, told[0])
     motion = actuated(Motion(mechanism, solver.model, instants, order, state, *outcome, *told))
+    check_room(motion)
     if strict:
         raise_for_status(motion)
     return motion

@@ -26,7 +26,7 @@ class TrainFacts(TypedDict):
 
 
 def train_facts(state: StartingState) -> list[dict[str, Any]]:
-    """Return the speed ratios of all planar bodies that mesh, at the position put together: TrainFacts.
+    """Return the speed ratios of all planar bodies that mesh or have a belt, at the position put together: TrainFacts.
 
     Parameters
     ----------
@@ -66,11 +66,11 @@ def train_facts(state: StartingState) -> list[dict[str, Any]]:
 
 
 def _meshing(mechanism: Any) -> list[str]:
-    """Return the moving bodies that gears turn, in the plane."""
+    """Return the moving bodies that gears and belts turn, in the plane."""
     found: dict[str, None] = {}
     for joint in mechanism.joints.values() if mechanism.space == "planar" else ():
         symbol = facts_of(type(joint)).symbol
-        if symbol == "gear" or (symbol == "coordinate" and joint.coordinate == "angle"):
+        if symbol in ("gear", "belt") or (symbol == "coordinate" and joint.coordinate == "angle"):
             found |= dict.fromkeys(body for body in joint.bodies if body != GROUND)
     return list(found)
 

@@ -12,7 +12,8 @@ from typing_extensions import TypedDict
 
 from jounce.constraints import Cam
 from jounce.constraints.base import by_ratio_alone, value_fields
-from jounce.dynamics.inverse.outputs import cam_words, ratio_words
+from jounce.constraints.planar import Belt
+from jounce.dynamics.inverse.outputs import belt_words, cam_words, ratio_words
 from jounce.errors import JounceError
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.output_types import OUTPUTS, output_holder
@@ -25,6 +26,7 @@ from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.mechanism.time import last_step_words
 from jounce.reporting.facts.freedom_facts import AssemblyFacts, FreedomFacts, MobilityFacts, StartingState
 from jounce.reporting.facts.gear_facts import TrainFacts, train_facts
+from jounce.reporting.facts.line_facts import LineFacts, line_facts
 from jounce.reporting.facts.range_facts import RangeFacts
 from jounce.reporting.text.law_facts import LawFacts, law_facts
 from jounce.trajectory import OutputMotion, SegmentedMotion
@@ -127,6 +129,7 @@ class InspectedMechanism(MechanismFacts):
     assembly: AssemblyFacts
     ok: bool
     trains: list[TrainFacts]
+    lines: list[LineFacts]
     remarks: list[str]
     range: NotRequired[RangeFacts | None]
 
@@ -189,6 +192,7 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
         "assembly": state.assembly,
         "ok": state.ok,
         "trains": train_facts(state),
+        "lines": line_facts(state),
         "remarks": _remarks(mechanism),
     }
 
@@ -200,7 +204,8 @@ def _remarks(mechanism: Mechanism) -> list[str]:
     joints = mechanism.joints.items()
     gears = ratio_words([name for name, joint in joints if by_ratio_alone(joint)])
     cams = cam_words([name for name, joint in joints if isinstance(joint, Cam)])
-    return [words for words in (gears, cams) if words]
+    belts = belt_words([name for name, joint in joints if isinstance(joint, Belt)])
+    return [words for words in (gears, cams, belts) if words]
 
 
 def _time(mechanism: Mechanism) -> dict[str, Any] | None:

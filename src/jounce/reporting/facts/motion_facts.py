@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from typing_extensions import TypedDict
 
+from jounce.dynamics.inverse.outputs import slack_ropes
 from jounce.integrate import Simulation
 from jounce.kinematics import Motion, Status, Stretches
 from jounce.mechanism import AbstractMotionOutput, build, with_outputs_held
@@ -130,6 +131,8 @@ def _remarks(motion: Motion | Stretches) -> list[str]:
     for name, instants in unbounded_outputs(motion).items():
         where = ", ".join(f"{instant:g} s" for instant in instants[:6]) + (", ..." if len(instants) > 6 else "")
         remark = f"grows without bound toward t = {where}, its extremes say only how near an instant comes"
+        names.setdefault(remark, []).append(name)
+    for name, remark in (slack_ropes(motion) if isinstance(motion, Motion) else {}).items():
         names.setdefault(remark, []).append(name)
     remarks = [f"{', '.join(those)}: {remark}" for remark, those in names.items()]
     return [*filter(None, [last_step_words(motion.time)]), *remarks]

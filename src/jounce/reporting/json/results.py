@@ -78,6 +78,8 @@ def complaint(kind: str, problem: object) -> str:
     else:
         record |= {"message": str(cause_or_problem), "file": None, "line": None, "name": None, "value": None}
     record["text"] = " ".join(str(cause_or_problem).split())
+    if details := getattr(cause_or_problem, "details", ""):
+        record["details"] = details
     return json.dumps({kind: record}, allow_nan=False)
 
 

@@ -80,8 +80,9 @@ class ViserScene:
         spring = its.kind == "spring"
         mesh = coil(8, its.radius, 0.16 * its.radius) if spring else cylinder(its.radius, 1.0, center=(0, 0, 0.5))
         handle = self._mesh(f"/connectors/{its.name}", mesh, its.color)
-        ends = zip(its.bodies, its.points, strict=True)
-        start, end = (recording.global_point(body, point) + 0.85 * in_front(recording) for body, point in ends)
+        points = zip(its.bodies, its.points, strict=True)
+        ends = its.ends or tuple(recording.global_point(body, point) for body, point in points)
+        start, end = (place + 0.85 * in_front(recording) for place in ends)
         return handle, start, end
 
     def show(self, overlay: Overlay, frame: int) -> None:

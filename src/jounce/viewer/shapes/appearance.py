@@ -71,18 +71,20 @@ class BodyPoint:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Connector:
-    """What joins a point of one body to a point of another: a rod, a spring, an actuator.
+    """What joins a point of one body to a point of another: a rod, a spring, an actuator, a span of a belt or a rope.
 
     Parameters
     ----------
     name : str
-    kind : {"rod", "spring", "actuator"}
+    kind : {"rod", "spring", "actuator", "line"}
     bodies : tuple of str
     points : tuple of numpy.ndarray
         One on each body, in its frame, m.
     radius : float
         m.
     color : tuple of int
+    ends : tuple of numpy.ndarray of shape (time, 3)
+        Where it begins and ends in the ground, m, where that is no point of a body.
     """
 
     name: str
@@ -91,6 +93,7 @@ class Connector:
     points: tuple[Float[np.ndarray, " components"], ...]
     radius: float
     color: Color
+    ends: tuple[Float[np.ndarray, "time 3"], ...] = ()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
 from jounce.kinematics import Motion
 from jounce.mechanism import Mechanism, PointOutput
+from jounce.mechanism.belts import belt_course, belt_outline
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.resolve import resolve
+from jounce.plot.frames import frames, points_at
 from jounce.plot.geometry import Skeleton, skeleton
 from jounce.viewer.shapes.appearance import (
     BODY_COLORS,
@@ -22,10 +25,12 @@ from jounce.viewer.shapes.appearance import (
     upward,
 )
 from jounce.viewer.shapes.mechanism_meshes import THICKNESS, planar_meshes, spatial_meshes
+from jounce.viewer.shapes.recording import spatial_vectors
 
 __all__ = ["mechanism_appearance"]
 
 ROD, SPRING, ACTUATOR = ("rod", 0.012, GRAY), ("spring", 0.022, (90, 120, 90)), ("actuator", 0.016, (136, 34, 85))
+ROPE, BROWN = 0.005, (138, 90, 43)
 CONNECTORS = {  # by symbol: kind, radius in sizes of the mechanism, and color
     "rod": ROD,
     "spring": SPRING,
@@ -52,7 +57,7 @@ def mechanism_appearance(motion: Motion) -> Appearance:
         meshes[body].append(ColoredMesh(mesh, color))
     return Appearance(
         meshes=meshes,
-        connectors=list(_connectors(seen)),
+        connectors=[*_connectors(seen), *_lines(motion, seen)],
         points=_points(mechanism, seen),
         size=seen.size,
         up=(0.0, 1.0, 0.0) if planar else upward(_gravity(mechanism)),
@@ -71,6 +76,25 @@ def _connectors(seen: Skeleton) -> Iterator[Connector]:
         if symbol.kind in CONNECTORS and len(symbol.bodies) == 2:
             kind, share, color = CONNECTORS[symbol.kind]
             yield Connector(symbol.name, kind, symbol.bodies, symbol.points, share * seen.size, color)
+
+
+def _lines(motion: Motion, seen: Skeleton) -> Iterator[Connector]:
+    """Give the spans of ropes, and the strands of belts."""
+    for symbol in seen.symbols:
+        if symbol.kind == "rope":
+            for k, slots in enumerate(pairwise(range(len(symbol.bodies)))):
+                bodies = tuple(symbol.bodies[slot] for slot in slots)
+                points = tuple(symbol.points[slot] for slot in slots)
+                yield Connector(f"{symbol.name} {k + 1}", "line", bodies, points, ROPE * seen.size, BROWN)
+        elif symbol.kind == "belt":
+            whole, radii = frames(motion), [radius or 0.0 for radius in symbol.radii]
+            centers = [points_at(whole[symbol.bodies[slot]], symbol.points[slot]).T for slot in (0, 1)]
+            course = belt_course(centers[0], centers[1], radii, symbol.crossed)
+            outline = spatial_vectors(belt_outline(course, centers, radii, symbol.crossed))
+            half = outline.shape[1] // 2
+            for k, (first, last) in enumerate(((-1, 0), (half - 1, half))):
+                ends = outline[:, first], outline[:, last]
+                yield Connector(f"{symbol.name} {k + 1}", "line", (), (), ROPE * seen.size, DARK, ends)
 
 
 def _points(mechanism: Mechanism, seen: Skeleton) -> list[BodyPoint]:

@@ -169,6 +169,9 @@ def spatial_meshes(motion: Motion, skeleton: Skeleton, colors: Mapping[str, Colo
         elif symbol.kind in ("curve", "surface"):
             yield from _groove(motion, symbol, skeleton.size)
             yield symbol.bodies[1], sphere(1.3 * radius, symbol.points[1]), DARK
+        elif symbol.kind == "rope":
+            for body, point in zip(symbol.bodies, symbol.points, strict=True):
+                yield body, sphere(1.1 * radius, point), DARK
         elif symbol.kind in ("gear", "wheel"):
             yield from _shaft_wheels(symbol, skeleton.size, colors)
         else:

@@ -1,0 +1,89 @@
+"""Ropes: lines of one length through points of bodies, in the plane and in space."""
+
+from itertools import pairwise
+from typing import Any
+
+import equinox as eqx
+
+from jounce.constraints.base import AbstractConstraint, Points, Scalar
+from jounce.errors import MechanismError
+from jounce.jet import Jet, sqrt
+from jounce.jet.algebra import total
+from jounce.shapes import Numbers
+
+
+class Rope(AbstractConstraint, type="rope"):
+    """Rope, cable or string of one length that runs without friction through points of bodies in their order.
+
+    Its distances from point to point add up to the length. A block and tackle is a rope through a point of the moving
+    block and one of the ground in turn. The multiplier is the tension, the same all along: positive where the rope
+    pulls, negative where it would have to push, and is slack.
+
+    Parameters
+    ----------
+    bodies : tuple of str
+        Names of the bodies in the order of the points; one may be there several times.
+    points : sequence of sequence of float
+        One on each of them, in its frame, m.
+    length : float
+        Of the whole rope between its ends, m.
+
+    Raises
+    ------
+    MechanismError
+        If a rope has less than two bodies, or all points are on one.
+
+    Examples
+    --------
+    >>> import jounce as jn
+    >>> weights = ("a", "ground", "ground", "b")
+    >>> jn.joints.Rope(weights, [[0, 0], [-0.1, 0], [0.1, 0], [0, 0]], length=1.2).bodies
+    ('a', 'ground', 'ground', 'b')
+    """
+
+    points: Points  # m, one on each body in its frame
+    length: Scalar  # m
+    slots: tuple[int, ...] = eqx.field(
+        static=True, default=(), init=False
+    )  # of the body of each point, where some repeat
+
+    body_counts = range(2, 101)
+    may_repeat = True
+    symbol = "rope"
+
+    def __check_init__(self):
+        if len(set(self.bodies)) < 2:
+            message = "a rope joins two bodies or more, and all its points are on one"
+            raise MechanismError(message, name="bodies", value=list(self.bodies))
+
+    def residual(self, *bodies_and_time: Any) -> Jet:
+        """Return by how much the distances from point to point exceed the length, m."""
+        *bodies, _ = bodies_and_time
+        places = [bodies[slot].point(self.points[k]) for k, slot in enumerate(self.slots or range(len(bodies)))]
+        spans = [after - before for before, after in pairwise(places)]
+        return total(sqrt(span.dot(span)) for span in spans) - self.length
+
+    def line_force(self) -> float:
+        """Return the tension, N, for a multiplier."""
+        return 1.0
+
+    def first_on(self, slot: int) -> Numbers:
+        """Return the first point on the body of a slot, in its frame, m."""
+        return self.points[(self.slots or tuple(range(len(self.points)))).index(slot)]
+
+
+def distinct(bodies: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    """Return bodies each once, and the slot of each among them.
+
+    Examples
+    --------
+    >>> distinct(("a", "ground", "ground", "b"))
+    (('a', 'ground', 'b'), (0, 1, 1, 2))
+    """
+    once = tuple(dict.fromkeys(bodies))
+    return once, tuple(map(once.index, bodies))
+
+
+def shares_points(element: Any) -> bool:
+    """Tell whether an element has several points on one body."""
+    return isinstance(element, Rope) and len(set(element.bodies)) < len(element.bodies)

@@ -1,0 +1,51 @@
+"""Bodies that hang loose: those that can move and that one joint alone holds, or none, as where one is missing."""
+
+from collections.abc import Sequence
+
+from jounce.mechanism import Model
+from jounce.mechanism.builder import group_rows
+from jounce.mechanism.mechanism import GROUND
+
+OF_A_HINGE = {2: 2, 3: 5}  # equations, by the components of positions
+MOST_NAMED = 3
+
+
+def joints_of(model: Model) -> dict[str, list[str]]:
+    """Return the names of the joints that hold each body, drivers left out."""
+    names = (GROUND, *model.bodies)
+    found: dict[str, list[str]] = {name: [] for name in names}
+    for group, rows in zip(model.system.groups, group_rows(model), strict=True):
+        for k, row in enumerate(model.rows[rows][: group.instances]):
+            kind, _, name = row.partition(".")
+            if kind == "joints":
+                for slot in group.bodies:
+                    if name not in found[names[slot[k]]]:
+                        found[names[slot[k]]].append(name)
+    return found
+
+
+def missing_joint_words(model: Model, moving: Sequence[str], left: int) -> str:
+    """Say which joint may be missing where bodies have degrees of freedom left; nothing where no body hangs loose.
+
+    Parameters
+    ----------
+    model : Model
+        Put together.
+    moving : sequence of str
+        Names of the bodies that can move.
+    left : int
+        Degrees of freedom.
+    """
+    joints = joints_of(model)
+    loose = [body for body in moving if len(joints[body]) <= 1]
+    if not loose or (len(loose) == 1 and left == 1 and joints[loose[0]]):
+        return ""  # a crank, which a driver may be missing of
+    held = [f"by {joints[body][0]} alone" if joints[body] else "by no joint" for body in loose]
+    first, *others = zip(loose, held, strict=True)
+    told = [f"{first[0]} is held {first[1]}", *map(" ".join, others[: MOST_NAMED - 1])]
+    words = f"{', '.join(told)}{', ...' if len(held) > MOST_NAMED else ''}"
+    if len(loose) != 2:
+        return f"{words}: is a joint missing?"
+    components = model.pose_type.shifts
+    kind = "a revolute joint" if left in (OF_A_HINGE[components], OF_A_HINGE[components] + 1) else "a joint"
+    return f"{words}: is {kind} missing between them, bodies: [{loose[0]}, {loose[1]}]?"
