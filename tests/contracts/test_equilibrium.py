@@ -56,8 +56,8 @@ def by_coordinates():
 
 
 def is_carried(element):
-    """Gears on bodies that others carry, and teeth, which press apart: right in whole mechanisms only, see below."""
-    toothed = isinstance(element, planar.Gear) and element.ratio is None
+    """Gears and belts on bodies that others carry, and teeth, which press apart: right in whole mechanisms only."""
+    toothed = isinstance(element, planar.Belt) or (isinstance(element, planar.Gear) and element.ratio is None)
     return toothed or isinstance(element, spatial.Gear) or getattr(element, "pressure_angle", None) is not None
 
 
@@ -93,7 +93,7 @@ def test_what_is_exerted_has_no_resultant_and_the_power_of_what_it_works_on(spac
     random = np.random.default_rng(5)
     elements, rates = subjects(space), RATES_OF_ONE[space]
     pose, found = acting(elements, space, rates, np.random.default_rng(3))
-    missing = {kind for role in ROLES for kind in catalogue(space, role).values()} - {spatial.Gear}
+    missing = {kind for role in ROLES for kind in catalogue(space, role).values()} - {spatial.Gear, planar.Belt}
     spins = spins_of(pose)
     for name, element in elements.items():
         exerted = resultant(found, name, element, pose, random, spins)
@@ -164,6 +164,7 @@ MOTIONS = {
     "pair that falls": lambda: jn.simulate(falling(), [0.0, 0.2], order=ORDER),
     "plane": lambda: jn.solve(MECHANISMS["plane"](), [0.0, 0.3, 0.8], ORDER),
     "teeth": lambda: jn.solve(MECHANISMS["teeth"](), [0.0, 0.3, 0.8], ORDER),
+    "lines": lambda: jn.solve(MECHANISMS["lines"](), [0.0, 0.3, 0.8], ORDER),
     "robot with a loop": lambda: jn.solve(loop(), [0.0, 0.8], ORDER),
 }
 
