@@ -229,11 +229,11 @@ def check_assembled(model: Model, found: AssemblyAttempt, instant: float, *, fre
             "contradict each other by that much: correct lengths and axes, free a direction there, or raise the "
             "tolerance if the numbers are no more exact"
         )
-        shown = open_rows[:2]
-        named = f"{', '.join(shown)}{' and others' if len(open_rows) > 2 else ''}"
+        shown, others = open_rows[:2], " and others" if len(open_rows) > 2 else ""
+        verb, gaps_of_shown = "stays" if len(open_rows) == 1 else "stay", ", ".join(wide[name] for name in shown)
         message = (
-            f"over-constrained at t = {instant:g} s: {named} {'stays' if len(open_rows) == 1 else 'stay'} open, by "
-            f"{', '.join(wide[name] for name in shown)}, and contradict each other; correct lengths, or take out a joint"
+            f"over-constrained at t = {instant:g} s: {', '.join(shown)}{others} {verb} open, by {gaps_of_shown}, and "
+            "contradict each other; correct lengths, or take out a joint"
         )
         raise AssemblyError(message, status=Status.NOT_ASSEMBLED, details=details)
     missing = found.jacobian.shape[1] - len(model.rows)
