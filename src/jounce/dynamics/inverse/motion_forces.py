@@ -225,12 +225,6 @@ class MotionForces:
 
         return self._once(chunk, "driver", index.group)[:, index.instance : index.instance + 1]
 
-    def line_force(self, name: str) -> Float[Numbers, "order 1 time"]:
-        """Return the tension of a rope, or the pull of a belt, as Taylor coefficients."""
-        index = self.indices[name]
-        sizes = self._of_group(index)[:, 0] * self.model.system.groups[index.group].element.line_force()
-        return sizes[:, index.instance : index.instance + 1]
-
     def reaction(self, name: str, body: int, frame: int | None, point: Numbers) -> tuple[Any, Any]:
         """Return what a joint, driver or applied force does to a body, as force and moment about a point of it.
 

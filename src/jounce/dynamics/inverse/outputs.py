@@ -230,6 +230,13 @@ def _is_load(element: Any) -> bool:
     return isinstance(element, AbstractForce) and len(element.bodies) == 1
 
 
+def _along_line(forces: MotionForces, name: str) -> Numbers:
+    """Return the tension of a rope, or the pull of a belt, as Taylor coefficients, (levels, 1, time)."""
+    index = forces.indices[name]
+    factor = forces.model.system.groups[index.group].element.line_force()
+    return forces.multipliers[:, list(index.own_rows)] * (factor if np.ndim(factor) == 0 else factor[index.instance])
+
+
 class JointForceOutput(_JointOutput):
     """Reaction force of a joint, driver or force between bodies on one of its bodies, or on the ground, N.
 
@@ -257,7 +264,7 @@ class JointForceOutput(_JointOutput):
     def coefficients(self, motion: Motion) -> Numbers:
         """Return the Taylor coefficients of the force, (levels, components, time)."""
         if self._is_line(motion.mechanism):
-            return MotionForces.of(motion).unique(lambda forces: forces.line_force(self.joint))
+            return MotionForces.of(motion).unique(lambda forces: _along_line(forces, self.joint))
         return self._values(motion, None, 0, 1.0)
 
     def remark(self, motion: Motion, values: np.ndarray) -> str:
