@@ -264,12 +264,10 @@ class MotionForces:
         """Return the point of a joint, driver or force on a body, or the origin of the body where it has none there."""
         group, instance = self._member(name)
         slots = [slot for slot, its in enumerate(group.bodies) if its[instance] == body]
-        if slots and hasattr(group.element, "first_on"):  # of the points of a rope
-            return group.element.first_on(slots[0])[:, instance, 0]
         names = [f"point_{'ijmn'[slot : slot + 1]}" for slot in slots[:1]] + ["point"] * (len(group.bodies) == 1)
         given = [value for key in names if (value := getattr(group.element, key, None)) is not None]
-        size = self.pose_type.shifts
-        return given[0].reshape(size, -1)[:, instance] if given else np.zeros(size)
+        given += [group.element.first_on(slot) for slot in slots[:1] if hasattr(group.element, "first_on")]
+        return given[0].reshape(self.pose_type.shifts, -1)[:, instance] if given else np.zeros(self.pose_type.shifts)
 
     def _bodies_of(self, name: str) -> tuple[int, ...]:
         """Return the indices of the bodies of a joint, driver or force in their order; 0 is the ground."""
