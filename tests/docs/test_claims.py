@@ -76,7 +76,7 @@ def test_error_is_proportional_to_the_residual():
 
     def off(turn):
         """Return the residual of the rod, m^2, and the error of the jounce, with the rocker turned by an angle."""
-        angle = np.array([right[0] + turn])
+        angle, equations = np.array([right[0] + turn]), jn.constraint_equations(mechanism, time=instant)
         for order in range(1, 5):
             crank = {key: np.asarray(value)[:order] for key, value in pose["crank"].items()}
             state = {"crank": crank, "rocker": {"position": np.zeros((order, 2)), "angle": angle}}

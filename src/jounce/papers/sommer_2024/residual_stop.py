@@ -78,7 +78,7 @@ class ResidualStop:
             pairs = ((name, values, corrected[name]) for name, values in positions.items())
             positions = {name: np.where(going, np.asarray(moved), values) for name, values, moved in pairs}
         series = _outputs(self.system, positions, self.time, self.pose_type, self.output[0])
-        return plain_derivatives(np.asarray(series)[:, 0, self.output[1]]).T
+        return np.asarray(plain_derivatives(np.asarray(series)[:, 0, self.output[1]])).T
 
 
 def in_centimeters(case: ValidationCase) -> Mechanism:
