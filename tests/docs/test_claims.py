@@ -65,6 +65,7 @@ def test_recipes_of_a_revolute_joint():
     assert re.findall(r"rank (?:is )?(\d)", text) == [str(r) for r in ranks]
 
 
+@pytest.mark.slow
 def test_error_is_proportional_to_the_residual():
     text, instant = section("No threshold"), 0.35
     mechanism = VALIDATION_CASES["four_bar"].load()
