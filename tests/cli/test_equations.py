@@ -1,9 +1,11 @@
 """The command ``equations``: what it writes, prints and refuses."""
 
 import functools
+import json
 
 import numpy as np
 import pytest
+import xarray
 
 import jounce as jn
 from tests.problems.mechanisms import example
@@ -49,3 +51,28 @@ def test_bad_input(run, tmp_path, monkeypatch, options, words):
     assert status == 2
     assert words in " ".join(message.split())
     assert not list(tmp_path.iterdir())
+
+
+def test_values_along_the_motion_are_tables(run, tmp_path):
+    expected = jn.constraint_equations(jn.solve(jn.load(FOUR_BAR), [0.0, 0.5], order=2))
+    short = ("--format", "table", "--order", "2", "--joint", "BC")
+    file = tmp_path / "short.yaml"
+    grid = "{start: 0, stop: 2, step: 0.01}"
+    file.write_text(FOUR_BAR.read_text().replace(grid, "{start: 0, stop: 0.5, count: 2}"))
+    for ending in ("csv", "nc", "json"):
+        assert run(file, *short, "--out", tmp_path / f"values.{ending}")[0] == 0
+    table = np.genfromtxt(tmp_path / "values.csv", delimiter=",", names=True, deletechars="")
+    right = expected.right_side.sel(row="BC.1", derivative=2).values
+    np.testing.assert_array_equal(table["right_side_2.BC.1"], right)
+    np.testing.assert_array_equal(
+        table["jacobian.BC.1.crank.angle"], expected.jacobian.sel(row="BC.1", column="crank.angle")
+    )
+    values = json.loads((tmp_path / "values.json").read_text())
+    assert values["row"] == ["BC.1"]
+    assert values["right_side"]["dimensions"] == ["time", "derivative", "row"]
+    assert [level[2][0] for level in values["right_side"]["values"]] == right.tolist()
+    with xarray.open_dataset(tmp_path / "values.nc") as stored:
+        np.testing.assert_array_equal(stored.jacobian.sel(row="BC.1"), expected.jacobian.sel(row="BC.1"))
+    status, _, message = run(file, "--format", "table")
+    assert status == 2
+    assert "a table goes to a file" in message

@@ -25,6 +25,7 @@ from jounce.cli.cams import cam
 from jounce.cli.conversion import convert
 from jounce.cli.curves import trace
 from jounce.cli.designs import optimize
+from jounce.cli.energies import energies
 from jounce.cli.example_files import example
 from jounce.cli.exports import export
 from jounce.cli.feedforward import feedforward
@@ -73,7 +74,8 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
 
 COMMANDS = (
     new, example, inspect, run, trace, simulate, optimize, sweep, tolerance, modes, plot, report, view, servo, cam,
-    check, torques, smooth, retime, feedforward, export, convert, reproduce, equations, schema, completion, doctor,
+    check, torques, smooth, retime, feedforward, export, convert, reproduce, equations, energies, schema, completion,
+    doctor,
 )  # fmt: skip
 LIGHT = (new, example, completion)  # they compute nothing
 GARBAGE = 50_000  # new objects before the collector looks: imports and traces leave none, and 700 take 0.2 s of a run

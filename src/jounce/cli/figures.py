@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from jounce.cli.mechanisms import outcome, simulated, solved
+from jounce.cli.mechanisms import moved, outcome
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, errors_about, spare_inputs, written
 from jounce.errors import JounceError, MechanismError, check_name
 from jounce.reporting.terminal import Bar, say
@@ -90,7 +90,7 @@ def plot(
     spare_inputs(out, overwrite=overwrite)
     _check_names(mechanism, chosen, output or (), file)
     least = max(derivative or 0, ORDERS.get(chosen, 0) if order is None or chosen in PORTRAITS else 0)
-    motion = _moved(mechanism, file, least if order is None else max(order, derivative or 0))
+    motion = moved(mechanism, file, least if order is None else max(order, derivative or 0))
     look: dict[str, Any] = {"paths": output, "order": derivative or 0, "view": (azimuth, elevation)}
     if names is not None:
         look["names"] = names
@@ -139,11 +139,6 @@ def _check_names(mechanism: Mechanism, kind: str, names: Sequence[str], file: Pa
         check_name(what, name, known, MechanismError, path=file, name="joints" if kind == "reactions" else "outputs")
     if kind in PORTRAITS and len(names) > 1:
         raise MechanismError("one output is drawn at a time", path=file, name="--output", value=list(names))
-
-
-def _moved(mechanism: Mechanism, file: Path, order: int) -> Motion:
-    """Solve a mechanism that is driven; simulate one that has initial conditions."""
-    return simulated(mechanism, file, order) if mechanism.initial else solved(mechanism, file, order)
 
 
 def _drawn(motion: Motion, kind: str, output: list[str] | None, derivative: int | None, look: dict[str, Any]) -> Any:
@@ -215,7 +210,7 @@ def report(
     check_report(out, overwrite=overwrite)
     mechanism = reading.mechanism(file)
     spare_inputs(out, overwrite=overwrite)
-    motion = _moved(mechanism, file, order)
+    motion = moved(mechanism, file, order)
     look: dict[str, Any] = {"view": (azimuth, elevation), "source": file.name, "overwrite": overwrite}
     with errors_about(file):
         written(lambda: write_report(motion, out, **look))

@@ -268,6 +268,11 @@ def simulated(mechanism: Mechanism, file: Path, order: int, **options: Any) -> M
         return integrate(mechanism, order=order, strict=False, progress=bar, **options)
 
 
+def moved(mechanism: Mechanism, file: Path, order: int) -> Motion:
+    """Solve a mechanism that is driven; simulate one that has initial conditions."""
+    return simulated(mechanism, file, order) if mechanism.initial else solved(mechanism, file, order)
+
+
 def outcome(motion: Motion | Stretches, file: Path) -> int:
     """Return 0, or raise for the first instant that failed."""
     from jounce.kinematics import raise_for_status

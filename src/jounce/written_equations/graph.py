@@ -101,7 +101,7 @@ class Graph:
         key = "constant", value.hex() if value else "0"  # zero has no sign here
         return self._node(Node("constant", (), value or 0.0, REAL), key)
 
-    def input(self, name: str) -> int:
+    def input(self, name: str | tuple[Any, ...]) -> int:
         """Return the node of an input."""
         return self._node(Node("input", (), name, REAL))
 

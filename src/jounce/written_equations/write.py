@@ -1,4 +1,4 @@
-"""The equations of a mechanism as text: code of Python and of C."""
+"""The equations of a mechanism as text: code of Python and of C, and LaTeX."""
 
 import re
 from collections.abc import Callable
@@ -8,6 +8,7 @@ from jounce.errors import MechanismError, check_choice, whole_number
 from jounce.kinematics import Motion
 from jounce.mechanism import Mechanism
 from jounce.written_equations.c_code import c_file
+from jounce.written_equations.latex import latex_document
 from jounce.written_equations.mechanism_equations import MechanismEquations, equations_of
 from jounce.written_equations.python_code import python_module
 
@@ -37,6 +38,13 @@ LANGUAGES = {
     "python": Language(lambda equations, _: python_module(equations), ".py", 200_000),
     "c": Language(c_file, ".c", 200_000),
 }
+LATEX_ENDING, MOST_LATEX = ".tex", 8  # the highest order
+FORMATS = (*LANGUAGES, "latex")
+
+
+def ending_of(format: str) -> str:  # noqa: A002 - the name of the option
+    """Return the ending of files of a format."""
+    return LANGUAGES[format].ending if format in LANGUAGES else LATEX_ENDING
 
 
 def equations(
@@ -59,12 +67,14 @@ def equations(
         grid of time. Or a motion: they are counted as along it.
     joint : str, optional
         Name of the joint or driver whose equations alone are written.
-    format : {"python", "c"}, default "python"
+    format : {"python", "c", "latex"}, default "python"
         ``python`` is a module that needs NumPy alone, with ``COORDINATES``, ``COLUMNS``, ``ROWS`` and ``ORDER``, and
         ``residual(t, q)``, ``jacobian(t, q)`` and ``right_side(t, q, velocities)``. ``c`` is a file of C99 with the
-        same functions, their names begun by `name`. Both state in their headings what the arguments are.
+        same functions, their names begun by `name`. Both state in their headings what the arguments are. ``latex`` is a
+        document with the equations of each type of joint in the
+        vectors of the paper; a joint that is not made of them has its equations by coordinates.
     order : int, default 4
-        The highest derivative that has a right side, from 1 to 12.
+        The highest derivative that has a right side, from 1 to 12, of LaTeX to 8.
     name : str, default "mechanism"
         With which the names of the functions of C begin.
 
@@ -92,12 +102,15 @@ def equations(
     >>> module["jacobian"](0.5, q).round(6).tolist()
     [[-0.089502, -0.289557, 0.002752, 0.089502, 0.289557, -0.041002]]
     """
-    check_choice("format", format, tuple(LANGUAGES), MechanismError)
+    check_choice("format", format, FORMATS, MechanismError)
     if not isinstance(mechanism, Mechanism | Motion):
         raise MechanismError("must be a jn.Mechanism or a jn.Motion", name="mechanism", value=mechanism)
-    order = whole_number("order", order, 1, HIGHEST_ORDER, error=MechanismError)
+    most = MOST_LATEX if format == "latex" else HIGHEST_ORDER
+    order = whole_number("order", order, 1, most, error=MechanismError)
     if not isinstance(name, str) or not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
         raise MechanismError("must be a name of C: letters, digits and _", name="name", value=name)
+    if format == "latex":
+        return latex_document(mechanism, joint, order)
     language, found = LANGUAGES[format], equations_of(mechanism, joint, order)
     if found.size > language.most:
         message = f"takes {found.size} operations, more than the {language.most} of a file of {format}"

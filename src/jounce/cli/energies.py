@@ -1,0 +1,139 @@
+"""The command for energies: kinetic and acceleration energies of robots and mechanisms, with their rates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from jounce.cli.arguments import check_ending
+from jounce.cli.file_kinds import expecting
+from jounce.cli.options import MechanismReading, RobotReading, errors_about, spare_inputs, written
+from jounce.errors import JounceError
+from jounce.io.files import DATA_FILES, ROBOT_FILES
+from jounce.reporting.terminal import say
+
+if TYPE_CHECKING:
+    import xarray
+
+MOST = 28  # of the order and the rates together: the highest derivative is 30
+
+
+def energies(
+    file: Path,
+    trajectory: Path | None = None,
+    /,
+    *,
+    order: int = 1,
+    rates: int = 2,
+    no_drives: bool = False,
+    set_: list[str] | None = None,
+    import_: list[Path] | None = None,
+    allow: list[Path] | None = None,
+    out: Path | None = None,
+    overwrite: bool = False,
+) -> int:
+    r"""Compute acceleration energies of any order, and their rates.
+
+    Order 0 is the kinetic energy, order 1 Gibbs' energy of accelerations.
+    Negrean 2025, equations 65-120.
+
+    Parameters
+    ----------
+    file
+        Robot file, .urdf, .xml or .sdf; or a mechanism file with masses.
+    trajectory
+        Of a robot: samples (.csv), laws or a motion (.yaml, .toml, .json).
+    order
+        Of the energy: derivatives of order p + 1 take the place of velocities.
+    rates
+        Highest rate of the energies.
+    no_drives
+        Leave out the rotors of a robot.
+    set_
+        NAME=VALUE of a parameter of a mechanism, with a unit; repeatable.
+    import_
+        Python file with your own joints and forces; repeatable.
+    allow
+        Folder whose files it may name, besides its own; repeatable.
+    out
+        Write all values to this .csv or .nc (NetCDF) file.
+    overwrite
+        Let --out replace a file that is read here.
+
+    Examples
+    --------
+      jounce energies examples/robots/panda.urdf \
+        examples/trajectories/panda_wave.yaml --order 2 --rates 1
+      jounce energies examples/double_pendulum.yaml --order 1 --out energies.csv
+    """
+    from jounce.io import check_writable, write
+    from jounce.units.shown_units import derivative_unit
+
+    for name, value in (("--order", order), ("--rates", rates)):
+        if not 0 <= value <= MOST - (order if name == "--rates" else 0):
+            most = MOST - (order if name == "--rates" else 0)
+            raise JounceError(f"must be a whole number from 0 to {most}", name=name, value=value)
+    with expecting(file, "mechanism", "robot"):
+        check_ending(file, (*DATA_FILES, *ROBOT_FILES))
+    if out is not None:
+        check_writable(out, overwrite=overwrite)
+    if file.suffix.lower() in ROBOT_FILES:
+        dataset = _of_robot(RobotReading(allow=allow), file, trajectory, order, rates, drives=not no_drives)
+    elif trajectory is not None:
+        raise JounceError("is for robots; a mechanism file has its motion", name="trajectory", path=trajectory)
+    else:
+        reading = MechanismReading(set_=set_, import_=import_, allow=allow)
+        dataset = _of_mechanism(reading, file, order, rates)
+    spare_inputs(out, overwrite=overwrite)
+    times = dataset["time"].values
+    what = "Kinetic energy" if order == 0 else f"Acceleration energy of order {order}"
+    say(f"{what}, t = {times[0]:g} to {times[-1]:g} s")
+    for k, values in enumerate(dataset["energy"].values.T):
+        unit = derivative_unit("J", 2 * order + k)
+        say(f"  {'energy' if k == 0 else f'rate {k}'}: from {values.min():.9g} to {values.max():.9g} {unit}")
+    if out is not None:
+        written(lambda: write(dataset, out, overwrite=overwrite))
+        say(f"Written to {out}")
+    return 0
+
+
+def _of_robot(
+    reading: RobotReading, file: Path, trajectory: Path | None, order: int, rates: int, *, drives: bool
+) -> xarray.Dataset:
+    from jounce.dynamics.energy.energies import acceleration_energy
+    from jounce.dynamics.limits.trajectories import FollowedTrajectory
+
+    robot = reading.robot(file)
+    if trajectory is None:
+        raise JounceError("a robot needs a trajectory: name it after the robot", name="trajectory", path=file)
+    motion = reading.trajectory(trajectory)
+    with errors_about(trajectory, file):
+        q = FollowedTrajectory(robot, motion).coordinates(motion.times, order + 1 + rates)
+        energy = acceleration_energy(robot, q, order=order, drives=drives)
+    return _dataset(motion.times, energy)
+
+
+def _of_mechanism(reading: MechanismReading, file: Path, order: int, rates: int) -> xarray.Dataset:
+    from jounce.cli.mechanisms import moved
+    from jounce.dynamics.energy.energies import acceleration_energy
+    from jounce.kinematics import raise_for_status
+
+    motion = moved(reading.mechanism(file), file, order + 1 + rates)
+    with errors_about(file):
+        raise_for_status(motion)
+        energy = acceleration_energy(motion, order=order)
+    return _dataset(motion.time, energy)
+
+
+def _dataset(times: Any, energy: Any) -> xarray.Dataset:
+    """Return the energy of all bodies, and that of each, with rates."""
+    import numpy as np
+    import xarray
+
+    from jounce.dynamics.energy.energies import energy_unit
+
+    parts = np.asarray(energy.translation) + np.asarray(energy.rotation)
+    found = {"energy": parts.sum(axis=-1)} | {f"energy_of_{n}": parts[..., k] for k, n in enumerate(energy.bodies)}
+    units = {"units": energy_unit(energy.order)}
+    variables = {name: (("time", "derivative"), values, units) for name, values in found.items()}
+    return xarray.Dataset(variables, {"time": times, "derivative": np.arange(parts.shape[-2])})

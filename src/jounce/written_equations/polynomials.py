@@ -1,0 +1,104 @@
+"""Polynomials with whole and rational coefficients, of atoms that are tuples."""
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from typing import Any
+
+MOST_TERMS = 5000
+Atom = tuple[Any, ...]
+Monomial = tuple[Atom, ...]
+
+
+class TooManyTermsError(Exception):
+    """A polynomial has more terms than anybody reads."""
+
+
+class Polynomial:
+    """A polynomial.
+
+    Parameters
+    ----------
+    terms : mapping of tuple of Atom to Fraction
+        The coefficient of each product of atoms, these in order; none is zero.
+    """
+
+    def __init__(self, terms: Mapping[Monomial, Fraction]):
+        self.terms = {m: c for m, c in terms.items() if c}
+
+    @classmethod
+    def number(cls, value: Fraction | int) -> "Polynomial":
+        """Return a constant."""
+        return cls({(): Fraction(value)})
+
+    @classmethod
+    def atom(cls, atom: Atom) -> "Polynomial":
+        """Return an atom."""
+        return cls({(atom,): Fraction(1)})
+
+    def __add__(self, other: "Polynomial") -> "Polynomial":
+        terms = dict(self.terms)
+        for monomial, c in other.terms.items():
+            terms[monomial] = terms.get(monomial, Fraction(0)) + c
+        return Polynomial(terms)
+
+    def __mul__(self, other: "Polynomial | Fraction | int") -> "Polynomial":
+        if not isinstance(other, Polynomial):
+            return Polynomial({m: c * other for m, c in self.terms.items()})
+        if len(self.terms) * len(other.terms) > MOST_TERMS:
+            raise TooManyTermsError(f"a product of {len(self.terms)} by {len(other.terms)} terms")
+        terms: dict[Monomial, Fraction] = {}
+        for m, c in self.terms.items():
+            for n, d in other.terms.items():
+                product = joined(m, n)
+                terms[product] = terms.get(product, Fraction(0)) + c * d
+        return Polynomial(terms)
+
+    def inverse(self) -> "Polynomial":
+        """Return one over the polynomial: of a number a number, else an atom ("inverse", terms)."""
+        if not self.terms:
+            return Polynomial.atom(("inverse", ()))
+        if set(self.terms) == {()}:
+            return Polynomial.number(1 / self.terms[()])
+        if len(self.terms) == 1:
+            ((monomial, c),) = self.terms.items()
+            return Polynomial({tuple(sorted((("inverse", atom) for atom in monomial), key=repr)): 1 / c})
+        return Polynomial.atom(("inverse", ("sum", self.frozen())))
+
+    def frozen(self) -> tuple[tuple[Monomial, Fraction], ...]:
+        """Return the terms in their order."""
+        return tuple(sorted(self.terms.items(), key=repr))
+
+    def replaced(self, rule: Callable[[Monomial], "Polynomial | None"]) -> "Polynomial":
+        """Return the polynomial with terms replaced until a rule has nothing to say of any."""
+        waiting, done = dict(self.terms), Polynomial({})
+        while waiting:
+            if len(waiting) + len(done.terms) > MOST_TERMS:
+                raise TooManyTermsError(f"more than {MOST_TERMS} terms")
+            monomial, c = waiting.popitem()
+            other = rule(monomial)
+            if other is None:
+                done.terms[monomial] = done.terms.get(monomial, Fraction(0)) + c
+                continue
+            for m, d in other.terms.items():
+                total = waiting.pop(m, Fraction(0)) + c * d
+                if total:
+                    waiting[m] = total
+        return Polynomial(done.terms)
+
+
+def joined(*monomials: Monomial) -> Monomial:
+    """Return the product of monomials: an atom and one over it are one."""
+    atoms = sorted((atom for monomial in monomials for atom in monomial), key=repr)
+    for atom in [a[1] for a in atoms if a[0] == "inverse"]:
+        if atom in atoms and ("inverse", atom) in atoms:
+            atoms.remove(atom)
+            atoms.remove(("inverse", atom))
+    return tuple(atoms)
+
+
+def without(monomial: Monomial, *atoms: Atom) -> Monomial:
+    """Return a product less some of its atoms."""
+    left = list(monomial)
+    for atom in atoms:
+        left.remove(atom)
+    return tuple(left)

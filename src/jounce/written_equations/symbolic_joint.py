@@ -1,0 +1,235 @@
+"""A joint on symbols: its residual on jets of the vectors that Sommer writes, as polynomials of their components."""
+
+import dataclasses
+import math
+from fractions import Fraction
+from typing import Any
+
+import jax
+import numpy as np
+
+from jounce.constraints.facts import field_kinds, value_fields
+from jounce.jet import Jet
+from jounce.mechanism.system import Group, with_rows
+from jounce.modules import with_fields
+from jounce.rigid import PlanarPose, SpatialPose
+from jounce.rigid.spatial import quaternion_spins
+from jounce.trajectory import AbstractMotion
+from jounce.written_equations.graph import FUNCTIONS, Graph, Node
+from jounce.written_equations.polynomials import Atom, Polynomial
+from jounce.written_equations.reading import Entries, GraphReader, NotWrittenError
+
+SLOTS = "ijmn"
+
+
+class _Law(AbstractMotion):
+    """A law of which only the Taylor coefficients are known."""
+
+    coefficients: Any
+    time: Any
+
+    def __call__(self, time: Jet) -> Jet:
+        if time is not self.time:
+            raise NotWrittenError("its law is one of a coordinate, not of time alone")
+        return Jet(self.coefficients[: time.order + 1])
+
+
+@dataclasses.dataclass(frozen=True)
+class SymbolicJoint:
+    """A joint on symbols.
+
+    Parameters
+    ----------
+    rows : list of list of Polynomial
+        For each order, for each row: the derivative of the residual, of the atoms below.
+    vectors : dict of str to str
+        Fields that are vectors, and in which body's frame they are: i, j or m.
+    planar : bool
+        Whether it is in the plane.
+    slots : str
+        Its bodies.
+    constants : list of list of float
+        What is computed of the values of the joint alone, for each joint of the group: ("c", k) is the k-th.
+    """
+
+    rows: list[list[Polynomial]]
+    vectors: dict[str, str]
+    planar: bool
+    slots: str
+    constants: list[list[float]] = dataclasses.field(default_factory=list)
+
+
+# Atoms, by kind: ("r", body, n, c) component of the n-th derivative of a position, ("A", body, n, row, column) entry of
+# that of the attitude matrix, ("phi", body, n), ("e", body, n, c) Euler parameter, ("w", body, n, c) angular velocity
+# about the body's axes, ("f", n) law, ("t",) the time, ("v", field, c) component of a vector of the joint, ("k", field)
+# number of it, ("c", k) what follows from these alone.
+
+
+def symbolic_joint(group: Group, pose_type: type, order: int) -> SymbolicJoint:
+    """Return the residual of the joints of a group, and its derivatives to an order, on symbols."""
+    planar, graph = pose_type is PlanarPose, Graph()
+    count = 2 if planar else 3
+    element = jax.tree.map(lambda v: np.asarray(v)[..., :1, :] if np.ndim(v) > 1 else v, group.element)
+    fields, vectors, law = {}, {}, None
+    for name in value_fields(type(element)):
+        kind, value = field_kinds(type(element))[name], getattr(element, name)
+        if kind == "motion":
+            law = [_scaled(graph, ("f", n), n, (1, 1)) for n in range(order + 1)]
+        elif value is not None and kind == "scalar":
+            fields[name] = _entries(graph, [("k", name)], (1, 1))
+        elif value is not None and kind == "vector":
+            fields[name] = _entries(graph, [("v", name, c) for c in range(count)], (count, 1, 1))
+            vectors[name] = name.rpartition("_")[2] if name[-2:] in ("_i", "_j", "_m") else "i"
+    slots = SLOTS[: len(group.bodies)]
+    poses = [_coefficients(graph, body, order, planar=planar) for body in slots]
+
+    def residual(fields: Any, law: Any, poses: Any, instant: Any) -> Any:
+        time = Jet((instant, np.ones((1, 1)), *[None] * (order - 1)))
+        values = {**fields} if law is None else {**fields, "motion": _Law(tuple(law), time)}
+        bodies = [(_planar if planar else _spatial)(pose) for pose in poses]
+        return with_rows(with_fields(element, **values).residual(*bodies, time)).dense().coefficients
+
+    found = GraphReader(graph).function(residual, fields, law, poses, _entries(graph, [("t",)], (1, 1)))
+    read = _Expansion(graph)
+    rows = [
+        [read.of(int(x)) * math.factorial(n) for x in level.numbers.reshape(len(level.numbers), -1)[:, 0]]
+        for n, level in enumerate(found)
+    ]
+    values = [_values(group, fields, vectors, k) for k in range(group.instances)]
+    constants = [[evaluated(graph, number, known) for number in read.constants] for known in values]
+    return SymbolicJoint(rows, vectors, planar, slots, constants)
+
+
+def _values(group: Group, fields: dict[str, Any], vectors: dict[str, str], instance: int) -> dict[Atom, float]:
+    """Return the values of the atoms of the fields of one joint of a group."""
+    known = {}
+    for name in fields:
+        value = np.asarray(getattr(group.element, name))[..., instance, 0]
+        parts = value.tolist() if name in vectors else [float(value)]
+        known |= {(("v", name, c) if name in vectors else ("k", name)): part for c, part in enumerate(parts)}
+    return known
+
+
+def evaluated(graph: Graph, root: int, known: dict[Atom, float]) -> float:
+    """Return the number that an operation is for values of its inputs."""
+    found: dict[int, Any] = {}
+    for number in graph.reached([root]):
+        node = graph.nodes[number]
+        if node.operation == "constant":
+            found[number] = node.detail
+        elif node.operation == "input":
+            found[number] = known[node.detail]
+        else:
+            found[number] = FUNCTIONS[node.operation][0](*(found[x] for x in node.operands))
+    return float(found[root])
+
+
+def _entries(graph: Graph, atoms: list[Atom], shape: tuple[int, ...]) -> Entries:
+    return Entries(np.array([graph.input(atom) for atom in atoms]).reshape(shape), float)
+
+
+def _scaled(graph: Graph, atom: Atom, n: int, shape: tuple[int, ...]) -> Entries:
+    number = graph.apply("div", graph.input(atom), graph.constant(float(math.factorial(n))))
+    return Entries(np.full(shape, number), float)
+
+
+def _coefficients(graph: Graph, body: str, order: int, *, planar: bool) -> dict[str, list[Entries]]:
+    """Return the Taylor coefficients of what a pose is made of."""
+    count = 2 if planar else 3
+
+    def jet(kind: str, tails: list[tuple], shape: tuple[int, ...], last: int = order) -> list[Entries]:
+        levels = []
+        for n in range(last + 1):
+            parts = [_scaled(graph, (kind, body, n, *tail), n, ()) for tail in tails]
+            levels.append(Entries(np.array([int(x.numbers) for x in parts]).reshape(shape), float))
+        return levels
+
+    found = {"position": jet("r", [(c,) for c in range(count)], (count, 1, 1))}
+    if planar:
+        found["angle"] = jet("phi", [()], (1, 1))
+        return found | {"cosine": jet("A", [(0, 0)], (1, 1)), "sine": jet("A", [(1, 0)], (1, 1))}
+    found["quaternion"] = jet("e", [(c,) for c in range(4)], (4, 1, 1))
+    found["angular_velocity"] = jet("w", [(c,) for c in range(3)], (3, 1, 1), order - 1)
+    return found | {f"axis_{k}": jet("A", [(c, k) for c in range(3)], (3, 1, 1)) for k in range(3)}
+
+
+def _planar(pose: dict[str, Any]) -> PlanarPose:
+    return PlanarPose(*(Jet(pose[name]) for name in ("position", "angle", "sine", "cosine")))
+
+
+def _spatial(pose: dict[str, Any]) -> SpatialPose:
+    spins = zip(*map(quaternion_spins, pose["quaternion"]), strict=True)
+    axes = tuple(Jet(pose[f"axis_{k}"]) for k in range(3))
+    velocity = Jet(pose["angular_velocity"]) if pose["angular_velocity"] else None
+    return SpatialPose(Jet(pose["position"]), Jet(pose["quaternion"]), tuple(map(Jet, spins)), axes, velocity)
+
+
+class _Expansion:
+    """Operations as polynomials; what is none is an atom of its own, ("function", name, polynomials)."""
+
+    def __init__(self, graph: Graph):
+        self._graph = graph
+        self._known: dict[int, Polynomial] = {}
+        self._fixed: set[int] = set()  # what is computed of the values of the joint alone
+        self.constants: list[int] = []
+
+    def of(self, root: int) -> Polynomial:
+        """Return the polynomial that an operation is."""
+        for number in self._graph.reached([root]):
+            if number not in self._known:
+                self._known[number] = self._expanded(number)
+        return self._known[root]
+
+    def _expanded(self, number: int) -> Polynomial:
+        node = self._graph.nodes[number]
+        fixed = all(x in self._fixed for x in node.operands)
+        if fixed and (node.operation != "input" or node.detail[0] in ("v", "k")):
+            self._fixed.add(number)
+        row = self._operation(node)
+        if number not in self._fixed or all(_is_plain(atom) for m in row.terms for atom in m):
+            return row
+        self.constants.append(number)
+        return Polynomial.atom(("c", len(self.constants)))
+
+    def _operation(self, node: Node) -> Polynomial:
+        parts = [self._known[x] for x in node.operands]
+        if node.operation == "constant":
+            return Polynomial.number(as_fraction(float(node.detail)))
+        if node.operation == "input":
+            return Polynomial.atom(node.detail)
+        if node.operation == "add":
+            return parts[0] + parts[1]
+        if node.operation == "sub":
+            return parts[0] + parts[1] * -1
+        if node.operation == "neg":
+            return parts[0] * -1
+        if node.operation == "mul":
+            return parts[0] * parts[1]
+        if node.operation == "div":
+            return parts[0] * parts[1].inverse()
+        if node.operation == "round":  # of whole turns, of which an angle is told without
+            return Polynomial.number(Fraction(0))
+        return Polynomial.atom(("function", node.operation, tuple(part.frozen() for part in parts)))
+
+
+def _is_plain(atom: Atom) -> bool:
+    """Tell whether an atom is a value of a joint, or the length of one of its vectors, or one over that."""
+    if atom[0] == "inverse":
+        return _is_plain(atom[1])
+    return atom[0] in ("v", "k", "c") or bool(
+        atom[:2] == ("function", "sqrt") and length_of(Polynomial(dict(atom[2][0])))
+    )
+
+
+def length_of(row: Polynomial) -> str:
+    """Return the vector of which a polynomial is the square of the length; nothing for another one."""
+    names = {a[1] for m in row.terms for a in m if a[0] == "v"}
+    if len(names) != 1 or any(len(m) != 2 or m[0] != m[1] or c != 1 for m, c in row.terms.items()):
+        return ""
+    return str(names.pop()) if len(row.terms) in (2, 3) else ""
+
+
+def as_fraction(value: float) -> Fraction:
+    """Return the simple fraction that a number is the nearest double to, or the number itself."""
+    simple = Fraction(value).limit_denominator(40320)
+    return simple if float(simple) == value else Fraction(value)

@@ -1,0 +1,49 @@
+"""Equations along a motion as tables: one column for each entry and order."""
+
+import itertools
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def columns(equations: "xarray.Dataset") -> "xarray.Dataset":
+    """Return the equations of `constraint_equations` with one variable for each column of a table.
+
+    Names are that of the quantity, with the order of the derivative where it has some, and the labels:
+    ``residual.A.1``, ``jacobian.A.1.crank.x``, ``right_side_2.A.1``, ``multipliers_0.A.1``. What is NaN at all instants
+    has no column.
+    """
+    import xarray
+
+    found: dict[str, Any] = {}
+    for name, variable in equations.data_vars.items():
+        axes = [axis for axis in variable.dims if axis != "time"]
+        for labels in itertools.product(*(variable[axis].values.tolist() for axis in axes)):
+            at = dict(zip(axes, labels, strict=True))
+            order = f"_{at['derivative']}" if "derivative" in at else ""
+            rest = [str(label) for axis, label in at.items() if axis != "derivative"]
+            values = np.asarray(variable.sel(at), float)
+            if len(values) and np.isnan(values).all() and not np.isnan(np.asarray(equations.residual)).all():
+                continue
+            found[".".join([f"{name}{order}", *rest])] = (("time", "derivative"), values[:, None])
+    return xarray.Dataset(found, {"time": equations["time"], "derivative": [0]}, equations.attrs)
+
+
+def as_json(equations: "xarray.Dataset") -> str:
+    """Return the equations of `constraint_equations` as JSON: dimensions, their labels, and arrays, NaN as null."""
+    labels = {str(name): axis.values.tolist() for name, axis in equations.coords.items()}
+    arrays = {
+        str(name): {"dimensions": list(map(str, variable.dims)), "values": _plain(variable.values)}
+        for name, variable in equations.data_vars.items()
+    }
+    return json.dumps({"title": equations.attrs.get("title", ""), **labels, **arrays}, allow_nan=False, indent=1) + "\n"
+
+
+def _plain(values: np.ndarray) -> Any:
+    whole = values.astype(object)
+    whole[np.isnan(values)] = None
+    return whole.tolist()
