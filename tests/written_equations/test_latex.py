@@ -106,7 +106,7 @@ def numbers(pairs, symbols, slots, shifts):
             np.testing.assert_allclose(Reader(right, symbols).whole(), symbols[left], atol=1e-13)
     jacobian = {}
     for slot, r, turn in blocks:
-        rows = len(residuals[0]) if len(residuals) == 1 else 1
+        rows = max(len(part) if np.ndim(part) == 2 else 1 for part in (r, turn))
         turns = 3 if shifts == 3 else 1
         whole = np.hstack([np.broadcast_to(r, (rows, shifts)), np.broadcast_to(turn, (rows, turns))])
         jacobian.setdefault(slot, []).append(whole)
