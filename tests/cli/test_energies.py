@@ -50,7 +50,7 @@ def test_a_mechanism(run, tmp_path):
     assert run(file, "--order", "0", "--rates", "1", "--out", out)[0] == 0
     table = np.genfromtxt(out, delimiter=",", names=True)
     motion = jn.simulate(jn.load(file), order=2)
-    np.testing.assert_array_equal(table["energy"], jn.kinetic_energy(motion).total.values[:, 0])
+    np.testing.assert_array_equal(table["energy"], jn.energy.kinetic_energy(motion).total.values[:, 0])
 
 
 def test_bad_input(run, files):
