@@ -106,7 +106,7 @@ def _of_robot(
     robot = reading.robot(file)
     if trajectory is None:
         raise JounceError("a robot needs a trajectory: name it after the robot", name="trajectory", path=file)
-    motion = reading.trajectory(trajectory)
+    motion = reading.trajectory(trajectory, robot)
     with errors_about(trajectory, file):
         q = FollowedTrajectory(robot, motion).coordinates(motion.times, order + 1 + rates)
         energy = acceleration_energy(robot, q, order=order, drives=drives)
