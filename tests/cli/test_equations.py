@@ -53,6 +53,7 @@ def test_bad_input(run, tmp_path, monkeypatch, options, words):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_values_along_the_motion_are_tables(run, tmp_path):
     expected = jn.constraint_equations(jn.solve(jn.load(FOUR_BAR), [0.0, 0.5], order=2))
     short = ("--format", "table", "--order", "2", "--joint", "BC")
