@@ -88,7 +88,7 @@ def simulate(
     heading: Heading = PLAIN,
     output: TableOutput = NO_TABLE,
 ) -> int:
-    r"""Move a mechanism or robot by its forces and print peak values, energy, drift.
+    r"""Move a mechanism or robot by its forces: peaks, energy, drift.
 
     Parameters
     ----------
