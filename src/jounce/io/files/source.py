@@ -101,7 +101,7 @@ def _without_empty(source: Source) -> Source:
         return Source(source.path, source.data[full[0]], lines)
     places = {old: new for new, old in enumerate(full)}
     lines = {
-        (places[location[0]], *location[1:]): line  # type: ignore[index]
+        (places[location[0]], *location[1:]): line
         for location, line in source.lines.items()
         if location and location[0] in places
     }
