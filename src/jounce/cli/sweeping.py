@@ -159,7 +159,9 @@ def _problem(
         robot = RobotReading(payload=payload, allow=reading.allow)
         model = robot.robot(file)
         with errors_about(file):
-            return robot_problem(model, None if trajectory is None else robot.trajectory(trajectory, model), None, order)
+            return robot_problem(
+                model, None if trajectory is None else robot.trajectory(trajectory, model), None, order
+            )
     if trajectory is not None or payload:
         raise JounceError("a trajectory and payloads go with a robot, not with a mechanism", path=file)
     mechanism = reading.mechanism(file)
