@@ -236,6 +236,8 @@ def balance_of_bodies(motion, point):
     gravity = np.asarray(motion.mechanism.gravity)[:, None]
     force, moment = (np.zeros((1, count, 1)) for count in (size, 1 if size == 2 else 3))
     for k, body in enumerate(motion.mechanism.bodies.values(), start=1):
+        if body.mass is None:  # such as a bead
+            continue
         matrix, center = (
             turned[:, :, :, k],
             np.zeros(size) if body.center_of_mass is None else np.asarray(body.center_of_mass),
