@@ -79,7 +79,7 @@ class SegmentedMotion(SplineMotion):
             _check_segment(segment, f"segments[{k}]")
         self.recipe = Untraced((tuple(segments), initial, start, beyond))
         if self._open:
-            self._set(np.zeros(1), np.full((1, 1), np.nan), np.zeros(()), "continue")
+            self._set(np.zeros(1), np.full((1, 1), np.inf), np.zeros(()), "continue")  # equal to itself, and no number
             self.sines = np.zeros((3, 1))
             return
         pieces, ends, values = joined_pieces(segments, number_of_value("initial", initial))

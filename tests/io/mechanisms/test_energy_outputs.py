@@ -101,7 +101,7 @@ def test_files_written_and_read(path, motion, tmp_path):
     again = jn.load(tmp_path / "again.yaml")
     for name, output in motion.mechanism.outputs.items():
         assert type(again.outputs[name]) is type(output)
-        assert (again.outputs[name].alone, again.outputs[name].unit) == (output.alone, output.unit)
+        assert (again.outputs[name].single_body, again.outputs[name].unit) == (output.single_body, output.unit)
 
 
 def test_inspection_tells_of_what_they_are(path, run):
