@@ -74,7 +74,7 @@ def test_annotations_may_be_strings(tmp_path):
     path = tmp_path / "postponed.py"
     path.write_text(
         "from __future__ import annotations\n"
-        "import jounce as jn\nfrom jounce import Vector\n"
+        "import jounce as jn\nfrom jounce.joints import Vector\n"
         'class Postponed(jn.joints.AbstractConstraint, type="postponed", space="planar"):\n'
         "    point_i: Vector\n    length: jn.joints.Scalar\n    word: str = 'x'\n"
     )

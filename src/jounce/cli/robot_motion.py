@@ -11,8 +11,6 @@ from jounce.errors import JounceError, RobotError
 from jounce.reporting.terminal import Bar, say, show_peaks
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from jounce.integrate import AbstractMethod
     from jounce.robot import Robot
 
@@ -56,7 +54,7 @@ class RobotRun:
         plain = RobotRun()
         return [name for name in self.__dataclass_fields__ if getattr(self, name) != getattr(plain, name)]
 
-    def time(self) -> np.ndarray:
+    def time(self) -> Any:
         """Return the instants.
 
         Raises
@@ -80,7 +78,7 @@ class RobotRun:
             raise JounceError("must be 2 or more", name="--instants", value=self.instants)
         return np.linspace(0.0, stop, self.instants)
 
-    def state(self, robot: Robot) -> np.ndarray:
+    def state(self, robot: Robot) -> Any:
         """Return the coordinates at the start, at rest."""
         import numpy as np
 

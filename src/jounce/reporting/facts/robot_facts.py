@@ -58,7 +58,9 @@ class JointFacts(TypedDict):
     mimic: MimicFacts | None
     armature: float
     damping: float
-    friction: float
+    friction: float | list[float]
+    stiffness: float
+    spring_reference: float
 
 
 class ClosureFacts(TypedDict):
