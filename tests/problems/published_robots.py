@@ -101,7 +101,8 @@ def forest(robots):
     links, joints = [jn.Link("forest")], []
     for prefix, robot in robots.items():
         new = f"{prefix}:{{}}".format
-        links += [dataclasses.replace(link, name=new(link.name)) for link in robot.links.values()]
+        # gravity counts for all of them here: Pinocchio does not read where Gazebo's extension switches it off
+        links += [dataclasses.replace(link, name=new(link.name), gravity=1.0) for link in robot.links.values()]
         joints.append(jn.Joint(f"{prefix}|", "forest", new(robot.base), "fixed"))
         for joint in robot.joints.values():
             mimic = joint.mimic and dataclasses.replace(joint.mimic, joint=new(joint.mimic.joint))

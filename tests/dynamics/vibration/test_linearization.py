@@ -33,7 +33,7 @@ def test_sprung_four_bar_swings_as_its_lagrange_equation_in_mpmath(size, turn):
     small = jn.linearize(sprung_four_bar(size, turn))
     angle = small.equilibrium.poses["crank"]["angle"] - turn
     _, square = SprungFourBar().rest(angle)
-    assert isinstance(small, jn.Linearization)
+    assert isinstance(small, jn.dynamics.Linearization)
     assert isinstance(small.modes, jn.dynamics.Modes)
     assert small.modes.angular_frequencies[0] ** 2 == pytest.approx(square, rel=1e-12)
     assert small.modes.frequencies[0] == pytest.approx(np.sqrt(square) / (2 * np.pi), rel=1e-12)
