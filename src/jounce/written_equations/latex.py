@@ -58,7 +58,7 @@ def latex_document(given: Mechanism | Motion, joint: str | None, order: int) -> 
 _COMMON = r"""Each joint is $\Phi = 0$, and each time derivative of it
 $\Phi_{q}\,q^{(k)} = \mathbf{v}, \boldsymbol{\gamma}, \boldsymbol{\eta}, \boldsymbol{\sigma}$ for
 $k = 1, \dots, 4$, as in Sommer, Mechanism and Machine Theory 196, 2024, 105613. The ground has
-$\mathbf{r} = \mathbf{0}$, $\mathbf{A} = \mathbf{I}$. A law is $f(t)$, $f_t$ its derivative; angles are told
+$\mathbf{r} = \mathbf{0}$, $\mathbf{A} = \mathbf{I}$. A law is $f(t)$, $f_t$ its derivative; angles are given
 without whole turns.
 """
 _PLANE = [

@@ -249,7 +249,6 @@ def test_joint_states_as_they_are_echoed(tmp_path, stamp):
 @pytest.mark.parametrize(
     "points, words",
     [
-        ([point(0), point(1, accelerations=[])], None),
         ([point(0, velocities=[]), point(1)], r"points\[0\]|accelerations without velocities"),
         ([point(0), point(1, positions=[1.0, "..."])], r"points\[1\]\.positions: was cut .* --full-length"),
         ([point(0), point(0, positions=[1.0, 2.0])], "must come after that of the point before, which is another"),
@@ -260,12 +259,14 @@ def test_joint_states_as_they_are_echoed(tmp_path, stamp):
 def test_points_that_no_controller_takes(tmp_path, points, words):
     path = tmp_path / "message.json"
     path.write_text(json.dumps(message(points)))
-    if words is None:  # the last one has no accelerations: a cubic
-        law = jn.load_trajectory(path).laws["shoulder"]
-        assert law.degree == 3
-        return
     with pytest.raises(TrajectoryError, match=words):
         jn.load_trajectory(path)
+
+
+def test_between_a_point_without_accelerations_and_another_the_law_is_a_cubic(tmp_path):
+    path = tmp_path / "message.json"
+    path.write_text(json.dumps(message([point(0), point(1, accelerations=[])])))
+    assert jn.load_trajectory(path).laws["shoulder"].degree == 3
 
 
 def test_a_robot_that_is_not_where_its_trajectory_starts(tmp_path):
