@@ -39,6 +39,20 @@ def cubes(extent, inside):
             lambda x, y, z: (x**2 + z**2 < 0.25) & (x**2 + z**2 > 0.09),
             5e-3,
         ),
+        (
+            "capsule",
+            {"radius": 0.3, "length": 0.8},
+            (0.3, 0.3, 0.7),
+            lambda x, y, z: x**2 + y**2 + np.maximum(abs(z) - 0.4, 0) ** 2 < 0.09,
+            5e-3,
+        ),
+        (
+            "ellipsoid",
+            {"size": [0.4, 0.8, 1.2]},
+            (0.2, 0.4, 0.6),
+            lambda x, y, z: (x / 0.2) ** 2 + (y / 0.4) ** 2 + (z / 0.6) ** 2 < 1,
+            5e-3,
+        ),
     ],
 )
 def test_volume_and_moments_are_those_of_many_cubes(kind, sizes, extent, inside, tolerance):
@@ -62,6 +76,20 @@ def test_thin_solids_are_limits_of_thick_ones(axis, index):
     flat = jn.Inertia.solid("cylinder", mass=2.0, radius=3.0, length=1e-9, axis=axis).tensor.diagonal()
     np.testing.assert_allclose(disc, flat, rtol=1e-15)
     assert disc[index] == 9.0
+
+
+def test_a_cone_is_that_of_many_discs():
+    """Discs of a thickness of length / n have the moments of their cylinders about the centroid, moved by Steiner."""
+    n, radius, length = 20_000, 0.3, 0.9
+    z = (np.arange(n) + 0.5) / n * length
+    r = radius * (1 - z / length)
+    weight = r**2 / np.sum(r**2)
+    center = weight @ z
+    np.testing.assert_allclose(center, length / 4, rtol=1e-8)
+    found = jn.Inertia.solid("cone", density=3.0, radius=radius, length=length)
+    moments = [weight @ (r**2 / 4 + (z - center) ** 2)] * 2 + [weight @ (r**2 / 2)]
+    np.testing.assert_allclose(found.tensor.diagonal() / found.mass, moments, rtol=1e-7)
+    assert found.mass == pytest.approx(np.pi * radius**2 * length)
 
 
 def test_pseudo_inertia_there_and_back():

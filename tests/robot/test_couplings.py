@@ -110,7 +110,7 @@ def test_what_cannot_be_is_refused():
 
 @pytest.mark.slow
 def test_the_mechanism_moves_as_the_robot():
-    """Springs, weightless links and the damping of a ball are forces of the mechanism; tendons have none there."""
+    """Springs, weightless links and the damping of a ball are forces of the mechanism."""
     given = robot()
     ball = BallDrive("ball", ("z", "y", "x"), damping=0.2)
     joints = [dataclasses.replace(joint, friction=0.0, mimic=None) for joint in given.joints.values()]
@@ -123,5 +123,13 @@ def test_the_mechanism_moves_as_the_robot():
     for name in outputs:
         column = one.joint_names.index(name)
         np.testing.assert_allclose(whole.outputs[name][:, 0], np.asarray(alone.q)[:, 0, column], atol=1e-9)
+
+
+def test_couplings_without_a_counterpart_in_a_mechanism_are_refused():
+    one = robot(followers=False)
+    ball, line = one.couplings.values()
+    with pytest.raises(jn.errors.RobotError, match="the armature of a ball whose parent turns has no counterpart"):
+        one.changed(couplings=[ball]).mechanism()
     with pytest.raises(jn.errors.RobotError, match="a tendon along joints has no counterpart"):
-        given.mechanism()
+        one.changed(couplings=[line]).mechanism()
+    assert one.mechanism(drives=False).bodies

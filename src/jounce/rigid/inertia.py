@@ -138,12 +138,14 @@ class Inertia:
         ----------
         kind : str
             ``"box"`` (size: three edges along x, y and z), ``"sphere"`` (radius), ``"cylinder"`` (radius, length),
-            ``"tube"`` (radius, inner_radius, length), or thin: ``"rod"`` (length), ``"disc"`` (radius).
+            ``"tube"`` (radius, inner_radius, length), ``"capsule"`` (radius, length between the half spheres),
+            ``"cone"`` (radius, length), ``"ellipsoid"`` (size: three diameters), or thin: ``"rod"`` (length),
+            ``"disc"`` (radius).
         mass, density : float
             kg, or kg/m^3: one of them; thin solids take a mass.
         axis : str, optional
-            ``"x"``, ``"y"`` or ``"z"`` of the body, along which a rod (x unless told), cylinder, tube, or the normal of
-            a disc (z unless told) stands.
+            ``"x"``, ``"y"`` or ``"z"`` of the body, along which a rod (x unless told), cylinder, tube, capsule, cone,
+            or the normal of a disc (z unless told) stands.
         center_of_mass : array_like of shape (3,), default zero
             In the frame of the body, m.
         **sizes

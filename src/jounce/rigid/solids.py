@@ -47,6 +47,26 @@ def _cylinder(radius: Any, length: Any) -> tuple[Any, tuple[Any, ...]]:
     return _tube(radius, 0.0, length)
 
 
+def _capsule(radius: Any, length: Any) -> tuple[Any, tuple[Any, ...]]:
+    """Return that of a cylinder of a length between two half spheres."""
+    balls = radius * (4.0 / 3.0)  # as long as a cylinder of their volume
+    squared, whole = radius * radius, length + balls
+    along = (length * squared / 2.0 + balls * squared * 0.4) / whole
+    lever = squared * 0.4 + length * length / 4.0 + length * radius * 0.375
+    across = (length * (length * length / 12.0 + squared / 4.0) + balls * lever) / whole
+    return squared * whole * math.pi, (along, across)
+
+
+def _cone(radius: Any, length: Any) -> tuple[Any, tuple[Any, ...]]:
+    squared = radius * radius
+    return squared * length * (math.pi / 3), (squared * 0.3, squared * 0.15 + length * length * 0.0375)
+
+
+def _ellipsoid(size: Any) -> tuple[Any, tuple[Any, ...]]:
+    x, y, z = size
+    return x * y * z * (math.pi / 6), ((y * y + z * z) / 20.0, (z * z + x * x) / 20.0, (x * x + y * y) / 20.0)
+
+
 def _rod(length: Any) -> tuple[Any, tuple[Any, ...]]:
     return None, (0.0, length * length / 12.0)
 
@@ -60,6 +80,9 @@ SOLIDS = {
     "sphere": HomogeneousSolid(("radius",), "", _sphere),
     "cylinder": HomogeneousSolid(("radius", "length"), "z", _cylinder),
     "tube": HomogeneousSolid(("radius", "inner_radius", "length"), "z", _tube),
+    "capsule": HomogeneousSolid(("radius", "length"), "z", _capsule),
+    "cone": HomogeneousSolid(("radius", "length"), "z", _cone),
+    "ellipsoid": HomogeneousSolid(("size",), "", _ellipsoid),
     "rod": HomogeneousSolid(("length",), "x", _rod),
     "disc": HomogeneousSolid(("radius",), "z", _disc),
 }

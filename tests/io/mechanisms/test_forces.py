@@ -150,6 +150,13 @@ SOLIDS = [
     ("spatial", "{solid: box, size: [L, 2 cm, 3 cm]}", ("box", {"size": [0.1, 0.02, 0.03]})),
     ("spatial", "{solid: tube, radius: L, inner_radius: L/2, length: 1}", ("tube", {"axis": "z"})),
     ("spatial", "{solid: sphere, radius: L}", ("sphere", {"radius": 0.1})),
+    (
+        "spatial",
+        "{solid: capsule, radius: L, length: 50 cm, axis: y}",
+        ("capsule", {"radius": 0.1, "length": 0.5, "axis": "y"}),
+    ),
+    ("spatial", "{solid: ellipsoid, size: [L, 2 cm, 3 cm]}", ("ellipsoid", {"size": [0.1, 0.02, 0.03]})),
+    ("planar", "{solid: cone, radius: L, length: 5}", ("cone", {"radius": 0.1, "length": 5.0})),
     ("planar", "{solid: cylinder, radius: L, length: 5}", ("cylinder", {"radius": 0.1, "length": 5.0})),
 ]
 THIN = [

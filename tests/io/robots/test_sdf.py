@@ -402,7 +402,6 @@ BAD = {
     "five numbers of a pose": (model(link("a", "0 0 0 0 0"), link("b"), joint("j", "a", "b")), "6 finite numbers"),
     "a number that is none": (model(link("a", "0 0 nan 0 0 0")), "finite"),
     "a mass below zero": (model(link("a", body="<inertial><mass>-1</mass></inertial>")), "greater than zero"),
-    "an inertia of shapes": (model(link("a", body='<inertial auto="true"/>')), "auto"),
     "a pose in a circle": (
         model(
             '<link name="a"><pose relative_to="b">1 0 0 0 0 0</pose></link>',

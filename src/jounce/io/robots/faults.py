@@ -13,6 +13,8 @@ REVERSED = "lower limits exceed upper ones, and are taken for no range"
 ONE_END = "these joints have one end of a range, beyond the zero that stands for the other, which is taken for none"
 WITHOUT_INERTIAL = "these links have no inertia of their own, which SDF takes for 1 kg with moments of 1 kg m^2"
 PARTLY_INERTIAL = "these links lack their mass or moments of inertia, which SDF takes for 1 kg and 1 kg m^2"
+DEFAULT_DENSITY = "shapes give these links their mass without a density, for which SDF takes 1000 kg/m^3"
+OVERWRITTEN = "poses or moments of inertia stand beside those that shapes give, which are taken"
 HEADINGS = {
     NEGATIVE: "a principal moment of inertia is negative",
     TRIANGLE: "a principal moment of inertia exceeds the sum of the others",

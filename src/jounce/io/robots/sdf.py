@@ -103,7 +103,7 @@ class _Reader:
     def robot(self) -> Robot:
         """Return the robot."""
         elements = {name: element for name, element in self.elements.items() if element.tag == "link"}
-        inertias = {name: read_inertia(name, element, self.faults) for name, element in elements.items()}
+        inertias = {name: read_inertia(name, element, self.frames, self.faults) for name, element in elements.items()}
         every = [
             read_joint(name, x, self.frames, self.version) for name, x in self.elements.items() if x.tag == "joint"
         ]

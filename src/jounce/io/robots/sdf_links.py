@@ -6,7 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.io.robots.faults import PARTLY_INERTIAL, WITHOUT_INERTIAL, Faults
-from jounce.io.robots.sdf_poses import check_known, number_of, only, pose_of
+from jounce.io.robots.sdf_poses import Frames, check_known, number_of, only, pose_of
+from jounce.io.robots.sdf_shapes import inertia_of_shapes
 from jounce.io.robots.xml_elements import Element
 from jounce.rigid.inertia import Inertia
 
@@ -18,7 +19,7 @@ LINK += ("velocity_decay", "material", "plugin", "frame", *SHOWN)
 INERTIAL = ("pose", "mass", "inertia", "density", "auto_inertia_params", "fluid_added_mass", "frame")
 
 
-def read_inertia(name: str, element: Element, faults: Faults) -> Inertia | None:
+def read_inertia(name: str, element: Element, frames: Frames, faults: Faults) -> Inertia | None:
     """Return the inertia of a link in its frame, None where all of it is zero."""
     where = ("links", name)
     check_known(element, LINK, *where)
@@ -30,6 +31,10 @@ def read_inertia(name: str, element: Element, faults: Faults) -> Inertia | None:
     where = (*where, "inertial")
     check_known(inertial, INERTIAL, *where)
     _check_readable(name, inertial, *where)
+    if inertial.attributes.get("auto", "false").strip() in ("true", "1"):
+        inertia = inertia_of_shapes(name, element, inertial, frames, faults)
+        faults.check(inertia, name, inertial.line)
+        return inertia
     moments = only(inertial, "inertia", *where)
     if moments is not None:
         check_known(moments, TENSOR, *where, "inertia")
@@ -50,9 +55,6 @@ def read_inertia(name: str, element: Element, faults: Faults) -> Inertia | None:
 
 def _check_readable(name: str, inertial: Element, *where: str) -> None:
     """Refuse what changes the inertia of a link and is not read."""
-    if inertial.attributes.get("auto", "false").strip() in ("true", "1"):
-        message = 'auto="true" asks for an inertia from shapes, which are not read; write mass and inertia'
-        raise inertial.error(message, *where)
     pose, added = only(inertial, "pose", *where), only(inertial, "fluid_added_mass", *where)
     given = {} if pose is None else pose.attributes
     frame = given.get("relative_to") or given.get("frame") or name

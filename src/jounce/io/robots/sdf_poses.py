@@ -61,6 +61,12 @@ class Frames:
             self._resolved[name] = self._resolved[self._reference(element)].then(pose_of(element, name))
         return self._resolved[name]
 
+    def of(self, name: str, element: Element, *where: str) -> FramePose:
+        """Return where a frame is in the model; `element` names the frame, which must be there."""
+        if name != MODEL:
+            self._check(name, element, *where)
+        return self.pose(name)
+
     def link(self, name: str, element: Element, *where: str) -> str:
         """Return the link that a frame is fixed to, or ``world``; `element` names the frame."""
         chain = [name]
