@@ -26,7 +26,7 @@ SLOW_EXAMPLES = frozenset(
     jounce.kinematics.curves.assemblies.assemblies
     jounce.kinematics.curves.limits.LimitPosition
     jounce.kinematics.families.solve_batch.solve_batch
-    jounce.kinematics.position_analysis.solve.solve_in_stretches
+    jounce.kinematics.position_analysis.solve.solve_in_chunks
     jounce.planning.tool_paths.follow_tool_path.follow_tool_path
     jounce.plot.bands.draw_bands
     jounce.plot.forces.draw_power

@@ -1,9 +1,10 @@
 """Public names of release 0.4 and where they are from 0.5 on; the old ones work for one release, with a warning."""
 
 import functools
+import sys
 import warnings
-from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from collections.abc import Callable, Mapping
+from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -98,3 +99,15 @@ def old_keyword(old: str, new: str) -> Callable[[Callable[P, R]], Callable[P, R]
         return call
 
     return accepting
+
+
+def renamed(module: str, names: Mapping[str, str]) -> Callable[[str], Any]:
+    """Return the `__getattr__` of a module that gives renamed objects under their old names too, with a warning."""
+
+    def get(old: str) -> Any:
+        if old not in names:
+            raise AttributeError(f"module {module!r} has no attribute {old!r}")
+        warnings.warn(f"{module}.{old} is {names[old]} from release 0.5 on", DeprecationWarning, stacklevel=2)
+        return getattr(sys.modules[module], names[old])
+
+    return get

@@ -38,9 +38,9 @@ def file(tmp_path):
 def test_stretches_change_nothing(run, file, tmp_path, monkeypatch, motion, status, suffix):
     path, out = file(motion), tmp_path / f"motion.{suffix}"
     told, written = [], []
-    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.STRETCH", 1100)
+    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.CHUNK", 1100)
     for streams in (False, True):
-        monkeypatch.setattr("jounce.kinematics.takes_stretches", lambda _, streams=streams: streams)
+        monkeypatch.setattr("jounce.kinematics.needs_chunks", lambda _, streams=streams: streams)
         told.append([run("run", path, "--order", "1", "--out", out), run("run", path, "--order", "1", "--json")])
         written.append(read(out))
         out.unlink()
@@ -52,7 +52,7 @@ def test_stretches_change_nothing(run, file, tmp_path, monkeypatch, motion, stat
 
 @pytest.mark.slow
 def test_an_interrupt_between_stretches_leaves_no_file(run, file, tmp_path, monkeypatch):
-    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.STRETCH", 1100)
+    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.CHUNK", 1100)
     path, seen = file(WHOLE), []
 
     def interrupt(_, done, total):
@@ -68,7 +68,7 @@ def test_an_interrupt_between_stretches_leaves_no_file(run, file, tmp_path, monk
 
 @pytest.mark.slow
 def test_a_result_that_cannot_be_written_is_told(run, file, tmp_path, monkeypatch):
-    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.STRETCH", 1100)
+    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.CHUNK", 1100)
 
     def full(*_):
         raise OSError(28, "No space left on device")

@@ -27,7 +27,7 @@ class Holder:
         return local
 
 
-holder_of = functools.cache(Holder)
+driver_of_output = functools.cache(Holder)
 
 
 @pytest.fixture
@@ -48,7 +48,7 @@ def by_table():
 
 
 def by_cache_and_property():
-    return holder_of(planar_state(np.random.default_rng(0))).place
+    return driver_of_output(planar_state(np.random.default_rng(0))).place
 
 
 def by_local_variable():

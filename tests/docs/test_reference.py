@@ -17,7 +17,7 @@ PACKAGES += ("robot", "sweeps", "trajectory", "viewer")
 MODULES = ("cams", "energy", "joints", "laws", "outputs")  # names of several packages, under subjects
 CATALOGUES = ("planar", "spatial", "drivers")
 ALIASES = {"Scalar", "Vector", "Law", "Laws"}  # annotations of fields, told of in the text
-HELPERS = {"check_animation", "check_figure", "check_report", "raise_for_status", "takes_stretches"}
+HELPERS = {"check_animation", "check_figure", "check_report", "raise_for_status", "needs_chunks"}
 HELPERS |= {
     "force_catalogue",
     "coordinate_of",

@@ -8,7 +8,7 @@ import pytest
 import jounce as jn
 from jounce.execution import buffer_pool
 from jounce.execution.backends import is_wanted
-from jounce.execution.buffer_pool import LINE, acquire, arrays_in, release, room_of
+from jounce.execution.buffer_pool import LINE, acquire, arrays_in, bytes_needed, release
 from tests.problems.small import four_bar
 
 
@@ -41,7 +41,7 @@ def test_no_more_is_kept_than_is_allowed(kept, monkeypatch):
 
 def test_arrays_begin_at_lines_and_have_nothing_in_common():
     shapes, kinds = [(3, 5), (2, 2, 7), (0,), (9,)], [float, float, float, int]
-    block = np.empty(room_of(shapes) + 3, np.uint8)[3:]
+    block = np.empty(bytes_needed(shapes) + 3, np.uint8)[3:]
     arrays = arrays_in(block, shapes, kinds)
     assert [(x.shape, x.dtype) for x in arrays] == [(s, np.dtype(k)) for s, k in zip(shapes, kinds, strict=True)]
     assert not any(x.ctypes.data % LINE for x in arrays if x.size)

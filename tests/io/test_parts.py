@@ -14,7 +14,7 @@ import xarray
 import jounce as jn
 from jounce.errors import OutputError
 from jounce.io import read, write, write_parts
-from jounce.kinematics import Status, solve_in_stretches
+from jounce.kinematics import Status, solve_in_chunks
 from jounce.mechanism import TimeGrid
 from tests.problems.small import four_bar, slider_crank, spindle
 
@@ -24,8 +24,8 @@ SUFFIXES = ["nc", "csv"]
 
 
 @pytest.fixture(autouse=True)
-def _three_stretches(monkeypatch):
-    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.STRETCH", 1100)
+def _three_chunks(monkeypatch):
+    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.CHUNK", 1100)
 
 
 def turning():
@@ -67,7 +67,7 @@ def test_the_file_is_that_of_the_whole_motion(tmp_path, mechanism):
     whole = jn.solve(mechanism(), GRID, order=2, strict=False)
     for suffix in SUFFIXES:
         write(whole.dataset, tmp_path / f"whole.{suffix}")
-        motion = solve_in_stretches(mechanism(), GRID, order=2)
+        motion = solve_in_chunks(mechanism(), GRID, order=2)
         count = []
         parts = (count.append(len(part.time)) or part.dataset for part in motion)
         write_parts(parts, tmp_path / f"parts.{suffix}", len(motion))
@@ -81,8 +81,8 @@ def test_the_file_is_that_of_the_whole_motion(tmp_path, mechanism):
 
 
 @pytest.mark.slow
-def test_a_motion_that_ends_in_a_later_stretch():
-    motion = solve_in_stretches(slider_crank("3.8 - 2*t"), GRID, order=0)  # beyond its range from t = 0.9 on
+def test_a_motion_that_ends_in_a_later_chunk():
+    motion = solve_in_chunks(slider_crank("3.8 - 2*t"), GRID, order=0)  # beyond its range from t = 0.9 on
     assert (motion.status == Status.OK).all()
     for part in motion:
         past = part.time > 0.9

@@ -24,7 +24,7 @@ from jounce.reporting.terminal import Bar, say, show_peaks
 
 if TYPE_CHECKING:
     from jounce.integrate import Obreshkov, Taylor
-    from jounce.kinematics import Motion, Stretches
+    from jounce.kinematics import ChunkedMotion, Motion
     from jounce.mechanism import Mechanism
 
 PLAIN_RUN = RobotRun()
@@ -142,10 +142,10 @@ def _refuse_options(file: Path, reading: MechanismReading) -> None:
 
 
 def _is_long(mechanism: Mechanism, file: Path) -> bool:
-    from jounce.kinematics import takes_stretches
+    from jounce.kinematics import needs_chunks
 
     with errors_about(file):
-        return takes_stretches(mechanism)
+        return needs_chunks(mechanism)
 
 
 def _streamed(
@@ -157,15 +157,15 @@ def _streamed(
     *,
     refine: bool,
     heading: bool | None,
-) -> Stretches:
-    """Solve stretch by stretch, and write each of them before the next is solved."""
+) -> ChunkedMotion:
+    """Solve chunk by chunk, and write each before the next is solved."""
     from jounce.io import in_units
-    from jounce.kinematics import solve_in_stretches
+    from jounce.kinematics import solve_in_chunks
     from jounce.reporting.peaks import parts_with_peaks
 
     with Bar("solving") as bar:
         with errors_about(file):
-            motion = solve_in_stretches(mechanism, order=order, tolerance=tolerance, progress=bar)
+            motion = solve_in_chunks(mechanism, order=order, tolerance=tolerance, progress=bar)
         parts = (in_units(part.dataset, mechanism.shown_units) for part in parts_with_peaks(motion, refine=refine))
         output.write_parts(parts, len(motion.time), header_units=heading)
     return motion
@@ -192,7 +192,7 @@ def _finished(
 
 def _write_result(
     command: str,
-    motion: Motion | Stretches,
+    motion: Motion | ChunkedMotion,
     file: Path,
     output: TableOutput,
     *,
@@ -273,7 +273,7 @@ def moved(mechanism: Mechanism, file: Path, order: int) -> Motion:
     return simulated(mechanism, file, order) if mechanism.initial else solved(mechanism, file, order)
 
 
-def outcome(motion: Motion | Stretches, file: Path) -> int:
+def outcome(motion: Motion | ChunkedMotion, file: Path) -> int:
     """Return 0, or raise for the first instant that failed."""
     from jounce.kinematics import raise_for_status
 

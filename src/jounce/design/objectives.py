@@ -39,7 +39,7 @@ from jounce.errors import ExpressionError, did_you_mean
 from jounce.jet.derivatives import taylor_coefficients
 from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
 from jounce.mechanism import Mechanism
-from jounce.mechanism.held_outputs import with_outputs
+from jounce.mechanism.output_drivers import with_outputs
 
 BEYOND = 5  # derivatives beyond those asked for, by which a quantity is known between instants
 

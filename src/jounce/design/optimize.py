@@ -14,7 +14,7 @@ from jounce.design.result import OptimizedDesign
 from jounce.design.study import Asked, Study
 from jounce.errors import DesignError, JounceError, MechanismError, check_name, whole_number
 from jounce.kinematics import assemblies as all_assemblies
-from jounce.mechanism import Mechanism, build, check_mechanism, time_grid, with_outputs_held
+from jounce.mechanism import Mechanism, build, check_mechanism, time_grid, with_output_drivers
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
 from jounce.moved_names import old_keyword
@@ -170,7 +170,7 @@ def _bound(mechanism: Mechanism, name: str, given: Any) -> float:
     try:
         changed = mechanism.with_parameters(**{name: given})
         value = float(changed.parameter_values[name])
-        build(with_outputs_held(changed))
+        build(with_output_drivers(changed))
     except JounceError as error:
         message = f"no mechanism can have this bound: {error}"
         raise type(error)(message, name=f"vary.{name}", value=given) from None

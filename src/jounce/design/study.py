@@ -19,7 +19,7 @@ from jounce.design.search import CONDITION_TOLERANCE, SMALL, Search, SearchResul
 from jounce.errors import DesignError, SolveError
 from jounce.kinematics import Motion, Status, assemblies as all_assemblies, solve
 from jounce.mechanism import Mechanism
-from jounce.mechanism.held_outputs import with_outputs
+from jounce.mechanism.output_drivers import with_outputs
 
 GRID = 121  # instants that a search works with at first, at most
 FINER = 4  # times as many, on which its end is looked at

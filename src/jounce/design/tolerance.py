@@ -17,8 +17,8 @@ from jounce.kinematics import Motion, Status, solve
 from jounce.kinematics.families.design_sides import Sides
 from jounce.kinematics.families.solve_batch import solve_with_sides
 from jounce.mechanism import Mechanism, check_mechanism, time_grid
-from jounce.mechanism.held_outputs import with_outputs
 from jounce.mechanism.law_breaks import laws_may_break
+from jounce.mechanism.output_drivers import with_outputs
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.time import TimeLike
 

@@ -30,7 +30,7 @@ def release(block: np.ndarray) -> None:
         _free.append(block)
 
 
-def room_of(shapes: Sequence[Sequence[int]]) -> int:
+def bytes_needed(shapes: Sequence[Sequence[int]]) -> int:
     """Return how many bytes a block needs for arrays of these shapes."""
     return LINE + sum(_lines(shape) for shape in shapes)
 

@@ -139,9 +139,9 @@ def write_parts(
     >>> import pathlib, tempfile
     >>> import jounce as jn
     >>> from jounce import io
-    >>> from jounce.kinematics import solve_in_stretches
+    >>> from jounce.kinematics import solve_in_chunks
     >>> fine = jn.TimeGrid(start=0, stop=2, count=100_001)
-    >>> motion = solve_in_stretches(jn.load("examples/four_bar.yaml"), fine, order=0)
+    >>> motion = solve_in_chunks(jn.load("examples/four_bar.yaml"), fine, order=0)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     io.write_parts((part.dataset for part in motion), pathlib.Path(folder, "motion.nc"), len(motion))
     ...     print(io.read(pathlib.Path(folder, "motion.nc"))["psi"].shape)

@@ -21,16 +21,19 @@ from jounce.kinematics.curves import (
 )
 from jounce.kinematics.families.solve_batch import solve_batch as solve_batch
 from jounce.kinematics.position_analysis.chunked_motion import (
-    Stretches as Stretches,
-    takes_stretches as takes_stretches,
+    ChunkedMotion as ChunkedMotion,
+    needs_chunks as needs_chunks,
 )
 from jounce.kinematics.position_analysis.solve import (
     raise_for_status as raise_for_status,
     solve as solve,
-    solve_in_stretches as solve_in_stretches,
+    solve_in_chunks as solve_in_chunks,
 )
 from jounce.kinematics.results.motion import Motion as Motion
 from jounce.kinematics.status import Status as Status
+from jounce.moved_names import renamed as _renamed
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
 _compute_under_own_settings(__name__)
+
+__getattr__ = _renamed(__name__, {"Stretches": "ChunkedMotion", "solve_in_stretches": "solve_in_chunks"})

@@ -14,7 +14,6 @@ from jounce.mechanism.driver_outputs import (
     DriverAngleOutput as DriverAngleOutput,
     DriverDisplacementOutput as DriverDisplacementOutput,
 )
-from jounce.mechanism.held_outputs import with_outputs_held as with_outputs_held
 from jounce.mechanism.linkage_outputs import (
     InstantCenterOutput as InstantCenterOutput,
     ProjectedAngleOutput as ProjectedAngleOutput,
@@ -23,6 +22,7 @@ from jounce.mechanism.linkage_outputs import (
     SymmetricRollCenterOutput as SymmetricRollCenterOutput,
 )
 from jounce.mechanism.mechanism import Body as Body, Mechanism as Mechanism, check_mechanism as check_mechanism
+from jounce.mechanism.output_drivers import with_output_drivers as with_output_drivers
 from jounce.mechanism.outputs import (
     AbstractMotionOutput as AbstractMotionOutput,
     AbstractOutput as AbstractOutput,

@@ -9,8 +9,8 @@ import numpy as np
 from jounce.constraints import AbstractConstraint
 from jounce.errors import JounceError, UnitWarning, warn_caller
 from jounce.mechanism.driver_outputs import is_turning
-from jounce.mechanism.held_outputs import with_outputs_held
 from jounce.mechanism.mechanism import Mechanism
+from jounce.mechanism.output_drivers import with_output_drivers
 from jounce.mechanism.resolve import resolve_motion
 from jounce.trajectory import (
     AbstractMotion,
@@ -46,7 +46,7 @@ class AngleLaw(NamedTuple):
 def laws_of_angles(mechanism: Mechanism) -> Iterator[AngleLaw]:
     """Yield the laws of drivers that turn something, those that are wrong left out: it is told where they are used."""
     try:
-        held, parameters = with_outputs_held(mechanism), mechanism.parameter_values
+        held, parameters = with_output_drivers(mechanism), mechanism.parameter_values
     except JounceError:
         return
     for name, driver in held.drivers.items():

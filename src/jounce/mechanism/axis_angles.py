@@ -10,7 +10,7 @@ from jounce.constraints.angles import Datum, angle_of
 from jounce.jet.turns import counted_on, principal, whole_periods
 from jounce.mechanism.system import Group, holding
 from jounce.mechanism.time import nearest_instants
-from jounce.mechanism.turn_counting import closer_places
+from jounce.mechanism.turn_counting import refined_samples
 from jounce.modules import unchecked, with_fields
 from jounce.shapes import Numbers
 
@@ -74,7 +74,7 @@ class AttitudeHistory(NamedTuple):
         if between is None:
             return self.time, known
         whole = np.zeros(len(self.time), int)  # one path, along which instants are measured
-        found = closer_places(lambda _, instants: measure(between(instants)), whole, self.time, known)
+        found = refined_samples(lambda _, instants: measure(between(instants)), whole, self.time, known)
         return found.share, found.angle
 
     def angles(self, group: Group) -> tuple[Float[np.ndarray, " place"], Float[np.ndarray, "instance place"]]:

@@ -6,8 +6,8 @@ from typing import Any
 from jounce.constraints.base import value_fields
 from jounce.constraints.cams import Cam, coordinate_of_element
 from jounce.errors import JounceError
-from jounce.mechanism.held_outputs import holder_of
 from jounce.mechanism.mechanism import Mechanism
+from jounce.mechanism.output_drivers import driver_of_output
 from jounce.mechanism.resolve import resolve_motion
 from jounce.trajectory import FollowingMotion, OutputMotion
 
@@ -56,7 +56,7 @@ def leader_name(mechanism: Mechanism, cam: Cam) -> str | None:
         element = next((kind[name] for kind in kinds if name in kind), None)
         try:
             if element is None:
-                element = holder_of(mechanism, OutputMotion(name, "0"), "of")
+                element = driver_of_output(mechanism, OutputMotion(name, "0"), "of")
             if element is not cam and same_coordinate(coordinate_of_element(element), cam.leader):
                 return name
         except JounceError:

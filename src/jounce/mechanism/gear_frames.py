@@ -32,7 +32,7 @@ LARGEST_WHOLE = 1000  # of the whole numbers in a ratio of turns in space
 WHOLE = 1e-9  # how near to a whole number a multiple of a ratio is
 
 
-class Place(NamedTuple):
+class BodyVector(NamedTuple):
     """A point or a direction of a body: its components, and as they were given."""
 
     body: str
@@ -42,7 +42,7 @@ class Place(NamedTuple):
 
 Grouped = tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]
 """Groups, and the names of the elements of each, with their kinds before them."""
-Joined = Sequence[tuple[Place, Place]]
+Joined = Sequence[tuple[BodyVector, BodyVector]]
 """Pairs of places that a joint holds together."""
 
 
@@ -176,7 +176,7 @@ def _arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[str, An
     def same(a: Any, b: Any) -> bool:
         return abs(a - b) <= LARGEST_GAP * size
 
-    def coincide(a: Place, b: Place) -> bool:
+    def coincide(a: BodyVector, b: BodyVector) -> bool:
         pairs = zip(a.value, b.value, a.given, b.given, strict=True)
         return all(_same(x, y, of_x, of_y, same) for x, y, of_x, of_y in pairs)
 
@@ -301,7 +301,9 @@ def _whole(ratio: Any) -> Any:
     return namespace.where(fits.any(axis=-1), 1.0 + namespace.argmax(fits, axis=-1), np.nan)
 
 
-def _joined(mechanism: Mechanism, pairs_of: Callable[[Any], Sequence[tuple[str, str]]]) -> list[tuple[Place, Place]]:
+def _joined(
+    mechanism: Mechanism, pairs_of: Callable[[Any], Sequence[tuple[str, str]]]
+) -> list[tuple[BodyVector, BodyVector]]:
     """Return the places that joints hold together, by the pairs of fields that say so."""
     found = []
     for joint in mechanism.joints.values():
@@ -326,9 +328,9 @@ def _held_parallel(joint: Any) -> Sequence[tuple[str, str]]:
     return facts_of(type(joint)).held_parallel
 
 
-def _place(body: str, given: Any, parameters: Mapping[str, Any]) -> Place:
+def _place(body: str, given: Any, parameters: Mapping[str, Any]) -> BodyVector:
     entries = tuple(given.tolist() if isinstance(given, np.ndarray) else given)
-    return Place(body, tuple(resolve(entry, parameters) for entry in entries), entries)
+    return BodyVector(body, tuple(resolve(entry, parameters) for entry in entries), entries)
 
 
 def _same(a: Any, b: Any, given_a: Any, given_b: Any, near: Callable[[Any, Any], bool]) -> bool:
@@ -339,7 +341,7 @@ def _same(a: Any, b: Any, given_a: Any, given_b: Any, near: Callable[[Any, Any],
     return bool(near(a, b))
 
 
-def _parallel(a: Place, b: Place) -> int:
+def _parallel(a: BodyVector, b: BodyVector) -> int:
     """Return 1 for the same direction, -1 for the opposite one, else 0."""
     if any(isinstance(x, Tracer) for x in (*a.value, *b.value)):
         pairs = zip(a.value, b.value, a.given, b.given, strict=True)
@@ -348,7 +350,9 @@ def _parallel(a: Place, b: Place) -> int:
     return int(np.sign(u @ v)) if np.linalg.norm(np.cross(u, v)) <= SAME_DIRECTION else 0
 
 
-def _reached(start: Place, joined: Joined, alike: Callable[[Place, Place], int | bool]) -> dict[str, Place]:
+def _reached(
+    start: BodyVector, joined: Joined, alike: Callable[[BodyVector, BodyVector], int | bool]
+) -> dict[str, BodyVector]:
     """Return where a place is on each body that joints hold to it, one after the other."""
     found, waiting = {start.body: start}, [start]
     while waiting:
@@ -358,7 +362,7 @@ def _reached(start: Place, joined: Joined, alike: Callable[[Place, Place], int |
                 if near.body != here.body or far.body in found:
                     continue
                 if sense := int(alike(here, near)):
-                    there = far if sense > 0 else Place(far.body, tuple(-x for x in far.value), far.given)
+                    there = far if sense > 0 else BodyVector(far.body, tuple(-x for x in far.value), far.given)
                     found[far.body] = there
                     waiting.append(there)
     return found

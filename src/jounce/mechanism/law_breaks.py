@@ -11,8 +11,8 @@ from jaxtyping import Float
 from jounce.constraints.base import field_kinds
 from jounce.forces import AbstractForce, ExpressionLaw, TimeLaw, VectorLaw
 from jounce.mechanism.cam_laws import cams_in_time
-from jounce.mechanism.held_outputs import with_outputs_held
 from jounce.mechanism.mechanism import Mechanism
+from jounce.mechanism.output_drivers import with_output_drivers
 from jounce.mechanism.resolve import resolve_motion
 from jounce.settings import under_own_settings
 from jounce.trajectory.breaks import apart, law_breaks, may_break
@@ -93,7 +93,7 @@ def breaks_depend_on(mechanism: Mechanism, names: Iterable[str]) -> bool:
 
 def laws_of(mechanism: Mechanism) -> list[AbstractMotion]:
     """Return the laws of drivers, and of cams that these lead, with numbers in the place of parameters."""
-    values, drivers = mechanism.parameter_values, with_outputs_held(mechanism).drivers.values()
+    values, drivers = mechanism.parameter_values, with_output_drivers(mechanism).drivers.values()
     motions = (getattr(driver, "motion", None) for driver in drivers)
     found = [resolve_motion(motion, values) for motion in motions if motion is not None]
     return [*found, *(law for _, law in cams_in_time(mechanism))]

@@ -72,7 +72,7 @@ def template(tree: Any) -> Callable[[Sequence[Any]], Any]:
 
     Numbers become plain ones on the way, as a mechanism is checked for.
     """
-    holder = _mapped(tree, lambda _: _PLACE)
+    holder = _mapped(tree, lambda _: _PLACEHOLDER)
 
     def made(values: Sequence[Any]) -> Any:
         left = iter(values)
@@ -81,16 +81,16 @@ def template(tree: Any) -> Callable[[Sequence[Any]], Any]:
     return made
 
 
-class _Place:
+class _Placeholder:
     """Stands where a traced value stood."""
 
 
-_PLACE = _Place()
+_PLACEHOLDER = _Placeholder()
 
 
 def _mapped(value: Any, function: Callable[[Any], Any]) -> Any:
     """Return a nesting with what a function makes of each traced value; what holds none stays the same object."""
-    if isinstance(value, Tracer | _Place):
+    if isinstance(value, Tracer | _Placeholder):
         return function(value)
     if type(value) in PLAIN or isinstance(value, type):
         return value

@@ -22,7 +22,7 @@ LARGEST_CHANGE = np.pi / 4  # of an angle from place to place: more, and it is l
 HALVINGS = 24  # of the way between two places: down to what passes 1e-9 beside an attitude that tells no angle
 
 
-class Places(NamedTuple):
+class PathSamples(NamedTuple):
     """Places along paths, in their order, and angles there.
 
     Attributes
@@ -44,7 +44,7 @@ class Places(NamedTuple):
         return self.angle[:, nearest_instants(2.0 * self.path + self.share, 2.0 * path + share)]
 
 
-def closer_places(measure: Measure, path: Paths, share: Shares, angle: Angles | None = None) -> Places:
+def refined_samples(measure: Measure, path: Paths, share: Shares, angle: Angles | None = None) -> PathSamples:
     """Return places between which no angle makes half a turn: those given, and more of them where an angle is fast.
 
     Parameters
@@ -66,12 +66,12 @@ def closer_places(measure: Measure, path: Paths, share: Shares, angle: Angles | 
         found = measure(path[wide], middle)
         path, share = np.insert(path, wide + 1, path[wide]), np.insert(share, wide + 1, middle)
         angle = np.insert(angle, wide + 1, found, axis=1)
-    return Places(path, share, angle)
+    return PathSamples(path, share, angle)
 
 
 def counted_along(
     measure: Measure, run: Int[np.ndarray, " step"], begun: Float[np.ndarray, "angle step"], places: int
-) -> Places:
+) -> PathSamples:
     """Count angles along the steps of many runs, each a path with shares from 0 to 1.
 
     Parameters
@@ -86,9 +86,9 @@ def counted_along(
         In a step, at least.
     """
     step, share = np.repeat(np.arange(len(run)), places + 1), np.tile(np.arange(places + 1) / places, len(run))
-    step, share, angle = closer_places(measure, step, share)
+    step, share, angle = refined_samples(measure, step, share)
     begins = np.append(True, np.diff(run[step]) != 0)
     rise = np.where(begins, 0.0, np.nan_to_num(principal(np.diff(angle, axis=1, prepend=angle[:, :1]))))
     first = np.flatnonzero(begins)[np.cumsum(begins) - 1]  # the place at which the run of each place begins
     counted, known = np.cumsum(rise, axis=1), begun[:, step]
-    return Places(step, share, known + principal(angle[:, first] - known) + counted - counted[:, first])
+    return PathSamples(step, share, known + principal(angle[:, first] - known) + counted - counted[:, first])

@@ -19,7 +19,7 @@ from jounce.jet.algebra import stacked
 from jounce.kinematics import Motion
 from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.curves.choice import chosen
-from jounce.mechanism import Mechanism, build, time_grid, with_outputs_held
+from jounce.mechanism import Mechanism, build, time_grid, with_output_drivers
 from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.starting_guess import starting_guess
 from jounce.mechanism.system import POSITION_COMPONENTS
@@ -50,7 +50,7 @@ def assembled(mechanism: Mechanism) -> dict[str, Frame]:
     >>> assembled(jn.load("examples/four_bar.yaml"))["crank"][0, :, 1].round(6).tolist()  # x axis
     [0.866025, 0.5]
     """
-    fixed = with_outputs_held(mechanism)
+    fixed = with_output_drivers(mechanism)
     started = dataclasses.replace(fixed, drivers={**fixed.drivers, **fixed.initial}, initial={})
     first = 0.0
     if mechanism.time is not None:

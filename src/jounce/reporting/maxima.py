@@ -1,4 +1,4 @@
-"""Where curves are largest that come stretch by stretch, and are not kept."""
+"""Where curves are largest that come chunk by chunk, and are not kept."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ALIKE = 1e-6  # of the largest value of a curve
 
 
 class RunningMaxima:
-    """The largest values and a number of the largest local maxima of curves that come stretch by stretch.
+    """The largest values and a number of the largest local maxima of curves that come chunk by chunk.
 
     A curve is -inf where it is not known.
 
@@ -23,7 +23,7 @@ class RunningMaxima:
     times, sizes : array of shape (2 curves,)
         Where each curve is largest, s, and how large.
     scales : array of shape (2 curves,)
-        The largest of the sizes that came with the stretches.
+        The largest of the sizes that came with the chunks.
     """
 
     times: Float[np.ndarray, " curves"]
@@ -36,7 +36,7 @@ class RunningMaxima:
         self._maxima: list[Peaks] = []  # heights, and the instants before and after
 
     def add(self, time: Times, values: Curves, scales: Float[np.ndarray, " curves"]) -> None:
-        """Look at the next stretch."""
+        """Look at the next chunk."""
         top, every = np.argmax(values, axis=0), np.arange(values.shape[1])
         largest = values[top, every]
         if self._ends is None:

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from jounce.errors import SampleWarning
 from jounce.integrate import Simulation
-from jounce.kinematics import Motion, Stretches, solve
+from jounce.kinematics import ChunkedMotion, Motion, solve
 from jounce.mechanism import AbstractQuantity
 from jounce.mechanism.law_breaks import breaks_of_laws
 from jounce.mechanism.user_code import holds_users_code
@@ -124,13 +124,13 @@ def scalar_outputs(motion: Motion) -> dict[str, tuple[str, Float[np.ndarray, "ti
     return outputs
 
 
-def peaks(motion: Motion | Stretches, *, refine: bool = True) -> list[Peak]:
+def peaks(motion: Motion | ChunkedMotion, *, refine: bool = True) -> list[Peak]:
     """Return the peak values of each output, component by component, and of each derivative.
 
     Parameters
     ----------
-    motion : Motion or Stretches
-        What was solved; of stretches, those that `parts_with_peaks` found; else they are solved for it.
+    motion : Motion or ChunkedMotion
+        What was solved; of chunks, those that `parts_with_peaks` found; else they are solved for it.
     refine : bool, default True
         Find peaks between its instants too: the motion is solved at more instants where it has few, and then, as often
         as it takes, around the highest of them. Otherwise only its own instants count, and both sides of the instants
@@ -155,10 +155,10 @@ def peaks(motion: Motion | Stretches, *, refine: bool = True) -> list[Peak]:
     return motion.derived[name]
 
 
-def parts_with_peaks(motion: Motion | Stretches, *, refine: bool = True) -> Iterator[Motion]:
-    """Yield the stretches of a motion, for what else is to be done with them, and keep their `peaks` in the end."""
+def parts_with_peaks(motion: Motion | ChunkedMotion, *, refine: bool = True) -> Iterator[Motion]:
+    """Yield the chunks of a motion, for what else is to be done with them, and keep their `peaks` in the end."""
     search = _PeakSearch()
-    for part in motion if isinstance(motion, Stretches) else (motion,):
+    for part in motion if isinstance(motion, ChunkedMotion) else (motion,):
         search.add(part)
         yield part
     motion.derived[_name(refine)] = search.peaks_of(motion, refine=refine)
@@ -231,7 +231,7 @@ def effort_name(unit: str, order: int) -> str:
 
 
 class _PeakSearch:
-    """A search for the peaks of a motion, which may come stretch by stretch and is not kept."""
+    """A search for the peaks of a motion, which may come chunk by chunk and is not kept."""
 
     def __init__(self) -> None:
         self._columns: dict[str, tuple[str, int]] = {}  # the output and the number of derivatives of each
@@ -243,7 +243,7 @@ class _PeakSearch:
         if self._columns:
             self._maxima.add(part.time, _curves(part), _scales(part))
 
-    def peaks_of(self, motion: Motion | Stretches, *, refine: bool) -> list[Peak]:
+    def peaks_of(self, motion: Motion | ChunkedMotion, *, refine: bool) -> list[Peak]:
         """Return the peaks of a motion of which all instants were looked at, as `peaks` does."""
         rows = [(column, name, order) for column, (name, orders) in self._columns.items() for order in range(orders)]
         if not rows:
@@ -262,7 +262,7 @@ class _PeakSearch:
 
 
 def _extremes(
-    motion: Motion | Stretches, maxima: RunningMaxima, refine: bool
+    motion: Motion | ChunkedMotion, maxima: RunningMaxima, refine: bool
 ) -> tuple[Float[np.ndarray, " curves"], Float[np.ndarray, " curves"]]:
     """Return where each curve is largest and how large, (2 curves,): all curves upside down, then as they are.
 
@@ -292,7 +292,7 @@ def _extremes(
     return np.where(solved, times, np.nan), np.where(solved, sizes, np.nan)
 
 
-def _has_changed(motion: Motion | Stretches) -> bool:
+def _has_changed(motion: Motion | ChunkedMotion) -> bool:
     """Tell whether code of users computes something else by now than when the motion was solved."""
     elements = (element for part in motion.mechanism.elements.values() for element in part.values())
     if type(motion) is not Motion or not len(motion.time) or not holds_users_code(elements):
@@ -302,7 +302,7 @@ def _has_changed(motion: Motion | Stretches) -> bool:
     return not alike(now, then)
 
 
-def _one_sided(motion: Motion | Stretches) -> tuple[Times, Times, Curves]:
+def _one_sided(motion: Motion | ChunkedMotion) -> tuple[Times, Times, Curves]:
     """Return where the laws of a motion jump or bend, at both sides of each, these sides, and the curves there."""
     if not len(motion.time):
         return np.zeros(0), np.zeros(0), np.zeros((0, 0))
@@ -317,10 +317,10 @@ def _one_sided(motion: Motion | Stretches) -> tuple[Times, Times, Curves]:
     return breaks[which], sides, _at(motion, sides) if len(sides) else np.zeros((0, 0))
 
 
-def _around_maxima(motion: Motion | Stretches, maxima: RunningMaxima) -> tuple[Peaks, Peaks]:
+def _around_maxima(motion: Motion | ChunkedMotion, maxima: RunningMaxima) -> tuple[Peaks, Peaks]:
     """Return the instants before and after the highest local maxima, of a motion with few instants at more of them."""
     steps = -(-LEAST // (len(motion.time) - 1))
-    if steps == 1 or isinstance(motion, Stretches):
+    if steps == 1 or isinstance(motion, ChunkedMotion):
         return maxima.around_maxima()
     denser = RunningMaxima(PEAKS)
     denser.add(*_denser(motion, steps), maxima.scales)
@@ -336,14 +336,14 @@ def _denser(motion: Motion, steps: int) -> tuple[Float[np.ndarray, " denser"], F
     return whole[order], np.concatenate([_curves(motion), _at(motion, between)])[order]
 
 
-def _own(motion: Motion | Stretches, around: _Around) -> _Around:
+def _own(motion: Motion | ChunkedMotion, around: _Around) -> _Around:
     """Return the values of curves at instants of their own, (points, peaks, curves)."""
     instants, inverse = np.unique(around, return_inverse=True)
     values = _at(motion, instants)
     return values[inverse.reshape(around.shape), np.arange(around.shape[-1])]
 
 
-def _at(motion: Motion | Stretches, instants: Times) -> Curves:
+def _at(motion: Motion | ChunkedMotion, instants: Times) -> Curves:
     """Return the curves of a motion at other instants, -inf where it cannot be solved."""
     parts = []
     for first in range(0, len(instants), CHUNK):

@@ -10,7 +10,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Bool, Float
 
-from jounce.kinematics import Motion, Stretches, solve
+from jounce.kinematics import ChunkedMotion, Motion, solve
 from jounce.mechanism import AbstractMotionOutput
 
 DISTANCES = 4.0 ** -np.arange(5, 9)  # radii of the Taylor series from a change point; forces have three digits there
@@ -18,12 +18,12 @@ POLE = 3.0  # least growth of a pole from one distance to the next; one of first
 LIKENESS = 0.05  # of these growths
 
 
-def unbounded_outputs(motion: Motion | Stretches) -> dict[str, list[float]]:
+def unbounded_outputs(motion: Motion | ChunkedMotion) -> dict[str, list[float]]:
     """Return the outputs that grow without bound, and toward which instants, s, where a motion passes change points.
 
     Parameters
     ----------
-    motion : Motion or Stretches
+    motion : Motion or ChunkedMotion
         Solved; it is solved again near its change points.
     """
     first, last = float(motion.time[0]), float(motion.time[-1])

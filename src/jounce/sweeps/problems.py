@@ -29,7 +29,7 @@ from jounce.mechanism import (
     build,
     check_mechanism,
     time_grid,
-    with_outputs_held,
+    with_output_drivers,
 )
 from jounce.mechanism.starting_guess import pose_at
 from jounce.rigid.inertia import Inertia
@@ -258,7 +258,7 @@ def outputs_of(mechanism: Mechanism, instants: Float[np.ndarray, " time"], order
     """Return the outputs of a mechanism as quantities; it is solved only where there are forces or energies."""
     if not mechanism.outputs:
         raise MechanismError("the mechanism has no outputs, so that there is nothing to keep", name="outputs")
-    model = build(with_outputs_held(mechanism))
+    model = build(with_output_drivers(mechanism))
     pose = pose_at(model.guess, model.pose_type)
     zeros = np.zeros_like(pose.position.coefficients[0])
     pose = pose.extended(zeros, None if mechanism.space == "planar" else zeros)  # for outputs that are rates

@@ -26,7 +26,7 @@ STARTS, STEPS = 8, 40
 WANTED = 2  # positions
 CLOSED, NEARLY = 1e-13, 1e-10  # last corrections, m or rad: while they fall, and where rounding keeps them up
 DEPENDENT = 1e-9  # smallest singular value over the largest
-STRETCH = 3.0  # by which lengths, and directions, are multiplied
+CHUNK = 3.0  # by which lengths, and directions, are multiplied
 PAIRS = {"revolute": planar.Revolute, "rod": planar.DoubleRevolute, "prismatic": planar.Prismatic}
 
 
@@ -157,18 +157,18 @@ def _dimensions(subject: Subject, element: Any, motion: Motion) -> None:
         dimension = dimension_of_field(element, name)
         stretched = dimension in ("length", "length per angle", "direction")
         if kind == "curve" and dimension == "length":
-            changed[name] = tuple(f"{STRETCH}*({entry})" for entry in value)
+            changed[name] = tuple(f"{CHUNK}*({entry})" for entry in value)
             continue
         if kind not in ("scalar", "vector", "points", "motion") or (value is None and not stretched):
             continue
         if value is None or not (stretched or dimension in ("angle", "ratio")):
             return  # nothing is said of a field, or it stands for a length that is not seen
         if stretched:
-            changed[name] = f"{STRETCH}*({value})" if kind == "motion" else (STRETCH * np.asarray(value)).tolist()
-    wide = {**motion, "position": STRETCH * motion["position"]}
+            changed[name] = f"{CHUNK}*({value})" if kind == "motion" else (CHUNK * np.asarray(value)).tolist()
+    wide = {**motion, "position": CHUNK * motion["position"]}
     gap = residual(group_of([dataclasses.replace(element, **changed)], subject.space), wide)[0]
     if period := subject.period_of(group_of([element], subject.space)):
-        period = STRETCH * period if isinstance(subject.period, str) else period
+        period = CHUNK * period if isinstance(subject.period, str) else period
         gap[-1] -= period * np.round(gap[-1] / period)
     words = "dimensions: a joint that holds does not where all lengths are those in another unit"
     subject.same(gap, 0 * gap, 1e-10, words)

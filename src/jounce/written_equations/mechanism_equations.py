@@ -16,7 +16,7 @@ from jounce.linear_algebra.pattern import Pattern
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.builder import group_rows
-from jounce.mechanism.held_outputs import with_outputs_held
+from jounce.mechanism.output_drivers import with_output_drivers
 from jounce.mechanism.system import Group, System
 from jounce.mechanism.time import time_grid
 from jounce.written_equations.graph import Graph
@@ -122,7 +122,7 @@ def put_together(mechanism: Mechanism) -> Model:
     instant = 0.0
     if mechanism.time is not None:
         instant = float(time_grid(mechanism.time, mechanism.parameter_values)[0])
-    model = build(chosen(with_outputs_held(mechanism), instant))
+    model = build(chosen(with_output_drivers(mechanism), instant))
     if not any(map(measures_angle, model.system.groups)):
         return model
     return assemble(model, instant, TOLERANCE, free=True)[0]

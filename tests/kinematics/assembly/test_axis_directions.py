@@ -10,7 +10,7 @@ import jounce as jn
 from jounce.constraints import AbstractConstraint, Vector
 from jounce.errors import AssemblyWarning
 from jounce.kinematics.assembly.assemble import settled
-from jounce.kinematics.assembly.axis_directions import drawn_senses
+from jounce.kinematics.assembly.axis_directions import drawn_axis_signs
 from jounce.mechanism import build
 from jounce.mechanism.resolve import resolve
 
@@ -124,4 +124,4 @@ def test_axes_of_a_joint_of_ones_own_need_not_be_parallel():
     }
     rod = jn.Body([0, 0, 0], orientation={"axis": [1, 0, 0], "angle": 2.0})
     mechanism = jn.Mechanism(space="spatial", bodies={"rod": rod}, joints=joints)
-    assert drawn_senses(build(mechanism)).size == 0
+    assert drawn_axis_signs(build(mechanism)).size == 0

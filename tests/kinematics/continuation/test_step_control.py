@@ -8,12 +8,12 @@ import pytest
 
 from jounce.kinematics.continuation.step_control import (
     GROWTH,
-    Place,
+    ExpansionPoint,
     StepLimits,
     StopReason,
-    planned,
-    step_on,
-    steps_begin,
+    initial_control,
+    next_controls,
+    plan_next_step,
 )
 from jounce.kinematics.status import Status
 
@@ -22,19 +22,19 @@ LIMITS = StepLimits(np.asarray(1.0), np.asarray(1e-10))
 
 def placed(instant: Any, safe_step: Any, det_rate: Any = 0.0):
     """Return the control of designs that have come to some places."""
-    place = Place(*(np.array(x, float) for x in np.broadcast_arrays(instant, safe_step, 1.0, det_rate)))
-    return steps_begin(place, np.array(place.instant))
+    point = ExpansionPoint(*(np.array(x, float) for x in np.broadcast_arrays(instant, safe_step, 1.0, det_rate)))
+    return initial_control(point, np.array(point.instant))
 
 
 def decided(control, status, there):
     """Return what follows a step, and whether it was taken."""
     one = jax.tree.map(lambda x: x[:1], (control, status, there))
-    return step_on.program(LIMITS, one)((control, status, there))
+    return next_controls.program(LIMITS, one)((control, status, there))
 
 
 def test_the_shortest_limit_makes_the_step_and_the_last_takes_a_sliver():
     safe, det_rate = np.array([0.2, 0.5, 0.95, 2.0]), np.array([-1.0, -4.0, 0.0, 0.0])
-    found = planned(placed(0.0, safe, det_rate=det_rate), LIMITS)
+    found = plan_next_step(placed(0.0, safe, det_rate=det_rate), LIMITS)
     np.testing.assert_allclose(found.step, [0.2, 0.4 / 4, 1.0, 1.0], rtol=1e-15)
     np.testing.assert_allclose(found.target, [0.2, 0.1, 1.0, 1.0], rtol=1e-15)
     assert set(np.asarray(found.ending).tolist()) == {StopReason.UNFINISHED}
@@ -42,19 +42,19 @@ def test_the_shortest_limit_makes_the_step_and_the_last_takes_a_sliver():
 
 def test_each_design_has_an_outcome_of_its_own():
     count = 5
-    control = planned(placed(0.0, np.full(count, 0.1)), LIMITS)
+    control = plan_next_step(placed(0.0, np.full(count, 0.1)), LIMITS)
     control = jax.tree.map(np.array, control)
     control.step[4], control.target[4] = 1e-11, 1e-11
     status = np.full(count, int(Status.OK))
     status[[1, 4]] = int(Status.NOT_CONVERGED)
     # one goes on, one is halved, one turns over too fast, one is beside a singular position, one is stuck
     det_rate = np.array([0.0, 0.0, -11.0, -1e4, 0.0])
-    there = Place(control.target, np.full(count, 0.5), np.full(count, 1.0), det_rate)
+    there = ExpansionPoint(control.target, np.full(count, 0.5), np.full(count, 1.0), det_rate)
     there.det_rate[3], there.radius[3] = -9.0, 100.0
     after, taken = decided(control, status, there)
     np.testing.assert_array_equal(taken, [True, False, False, True, False])
     np.testing.assert_allclose(after.step[:3], [GROWTH * 0.1, 0.05, 0.05], rtol=1e-15)
-    np.testing.assert_allclose(after.place.instant, [0.1, 0, 0, 0.1, 0], rtol=1e-15)
+    np.testing.assert_allclose(after.expansion_point.instant, [0.1, 0, 0, 0.1, 0], rtol=1e-15)
     expected = [StopReason.UNFINISHED] * 3 + [StopReason.PASSAGE, StopReason.REFUSED]
     np.testing.assert_array_equal(after.ending, list(map(int, expected)))
 
@@ -64,8 +64,12 @@ def test_a_design_among_many_is_decided_as_alone(status):
     random = np.random.default_rng(1)
     count = 9
     safe, det_rate = random.uniform(0.01, 0.5, count), random.normal(size=count) * 5
-    control = jax.tree.map(np.asarray, planned(placed(random.uniform(0, 1, count), safe, det_rate=det_rate), LIMITS))
-    there = Place(control.target, random.uniform(0.01, 0.5, count), np.ones(count), random.normal(size=count) * 5)
+    control = jax.tree.map(
+        np.asarray, plan_next_step(placed(random.uniform(0, 1, count), safe, det_rate=det_rate), LIMITS)
+    )
+    there = ExpansionPoint(
+        control.target, random.uniform(0.01, 0.5, count), np.ones(count), random.normal(size=count) * 5
+    )
     outcome = np.full(count, int(status))
     many = decided(control, outcome, there)
     for k in range(count):

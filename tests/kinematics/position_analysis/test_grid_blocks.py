@@ -6,7 +6,7 @@ import pytest
 import jounce as jn
 from jounce.execution.llvm.self_test import is_usable
 from jounce.kinematics import Status
-from jounce.kinematics.position_analysis import grid, grid_storage, rooms
+from jounce.kinematics.position_analysis import grid, grid_storage, solve_buffers
 from jounce.kinematics.position_analysis.grid_blocks import blocks_of, rounds
 from tests.problems.small import four_bar, slider_crank
 
@@ -111,7 +111,7 @@ def test_instants_that_start_from_failures_are_solved_again(monkeypatch):
     """Where it is told that some instants failed, they and what starts from them are solved once more."""
     time, again = np.linspace(0, 2, 3001), []
     expected = jn.solve(four_bar(), time)
-    in_spans, solve = grid.GridSolver._in_blocks, rooms.Room.solve
+    in_spans, solve = grid.GridSolver._in_blocks, solve_buffers.SolveBuffer.solve
 
     def spoiling(room):
         solve(room)
@@ -122,7 +122,7 @@ def test_instants_that_start_from_failures_are_solved_again(monkeypatch):
         again.append(in_spans(self, *given))
         return again[-1]
 
-    monkeypatch.setattr(rooms.Room, "solve", spoiling)
+    monkeypatch.setattr(solve_buffers.SolveBuffer, "solve", spoiling)
     monkeypatch.setattr(grid.GridSolver, "_in_blocks", told)
     assert_same(jn.solve(four_bar(), time, threads=1), expected)
     np.testing.assert_array_equal(np.flatnonzero(again[0]), np.arange(64, 96))
@@ -144,7 +144,7 @@ def test_progress_never_goes_back_and_ends_with_all():
 @pytest.mark.parametrize("name", ["nothing", *FAILING])
 def test_stretches_solved_at_once_are_those_solved_one_after_another(monkeypatch, name, keep):
     mechanism, time, solved = FAILING.get(name, four_bar()), np.linspace(0, 2, 5000), []
-    monkeypatch.setattr(grid_storage, "STRETCH", 1100)
+    monkeypatch.setattr(grid_storage, "CHUNK", 1100)
     with monkeypatch.context() as patch:
         patch.setattr(grid_storage, "_solved_at_once", lambda *_: frozenset())
         expected = jn.solve(mechanism, time, order=3, keep=keep, strict=False)
@@ -162,9 +162,9 @@ def test_stretches_solved_at_once_are_those_solved_one_after_another(monkeypatch
 def test_a_stretch_in_which_some_instant_fails_is_solved_again(monkeypatch, always, keep):
     """Of what failed nothing is kept, of the stretches beside it everything, and progress does not go back."""
     time, told, spoiled = np.linspace(0, 2, 4400), [], []
-    monkeypatch.setattr(grid_storage, "STRETCH", 1100)
+    monkeypatch.setattr(grid_storage, "CHUNK", 1100)
     expected = jn.solve(four_bar(), time, keep=keep)
-    solve = rooms.Room.solve
+    solve = solve_buffers.SolveBuffer.solve
 
     def spoiling(room):
         solve(room)
@@ -173,7 +173,7 @@ def test_a_stretch_in_which_some_instant_fails_is_solved_again(monkeypatch, alwa
             room.state[1][0][..., 5] = 1e308  # 24 times that is no number
             spoiled.append(True)
 
-    monkeypatch.setattr(rooms.Room, "solve", spoiling)
+    monkeypatch.setattr(solve_buffers.SolveBuffer, "solve", spoiling)
     found = jn.solve(four_bar(), time, threads=1, keep=keep, progress=lambda *x: told.append(x))
     assert len(spoiled) == 1 + always
     assert_same(found, expected)

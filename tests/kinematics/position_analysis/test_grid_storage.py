@@ -15,7 +15,7 @@ TIME = np.linspace(0, 2, 2501)
 
 @pytest.fixture
 def short_stretches(monkeypatch):
-    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.STRETCH", 1100)
+    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.CHUNK", 1100)
 
 
 @pytest.mark.slow
@@ -57,7 +57,7 @@ def test_a_short_grid_need_not_keep_bodies_either():
 def test_an_end_is_explained_once(monkeypatch, stretch):
     mechanism = slider_crank("3.8 - 2*t")  # beyond its range from t = 0.9 on
     whole = jn.solve(mechanism, TIME, order=0, strict=False)
-    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.STRETCH", stretch)
+    monkeypatch.setattr("jounce.kinematics.position_analysis.grid_storage.CHUNK", stretch)
     motion = jn.solve(mechanism, TIME, order=0, strict=False)
     np.testing.assert_array_equal(motion.status, whole.status)
     assert motion.faults == whole.faults

@@ -9,7 +9,7 @@ from jounce.dynamics.statics.equilibrium_search import displaced, rest_point, se
 from jounce.dynamics.statics.independent_coordinates import OperatingPoint
 from jounce.dynamics.statics.static_equilibrium import Equilibrium, as_mechanism, at_rest_from, equilibrium_of
 from jounce.errors import MechanismError, whole_number
-from jounce.kinematics.assembly.axis_directions import senses
+from jounce.kinematics.assembly.axis_directions import axis_signs
 from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates
 from jounce.mechanism import Mechanism, build
@@ -127,7 +127,9 @@ def _closed(start: OperatingPoint, coordinates: Coordinates) -> OperatingPoint |
     if model.rows:
         trial = assemble_from_guess(model, instant, TOLERANCE, coordinates)
         drawn = {name: x[0] for name, x in start.coordinates.items()}
-        if not trial.closed or not np.array_equal(senses(model.system, trial.coordinates), senses(model.system, drawn)):
+        if not trial.closed or not np.array_equal(
+            axis_signs(model.system, trial.coordinates), axis_signs(model.system, drawn)
+        ):
             return None
         coordinates = trial.coordinates
     return rest_point(start.mechanism, model, coordinates, instant)

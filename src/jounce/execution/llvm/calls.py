@@ -6,7 +6,7 @@ from typing import Any
 
 from jounce.execution.llvm.machine import is_published
 from jounce.execution.llvm.text.code import Code
-from jounce.execution.llvm.text.stored import copied, room_for, stored
+from jounce.execution.llvm.text.stored import copied, empty_state, stored
 from jounce.execution.llvm.text.values import UnsupportedOperationError, kind_of
 from jounce.execution.llvm.text.views import Array, Stored, contiguous
 
@@ -22,7 +22,7 @@ def call(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     name, found = equation.params["target_name"], [variable.aval for variable in equation.outvars]
     if not (code.alone and is_published(name)):
         raise UnsupportedOperationError(f"a call of {name}")
-    results: list[Array] = [room_for(code, aval.shape, kind_of(aval.dtype), lanes=False) for aval in found]
+    results: list[Array] = [empty_state(code, aval.shape, kind_of(aval.dtype), lanes=False) for aval in found]
     arrays = [*(_in_one_piece(code, array) for array in given), *results]
     addresses = code.fresh("m")
     code.entry.append(f"{addresses} = alloca ptr, i64 {len(arrays)}, align 8")

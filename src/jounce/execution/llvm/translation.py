@@ -19,10 +19,10 @@ from jounce.execution.llvm.text.arrays import constants, each, filled
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.stored import (
     any_lanes,
+    empty_state,
     is_large,
     kind_in,
     put,
-    room_for,
     row,
     settled,
     stored,
@@ -356,7 +356,7 @@ def _stacked(code: Code, parts: Sequence[Array]) -> Array:
     single = [part for part in parts if isinstance(part, np.ndarray)]
     if len(single) == len(parts) and (code.large is None or len(parts) * parts[0].size <= code.large):
         return np.stack(single)
-    found = room_for(code, (len(parts), *parts[0].shape), kind_in(parts[0]), lanes=any_lanes(parts))
+    found = empty_state(code, (len(parts), *parts[0].shape), kind_in(parts[0]), lanes=any_lanes(parts))
     for k, part in enumerate(parts):
         put(code, contiguous(found.region, part.shape, k * part.size), part)
     return found

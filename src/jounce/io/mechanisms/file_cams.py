@@ -13,7 +13,7 @@ from jounce.constraints.facts import at_coordinate, facts_of
 from jounce.errors import JounceError
 from jounce.io.files.source import Source
 from jounce.io.mechanisms.keys import cam_types, file_keys, is_cam
-from jounce.mechanism.held_outputs import holder_of
+from jounce.mechanism.output_drivers import driver_of_output
 from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.trajectory import OutputMotion
 
@@ -92,7 +92,7 @@ def with_leaders(source: Source, space: str, elements: dict[str, dict[str, Any]]
                 known = elements[kind][name]
                 return known.follower if isinstance(known, CamEntry) else known
         motion = OutputMotion(name, "0")
-        return holder_of(SimpleNamespace(space=space, outputs=elements["outputs"]), motion, "motion.of")
+        return driver_of_output(SimpleNamespace(space=space, outputs=elements["outputs"]), motion, "motion.of")
 
     joints = {}
     for name, entry in elements["joints"].items():

@@ -18,7 +18,7 @@ from jounce.io.mechanisms.file_cams import CamEntry, coordinates_by_name, with_l
 from jounce.io.mechanisms.file_laws import FileLaws
 from jounce.io.mechanisms.keys import ROLES, FileKey, file_keys, location_of
 from jounce.io.mechanisms.unit_hints import warn_of_units
-from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid, with_outputs_held
+from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid, with_output_drivers
 from jounce.mechanism.gear_frames import check_distances
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.redundant_reactions import resolved_reactions
@@ -251,7 +251,7 @@ def _elements(
 
 def _check_values(mechanism: Mechanism) -> None:
     """Check what depends on the values of parameters: finite numbers, lengths above zero, axes that are not zero."""
-    mechanism = with_outputs_held(mechanism)
+    mechanism = with_output_drivers(mechanism)
     parameters, components = mechanism.parameter_values, POSITION_COMPONENTS[mechanism.space]
     for kind, elements in mechanism.elements.items():
         for name, element in elements.items():

@@ -10,7 +10,13 @@ from jounce.constraints.facts import facts_of
 from jounce.errors import AssemblyError, AssemblyWarning, MobilityError
 from jounce.execution.device import resident
 from jounce.jet import Jet
-from jounce.kinematics.assembly.axis_directions import drawn_senses, pair_names, senses, senses_to_seek, starts_with
+from jounce.kinematics.assembly.axis_directions import (
+    axis_signs,
+    axis_signs_to_try,
+    drawn_axis_signs,
+    pair_names,
+    starts_with_axis_signs,
+)
 from jounce.kinematics.assembly.gauss_newton import AssemblyAttempt, Displacements, assemble_from_guess
 from jounce.kinematics.assembly.idle_motions import idle_motions
 from jounce.kinematics.assembly.initial_revolutions import (
@@ -102,13 +108,13 @@ def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Asse
     check_gears(model.system.groups, [model.rows[place] for place in group_rows(model)])
     best = _nearby(model, instant, tolerance)
     found = best[1]
-    sought = senses_to_seek(model, found)
+    sought = axis_signs_to_try(model, found)
     rank = found.jacobian.rank - 1 if sought and found.closed else -1  # of the best so far
     for wanted in sought:
-        for start in starts_with(model, wanted, instant, tolerance):
+        for start in starts_with_axis_signs(model, wanted, instant, tolerance):
             drawn, _ = with_reference(dataclasses.replace(model, guess=start), start, instant, model.prescribed)
             other, trial = _nearby(drawn, instant, tolerance)
-            as_wanted = trial.closed and np.array_equal(senses(model.system, trial.coordinates), wanted)
+            as_wanted = trial.closed and np.array_equal(axis_signs(model.system, trial.coordinates), wanted)
             if as_wanted and trial.jacobian.rank > rank:
                 best, rank = (dataclasses.replace(other, guess=model.guess), trial), trial.jacobian.rank
             if rank == trial.jacobian.shape[1]:
@@ -124,14 +130,14 @@ def _nearby(model: Model, instant: float, tolerance: float) -> tuple[Model, Asse
     Where the axes were tilted against each other in the guess, the angles in the position found are others than those
     counted from the guess, and it takes another turn to get to those that the drivers prescribe.
     """
-    moved, told = Displacements(model, instant), model.prescribed
-    residual, found, known = moved.closed(model.guess, tolerance)
+    displace, told = Displacements(model, instant), model.prescribed
+    residual, found, known = displace.closed(model.guess, tolerance)
     lag = driver_lag(model, instant, residual)
     model, start = _turned(model, instant, tolerance, lag)
     if start is not None:
         found = assemble_from_guess(model, instant, tolerance, start)
     elif found is None:
-        found = assemble_from_guess(model, instant, tolerance, known=known or moved.at(model.guess))
+        found = assemble_from_guess(model, instant, tolerance, known=known or displace.at(model.guess))
     if not found.closed and any(map(measures_angle, model.system.groups)):
         # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
         begin = found if lag is None else assemble_from_guess(model, instant, tolerance, lag=lag)
@@ -152,8 +158,8 @@ def _nearby(model: Model, instant: float, tolerance: float) -> tuple[Model, Asse
 
 def warn_of_parts_turned_over(model: Model, found: AssemblyAttempt) -> None:
     """Warn of joints whose parts are held the other way round than the starting guess means."""
-    there = senses(model.system, found.coordinates)
-    if there.all() or not (odd := there != drawn_senses(model)).any():
+    there = axis_signs(model.system, found.coordinates)
+    if there.all() or not (odd := there != drawn_axis_signs(model)).any():
         return
     names = [name for name, is_odd in zip(pair_names(model), odd, strict=True) if is_odd]
     message = (
@@ -191,10 +197,10 @@ def _turned(model: Model, instant: float, tolerance: float, lag: DriverLag | Non
 
 def nearest_to_guess(model: Model, found: AssemblyAttempt, instant: float) -> AssemblyAttempt:
     """Return planar bodies put together, with every angle shifted by whole turns to be nearest to the guess."""
-    moved = Displacements(model, instant)
+    displace = Displacements(model, instant)
 
     def residual_at(angle: np.ndarray) -> np.ndarray:
-        return found.scale * moved.at({**found.coordinates, "angle": angle})[1]
+        return found.scale * displace.at({**found.coordinates, "angle": angle})[1]
 
     return found._replace(coordinates=nearest_turns(model.guess, found.coordinates, residual_at))
 

@@ -27,7 +27,7 @@ from jounce.rigid.pose import Pose
 DRAWN_OPPOSITE = -0.9  # cosine: directions as far apart in the starting guess are meant to point opposite ways
 DRAWN_NEARLY = 0.8  # where all are within this, the guess leaves no doubt, and nothing is gained by another
 
-Senses = Bool[np.ndarray, " pair"]
+AxisSigns = Bool[np.ndarray, " pair"]
 """Of each pair of directions that joints hold parallel, whether they point the same way."""
 
 
@@ -54,7 +54,7 @@ class SameDirection(Module):
         return rows(*(body_i.direction(side).dot(direction) / along for side in sides))
 
 
-def senses(system: System, coordinates: Coordinates) -> Senses:
+def axis_signs(system: System, coordinates: Coordinates) -> AxisSigns:
     """Tell of each pair of directions that joints hold parallel whether they point the same way.
 
     Coordinates are those of all bodies, the ground first.
@@ -62,8 +62,8 @@ def senses(system: System, coordinates: Coordinates) -> Senses:
     return _cosines(system, coordinates) >= 0
 
 
-def drawn_senses(model: Model) -> Senses:
-    """Return the senses that the starting guess means: the same way, unless it draws a pair as good as opposite."""
+def drawn_axis_signs(model: Model) -> AxisSigns:
+    """Return the signs that the starting guess means: the same way, unless it draws a pair almost opposite."""
     return _cosines(model.system, model.guess) > DRAWN_OPPOSITE
 
 
@@ -73,13 +73,13 @@ def pair_names(model: Model) -> list[str]:
     return [name for group, _ in _pairs(model.system) for name in names[id(group)][: group.instances]]
 
 
-def senses_to_seek(model: Model, found: AssemblyAttempt) -> list[Senses]:
-    """Return the senses with which parts should be put together anew, the most likely first; none where all is well.
+def axis_signs_to_try(model: Model, found: AssemblyAttempt) -> list[AxisSigns]:
+    """Return the signs with which assembly should be tried again, the most likely first; none where all is well.
 
     That is where parts lie turned over, and where they were not put together at all from a guess in which directions
     are far from parallel. What the guess draws may not exist: then all pairs are meant to point the same way.
     """
-    there = senses(model.system, found.coordinates) if found.closed else None
+    there = axis_signs(model.system, found.coordinates) if found.closed else None
     if there is not None and there.all():
         return []
     drawn = _cosines(model.system, model.guess)
@@ -93,8 +93,8 @@ def senses_to_seek(model: Model, found: AssemblyAttempt) -> list[Senses]:
     return [meant] if meant.all() else [meant, np.ones_like(meant)]
 
 
-def starts_with(model: Model, wanted: Senses, instant: float, tolerance: float) -> Iterator[Coordinates]:
-    """Give coordinates near the starting guess in which the joints hold with these senses, the best tried first.
+def starts_with_axis_signs(model: Model, wanted: AxisSigns, instant: float, tolerance: float) -> Iterator[Coordinates]:
+    """Give coordinates near the starting guess in which the joints hold with these signs, the most likely first.
 
     Drivers hold in the first as well. The attitudes alone come first in a part of them: what is far away else draws
     parts round.
@@ -108,7 +108,7 @@ def starts_with(model: Model, wanted: Senses, instant: float, tolerance: float) 
                 yield found.coordinates
 
 
-def _directed(model: Model, wanted: Senses, *, alone: bool = False, driven: bool = True) -> Model:
+def _directed(model: Model, wanted: AxisSigns, *, alone: bool = False, driven: bool = True) -> Model:
     """Return the model with rows that hold directions the same way, or the opposite one where not wanted.
 
     Parameters
@@ -116,7 +116,7 @@ def _directed(model: Model, wanted: Senses, *, alone: bool = False, driven: bool
     model : Model
         The mechanism.
     wanted : array of bool, shape (pairs,)
-        Senses.
+        Axis signs.
     alone : bool, default False
         Whether they are the only rows; then pairs that close a loop are left out.
     driven : bool, default True

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
-from jounce.kinematics.assembly.initial_revolutions import Coordinates, DriverLag, Place
+from jounce.kinematics.assembly.initial_revolutions import Coordinates, Displaced, DriverLag
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism import Model
@@ -26,7 +26,7 @@ LONGEST_STEP = 0.5  # rad, or sizes of the mechanism
 REGULAR = 1e-4  # smallest pivot over the largest, from where on a matrix is inverted instead of decomposed
 
 
-class _Going(NamedTuple):
+class _NewtonState(NamedTuple):
     """How Newton-Raphson stands between two steps, for one instant."""
 
     coordinates: dict[str, Numbers]
@@ -64,27 +64,29 @@ def _moved(
         moved = {name: jet.coefficients[0] for name, jet in pose.coordinates().items()}
         return moved, system.residual(pose, time).coefficients[0][:, 0], system.entries(pose, time)[:, 0]
 
-    def stepped(going: _Going) -> _Going:
-        moved, residual, entries = there(going.coordinates, going.increment)
-        before, now = (jnp.sqrt(jnp.sum((going.row_scale * x) ** 2)) for x in (going.residual, residual))
-        first, small = going.left == steps, going.size <= tolerance
+    def newton_step(state: _NewtonState) -> _NewtonState:
+        moved, residual, entries = there(state.coordinates, state.increment)
+        before, now = (jnp.sqrt(jnp.sum((state.row_scale * x) ** 2)) for x in (state.residual, residual))
+        first, small = state.left == steps, state.size <= tolerance
         falls = first | small | (now < before)
-        closed = ~first & falls & (small | (going.size * now <= NEXT_STEP * tolerance * before))
+        closed = ~first & falls & (small | (state.size * now <= NEXT_STEP * tolerance * before))
         matrix = system.pattern.dense(entries[:, None])
         row_scale = 1 / jnp.max(jnp.abs(matrix), axis=(1, 2))
         factor = DenseFactor.of(row_scale[:, None, None] * matrix)
         step = factor.solve(-(row_scale * residual)[:, None])[:, 0]
         size = jnp.max(jnp.abs(step))
         goes_on = falls & (size <= LONGEST_STEP) & (factor.pivot_ratio()[0] >= REGULAR)
-        left = jnp.where(goes_on, going.left - 1, -1)
-        begun = jnp.where(first, residual, going.begun)
-        return _Going(moved, step, begun, residual, entries, row_scale, size, closed, left)
+        left = jnp.where(goes_on, state.left - 1, -1)
+        begun = jnp.where(first, residual, state.begun)
+        return _NewtonState(moved, step, begun, residual, entries, row_scale, size, closed, left)
 
     if system.pattern is None:
         return there(coordinates, increment)
     rows, entries = np.zeros(system.shape[0]), np.zeros(system.pattern.entry_count)
-    start = _Going(coordinates, increment, rows, rows, entries, rows, np.zeros(()), np.zeros((), bool), steps)
-    end = jax.lax.while_loop(lambda going: ~going.closed & (going.left >= 0), stepped, jax.tree.map(jnp.asarray, start))
+    start = _NewtonState(coordinates, increment, rows, rows, entries, rows, np.zeros(()), np.zeros((), bool), steps)
+    end = jax.lax.while_loop(
+        lambda state: ~state.closed & (state.left >= 0), newton_step, jax.tree.map(jnp.asarray, start)
+    )
     return end.coordinates, end.residual, end.entries, end.begun, end.closed
 
 
@@ -123,13 +125,13 @@ class Displacements:
         rows, columns = model.system.shape
         self._dense, self._still = rows == columns and model.system.fronts is None, np.zeros(columns)
 
-    def __call__(self, coordinates: Coordinates, increment: Float[np.ndarray, " column"]) -> Place:
+    def __call__(self, coordinates: Coordinates, increment: Float[np.ndarray, " column"]) -> Displaced:
         """Return the place after an increment."""
         return self._moved(coordinates, increment, 0, 0.0)[0]
 
     def closed(
         self, start: Coordinates, tolerance: float
-    ) -> tuple[Float[np.ndarray, " row"], AssemblyAttempt | None, Place | None]:
+    ) -> tuple[Float[np.ndarray, " row"], AssemblyAttempt | None, Displaced | None]:
         """Return the residual at some coordinates, and the bodies put together from there if no step needs a check.
 
         The place with those coordinates comes last, where none of its steps was tried: the one to go on from.
@@ -138,13 +140,13 @@ class Displacements:
         found = _trial(*there, there[2].row_scale, tolerance) if closed else None
         return begun, found, None if self._dense else there
 
-    def at(self, coordinates: Coordinates) -> Place:
+    def at(self, coordinates: Coordinates) -> Displaced:
         """Return the place with some coordinates."""
         return self(coordinates, self._still)
 
     def _moved(
         self, coordinates: Coordinates, increment: Float[np.ndarray, " column"], steps: int, tolerance: float
-    ) -> tuple[Place, Float[np.ndarray, " row"], bool]:
+    ) -> tuple[Displaced, Float[np.ndarray, " row"], bool]:
         settings = self._instant, np.int64(steps), np.float64(tolerance)
         found = _moved(self._system, coordinates, increment, *settings, self._model.pose_type)
         to, residual, entries, *ending = jax.tree.map(np.asarray, found)
@@ -167,7 +169,7 @@ def assemble_from_guess(
     start: Coordinates | None = None,
     *,
     lag: DriverLag | None = None,
-    known: Place | None = None,
+    known: Displaced | None = None,
 ) -> AssemblyAttempt:
     """Return how far the bodies can be put together at one instant; nothing is refused.
 
@@ -186,18 +188,18 @@ def assemble_from_guess(
     known : Place, optional
         Where to start from, in the place of coordinates, if it is known whole.
     """
-    moved = Displacements(model, instant)
+    displace = Displacements(model, instant)
 
-    def opened(place: Place) -> Place:
+    def opened(place: Displaced) -> Displaced:
         return place if lag is None else (place[0], lag.open(place[1], 1.0), place[2])
 
     if known is None:
         begin = model.guess if start is None else start
         if lag is None:
-            _, found, known = moved.closed(begin, tolerance)
+            _, found, known = displace.closed(begin, tolerance)
             if found is not None:
                 return found
-        known = moved.at(begin) if known is None else known
+        known = displace.at(begin) if known is None else known
     coordinates, residual, jacobian = opened(known)
     scale = jacobian.row_scale
     for _ in range(MAX_STEPS):
@@ -208,7 +210,7 @@ def assemble_from_guess(
         step *= min(1.0, LONGEST_STEP / max(size, 1e-300))
         now = np.linalg.norm(scale * residual)
         for _halving in range(12):
-            trial = opened(moved(coordinates, step))
+            trial = opened(displace(coordinates, step))
             left = np.linalg.norm(scale * trial[1])
             if left < now or size <= tolerance:
                 break

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.kinematics.assembly.initial_revolutions import Coordinates, Mover
+from jounce.kinematics.assembly.initial_revolutions import Coordinates, Displace
 from jounce.kinematics.assembly.redundancy import Redundancy
 from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import turned
@@ -23,7 +23,7 @@ IdleMotions = dict[str, tuple[tuple[str, ...], tuple[float, float, float]]]
 """By the body that is held: all bodies that spin as one with it, and the axis on that body."""
 
 
-def idle_motions(model: Model, told: Redundancy, coordinates: Coordinates, moved: Mover) -> IdleMotions:
+def idle_motions(model: Model, told: Redundancy, coordinates: Coordinates, displace: Displace) -> IdleMotions:
     """Return the idle motions of a driven mechanism in space, if all degrees of freedom left are such; else none.
 
     Parameters
@@ -34,7 +34,7 @@ def idle_motions(model: Model, told: Redundancy, coordinates: Coordinates, moved
         Of its equations.
     coordinates : dict of str to array
         Where they are fulfilled.
-    moved : callable
+    displace : callable
         Takes coordinates and an increment to coordinates, residual and Jacobian.
     """
     driven = any(name.startswith("drivers.") for name in model.rows)
@@ -49,7 +49,7 @@ def idle_motions(model: Model, told: Redundancy, coordinates: Coordinates, moved
             return {}
         way = ways[0].reshape(len(members), -1)
         spin = _spin(model, members, way, coordinates)
-        if spin is None or not _is_finite(members, spin, coordinates, moved):
+        if spin is None or not _is_finite(members, spin, coordinates, displace):
             return {}
         first = members[0]
         axis = way[0, 3:] / np.linalg.norm(way[0, 3:])
@@ -109,7 +109,7 @@ def _spin(
 _POSE = ("position", "quaternion")
 
 
-def _is_finite(members: list[int], spin: tuple[Any, Any], coordinates: Coordinates, moved: Mover) -> bool:
+def _is_finite(members: list[int], spin: tuple[Any, Any], coordinates: Coordinates, displace: Displace) -> bool:
     """Tell whether all constraints hold after bodies were turned far about a line, the others being where they were."""
     axis, point = spin
     bodies, nothing = [k + 1 for k in members], None
@@ -119,7 +119,7 @@ def _is_finite(members: list[int], spin: tuple[Any, Any], coordinates: Coordinat
         place[:, bodies, 0] = point[:, None] + turned(turn, place[:, bodies, 0] - point[:, None])
         attitude[:, bodies, 0] = _composed(turn, attitude[:, bodies, 0])
         nothing = np.zeros(6 * (place.shape[1] - 1)) if nothing is None else nothing
-        residual = moved({**coordinates, "position": place, "quaternion": attitude}, nothing)[1]
+        residual = displace({**coordinates, "position": place, "quaternion": attitude}, nothing)[1]
         if not np.abs(residual).max(initial=0.0) < HELD:
             return False
     return True

@@ -28,9 +28,9 @@ SMALLEST_PERIOD, LARGEST_PERIOD = 1, 60  # whole turns, among which those are so
 
 Coordinates = dict[str, np.ndarray]
 """Coordinates of all bodies by name, the ground first, (..., bodies, 1)."""
-Place = tuple[Coordinates, np.ndarray, HostJacobian]
+Displaced = tuple[Coordinates, np.ndarray, HostJacobian]
 """Coordinates, with residual and Jacobian there."""
-Mover = Callable[[Coordinates, np.ndarray], Place]
+Displace = Callable[[Coordinates, np.ndarray], Displaced]
 
 
 class DriverLag(NamedTuple):
@@ -83,7 +83,7 @@ def driver_lag(model: Model, instant: float, residual: Float[np.ndarray, " row"]
 
 
 def turned_to_laws(
-    model: Model, lag: DriverLag, start: Coordinates, moved: Mover
+    model: Model, lag: DriverLag, start: Coordinates, displace: Displace
 ) -> tuple[Coordinates, AttitudeHistory | None] | None:
     """Follow the mechanism from where drivers are as in the guess to where they fulfill their laws.
 
@@ -95,7 +95,7 @@ def turned_to_laws(
         At the guess.
     start : dict of str to array
         Coordinates, put together with the drivers as in the guess.
-    moved : callable
+    displace : callable
         Takes coordinates and an increment to coordinates, residual and Jacobian.
 
     Returns
@@ -118,7 +118,7 @@ def turned_to_laws(
             if turns > MOST_FOLLOWED:
                 return None
             skipped = 0  # drivers that turn unlike each other: no turn is like the last
-        found = _corrected(states[-1], increment, lambda r, p=part: lag.open(r, p), moved)
+        found = _corrected(states[-1], increment, lambda r, p=part: lag.open(r, p), displace)
         if found is None:
             return None
         coordinates, increment = found
@@ -134,15 +134,15 @@ def _corrected(
     coordinates: Coordinates,
     increment: Float[np.ndarray, " column"],
     opened: Callable[[np.ndarray], np.ndarray],
-    moved: Mover,
+    displace: Displace,
 ) -> tuple[Coordinates, Float[np.ndarray, " column"]] | None:
     """Return coordinates a step on, and the step; None where Newton-Raphson does not go there."""
-    whole, trial = increment, moved(coordinates, increment)
+    whole, trial = increment, displace(coordinates, increment)
     for _ in range(CORRECTIONS):
         step = trial[2].step(opened(trial[1]))
         if step is None or (size := np.max(np.abs(step), initial=0.0)) > 0.5:
             return None
-        whole, trial = whole + step, moved(trial[0], step)
+        whole, trial = whole + step, displace(trial[0], step)
         if size < 1e-9:
             return trial[0], whole
     return None

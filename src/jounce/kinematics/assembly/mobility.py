@@ -15,7 +15,7 @@ from jounce.errors import MechanismError, whole_number
 from jounce.kinematics.assembly.assemble import check_assembled, redundancy_of, settled
 from jounce.kinematics.assembly.constraint_series import SINGULAR, ReducedConstraints
 from jounce.kinematics.assembly.gauss_newton import AssemblyAttempt, Displacements, assemble_from_guess
-from jounce.kinematics.assembly.initial_revolutions import Coordinates, Mover
+from jounce.kinematics.assembly.initial_revolutions import Coordinates, Displace
 from jounce.kinematics.assembly.redundancy import Repetition, closed_nearby
 from jounce.kinematics.assembly.tangent_cone import LocalCurve, curves
 from jounce.linear_algebra.host_jacobian import HostJacobian
@@ -206,7 +206,7 @@ def _released(mechanism: Mechanism, time: float) -> tuple[Model, Coordinates, As
     return dataclasses.replace(model, system=system), found.coordinates, found
 
 
-def _analyzed(constraints: ReducedConstraints, moved: Mover) -> Mobility:
+def _analyzed(constraints: ReducedConstraints, displace: Displace) -> Mobility:
     """Return the mobility at a position where equations depend on each other."""
     columns, rows = constraints.inverse.shape
     left, order = constraints.free.shape[1], constraints.order
@@ -216,11 +216,11 @@ def _analyzed(constraints: ReducedConstraints, moved: Mover) -> Mobility:
         return Mobility(columns, rows, left, left, order, "regular", None, (_whole(constraints),))
     found = curves(constraints)
     going = [curve for curve in found if curve.order == order]
-    branches = _branches(constraints, going, moved)
+    branches = _branches(constraints, going, displace)
     blocked = max((curve.order + 1 for curve in found if curve.order < order), default=2)
     finite = max((branch.freedom for branch in branches), default=0)
     if not branches:
-        moves = _moves_by_trial(constraints, moved)
+        moves = _moves_by_trial(constraints, displace)
         kind: Kind = "singular" if moves else "shaky"
         return Mobility(columns, rows, left, int(moves), order, kind, blocked)
     only, *others = branches
@@ -242,14 +242,14 @@ def _whole(constraints: ReducedConstraints) -> Branch:
     return Branch(constraints.free.shape[1], _by_body(constraints, constraints.free.T))
 
 
-def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], moved: Mover) -> tuple[Branch, ...]:
+def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], displace: Displace) -> tuple[Branch, ...]:
     """Return the branches that curves belong to: those whose tangent spaces a little way on are alike are one."""
     members: list[tuple[np.ndarray, list[LocalCurve]]] = []
     for curve in going:
         coefficients = constraints.along(curve.series[None])[2][0]
         step = NEARBY ** (1.0 / curve.multiplicity)
         everything = np.ones(len(constraints.dependent), bool)
-        nearby = closed_nearby(constraints.coordinates, constraints.placed(coefficients, step), everything, moved)
+        nearby = closed_nearby(constraints.coordinates, constraints.placed(coefficients, step), everything, displace)
         velocity = constraints.free @ curve.tangent
         space = velocity[None] if nearby is None else nearby.free_directions
         for known, its in members:
@@ -267,7 +267,7 @@ def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], move
     return tuple(sorted(found, key=lambda branch: branch.freedom))
 
 
-def _moves_by_trial(constraints: ReducedConstraints, moved: Mover) -> bool:
+def _moves_by_trial(constraints: ReducedConstraints, displace: Displace) -> bool:
     """Tell whether bodies that are displaced along a velocity that is free can be put together where they are."""
     everything = np.ones(len(constraints.dependent), bool)
     random = np.random.default_rng(3).standard_normal((2 * RANDOM_CURVES, constraints.free.shape[1]))
@@ -275,7 +275,7 @@ def _moves_by_trial(constraints: ReducedConstraints, moved: Mover) -> bool:
     for way in ways:
         sway = constraints.free @ way
         sway *= FARTHER / np.abs(sway).max()
-        if closed_nearby(constraints.coordinates, sway, everything, moved) is not None:
+        if closed_nearby(constraints.coordinates, sway, everything, displace) is not None:
             return True
     return False
 

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jounce.kinematics.assembly.constraint_series import ReducedConstraints
-from jounce.kinematics.assembly.initial_revolutions import Coordinates, Mover
+from jounce.kinematics.assembly.initial_revolutions import Coordinates, Displace
 from jounce.kinematics.assembly.tangent_cone import curves
 from jounce.linear_algebra.host_jacobian import HostJacobian
 from jounce.mechanism import Model
@@ -101,7 +101,7 @@ class Redundancy:
         return "; ".join(map(str, self.repetitions))
 
 
-def redundancy(model: Model, coordinates: Coordinates, jacobian: HostJacobian, moved: Mover) -> Redundancy:
+def redundancy(model: Model, coordinates: Coordinates, jacobian: HostJacobian, displace: Displace) -> Redundancy:
     """Return which rows of a mechanism that was put together follow from others.
 
     Parameters
@@ -112,19 +112,19 @@ def redundancy(model: Model, coordinates: Coordinates, jacobian: HostJacobian, m
         Of all bodies, where joints and drivers are fulfilled.
     jacobian : HostJacobian
         There, with rows of one size.
-    moved : callable
+    displace : callable
         Takes coordinates and an increment to coordinates, residual and Jacobian, with rows of that size.
     """
-    here = _next_to_singular(coordinates, jacobian, moved)
+    here = _next_to_singular(coordinates, jacobian, displace)
     best, rank = jacobian, jacobian.rank
     if here.rank < min(here.shape) or here.shape[0] > here.shape[1]:
-        for nearby in _nearby(model, coordinates, here, moved):
+        for nearby in _nearby(model, coordinates, here, displace):
             if nearby.rank >= rank:
                 best, rank = nearby, nearby.rank
     return Redundancy(model.rows, rank, here, best)
 
 
-def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, moved: Mover) -> HostJacobian:
+def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, displace: Displace) -> HostJacobian:
     """Return the Jacobian with those singular values zero that are so at a position that rounding does not tell apart.
 
     Along the velocity v of a small singular value s, the residual by the combination u of rows that belongs to it grows
@@ -135,14 +135,14 @@ def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, moved: M
     zero = 0.0
     for k in np.flatnonzero(sizes > jacobian.tolerance * jacobian.largest):
         size, velocity = sizes[k], columns[:, k]
-        there, back = (moved(coordinates, sign * STEP * velocity)[2] for sign in (1.0, -1.0))
+        there, back = (displace(coordinates, sign * STEP * velocity)[2] for sign in (1.0, -1.0))
         change = rows.T @ (there.times(columns) - back.times(columns)) / (2 * STEP)
         if size**2 <= 2 * ROUNDING * np.linalg.norm(change):
             zero = max(zero, float(size))
     return dataclasses.replace(jacobian, tolerance=1.01 * zero / jacobian.largest) if zero else jacobian
 
 
-def _nearby(model: Model, coordinates: Coordinates, jacobian: HostJacobian, moved: Mover) -> list[HostJacobian]:
+def _nearby(model: Model, coordinates: Coordinates, jacobian: HostJacobian, displace: Displace) -> list[HostJacobian]:
     """Return the Jacobians at positions in general near one, as many as are found."""
     joints = np.array([name.startswith("joints.") for name in model.rows], bool)
     directions = jacobian.take(joints).free_directions
@@ -152,15 +152,15 @@ def _nearby(model: Model, coordinates: Coordinates, jacobian: HostJacobian, move
     for _ in range(POSITIONS):
         sway = random.normal(size=len(directions)) @ directions
         for size in SWAYS:
-            there = closed_nearby(coordinates, size * sway / np.abs(sway).max(), joints, moved)
+            there = closed_nearby(coordinates, size * sway / np.abs(sway).max(), joints, displace)
             if there is not None:
                 found.append(there)
                 break
-    return found or _along_curves(model, coordinates, jacobian, joints, moved)
+    return found or _along_curves(model, coordinates, jacobian, joints, displace)
 
 
 def _along_curves(
-    model: Model, coordinates: Coordinates, jacobian: HostJacobian, joints: Bool[np.ndarray, " row"], moved: Mover
+    model: Model, coordinates: Coordinates, jacobian: HostJacobian, joints: Bool[np.ndarray, " row"], displace: Displace
 ) -> list[HostJacobian]:
     """Return the Jacobians a little way along the curves that lead away from a singular position."""
     if not joints.any() or jacobian.is_large:
@@ -171,13 +171,13 @@ def _along_curves(
     for curve in going:
         coefficients = constraints.along(curve.series[None])[2][0]
         sway = constraints.placed(coefficients, SWAYS[-1] ** (1.0 / curve.multiplicity))
-        there = closed_nearby(coordinates, sway, joints, moved)
+        there = closed_nearby(coordinates, sway, joints, displace)
         found += [] if there is None else [there]
     return found
 
 
 def closed_nearby(
-    coordinates: Coordinates, sway: Float[np.ndarray, " column"], joints: Bool[np.ndarray, " row"], moved: Mover
+    coordinates: Coordinates, sway: Float[np.ndarray, " column"], joints: Bool[np.ndarray, " row"], displace: Displace
 ) -> HostJacobian | None:
     """Return the Jacobian at a position near a displaced one that fulfills the joints; None where it is not displaced.
 
@@ -189,15 +189,15 @@ def closed_nearby(
         By how much they are displaced, rad and sizes of the mechanism.
     joints : array of bool, shape (rows,)
         Rows that must hold.
-    moved : callable
+    displace : callable
         As `redundancy` takes it.
     """
-    place, step, gone = moved(coordinates, sway), sway, sway
+    place, step, gone = displace(coordinates, sway), sway, sway
     for _ in range(MOST_STEPS):
         correction = place[2].take(joints).step(place[1][joints])
         if correction is None or np.abs(correction).max(initial=0.0) > 1.0:
             return None
-        place, step, gone = moved(place[0], correction), correction, gone + correction
+        place, step, gone = displace(place[0], correction), correction, gone + correction
         if np.abs(step).max(initial=0.0) < 1e-12:
             break
     away = np.abs(gone).max(initial=0.0)

@@ -18,13 +18,13 @@ from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.instant_program import finds_det_rate
 from jounce.kinematics.continuation.singularity_distance import det_rate_at
 from jounce.kinematics.continuation.step_control import (
-    Place,
+    ExpansionPoint,
     StepControl,
     StepLimits,
     StopReason,
-    accepted,
-    after,
-    planned,
+    is_accepted,
+    next_control,
+    plan_next_step,
 )
 from jounce.mechanism.system import System
 from jounce.rigid.pose import Pose
@@ -39,7 +39,7 @@ class Settings(NamedTuple):
     tolerance: Number
     refine: Bool[Numbers, ""]
     search: Bool[Numbers, ""]
-    wanted: Int[Numbers, ""]
+    finite_order: Int[Numbers, ""]
 
 
 class StepState(NamedTuple):
@@ -61,7 +61,7 @@ class Records(NamedTuple):
     sign: Float[Numbers, "step batch"]
     status: Int[Numbers, "step batch"]
     lane: Int[Numbers, "step batch"]
-    place: Place
+    expansion_point: ExpansionPoint
     taken: Bool[Numbers, " step"]  # whether the first lane is the next anchor
 
 
@@ -125,10 +125,10 @@ def take_steps(
 
     def solved(run: StepState) -> Any:
         if native is not None:
-            tolerance, refine, search, wanted = settings
+            tolerance, refine, search, finite_order = settings
             first = np.arange(len(run.instant)) == 0
             lanes = run.known, run.away, run.instant, None, search & first
-            arrival = called(native, (system, tolerance, refine, wanted), lanes)
+            arrival = called(native, (system, tolerance, refine, finite_order), lanes)
             if finds_det_rate(system):
                 return arrival._replace(det_rate=arrival.det_rate[:1])
             there = partial(det_rate_at, system, pose_type, arrival.coordinates, run.instant)
@@ -148,8 +148,12 @@ def take_steps(
 
     shapes = jax.eval_shape(solved, run)
     blank = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), shapes)
-    yes, lanes, place = np.zeros((), bool), np.zeros(len(run.instant), int), Place(*map(np.asarray, np.zeros(4)))
-    once = Records(shapes.coordinates, shapes.outputs, shapes.sign, shapes.status, lanes, place, yes)
+    yes, lanes, point = (
+        np.zeros((), bool),
+        np.zeros(len(run.instant), int),
+        ExpansionPoint(*map(np.asarray, np.zeros(4))),
+    )
+    once = Records(shapes.coordinates, shapes.outputs, shapes.sign, shapes.status, lanes, point, yes)
     records = jax.tree.map(lambda x: jnp.zeros((batches, *x.shape), x.dtype), once)
     run = _typed(run, run)
     run = jax.lax.cond(run.planned, lambda: run, lambda: _typed(_planned(run, grid, limits), run))
@@ -163,13 +167,13 @@ def _typed(values: Any, like: Any) -> Any:
 
 def _planned(run: StepState, grid: Float[Numbers, " time"], limits: StepLimits) -> StepState:
     """Return the run with its next step, or why there is none."""
-    return _aimed(run, planned(run.control, limits), grid)
+    return _aimed(run, plan_next_step(run.control, limits), grid)
 
 
 def _aimed(run: StepState, control: StepControl, grid: Float[Numbers, " time"]) -> StepState:
     """Return the run with a step to try, and in the other lanes the next instants of the grid within it."""
     instant = jnp.concatenate([control.target[None], jnp.minimum(_next_up(run, grid), control.target)])
-    away = instant - control.place.instant
+    away = instant - control.expansion_point.instant
     return run._replace(control=control, instant=instant, away=away, planned=jnp.ones((), bool))
 
 
@@ -187,14 +191,14 @@ def _after(
     """Return how the run stands after a batch, and what is recorded of it; `known` is of the arrival."""
     control, status, lanes = run.control, arrival.status[0], len(run.instant) - 1
     target = control.target
-    there = Place(target, arrival.safe_step[0], arrival.radius[0], arrival.det_rate[0])
-    good = accepted(control, status, there)
+    arrived = ExpansionPoint(target, arrival.safe_step[0], arrival.radius[0], arrival.det_rate[0])
+    good = is_accepted(control, status, arrived)
     within = good & (_next_up(run, grid) <= target)
     lane = jnp.where(within, run.next_up + np.arange(lanes), -1)
     run = run._replace(next_up=run.next_up + jnp.sum(within))
     behind = jnp.sum(_next_up(run, grid) <= target)  # a few are solved from the next anchor, which is near them
     taken = good & (behind <= jnp.where(target < limits.stop, lanes // 2, 0))  # else the same step with those left
     known = jax.tree.map(lambda new, old: jnp.where(taken, new[..., :1], old), known, run.known)
-    run = _aimed(run._replace(known=known), after(control, status, there, limits, (good, taken)), grid)
+    run = _aimed(run._replace(known=known), next_control(control, status, arrived, limits, (good, taken)), grid)
     solved = (arrival.coordinates, arrival.outputs, arrival.sign, arrival.status)
-    return run, Records(*solved, jnp.concatenate([jnp.full(1, -1), lane]), there, taken)
+    return run, Records(*solved, jnp.concatenate([jnp.full(1, -1), lane]), arrived, taken)

@@ -146,21 +146,21 @@ def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes)
     return tuple(results)
 
 
-def _finite(jets: Sequence[Numbers], wanted: Int[Numbers, ""]) -> Bool[Numbers, "instance batch"]:
+def _finite(jets: Sequence[Numbers], finite_order: Int[Numbers, ""]) -> Bool[Numbers, "instance batch"]:
     """Tell where the coefficients of jets are finite up to the order wanted, for each instance: (instances, batch)."""
     found = []
     for jet in jets:
-        above = (np.arange(jet.shape[0]) > wanted).reshape(-1, *[1] * (jet.ndim - 1))
+        above = (np.arange(jet.shape[0]) > finite_order).reshape(-1, *[1] * (jet.ndim - 1))
         found.append(jnp.all(jnp.isfinite(jet) | above, axis=(0, 1)))
     return jnp.concatenate(found)
 
 
 def _finite_results(
-    coordinates: Sequence[Numbers], outputs: Sequence[Numbers], wanted: Int[Numbers, ""]
+    coordinates: Sequence[Numbers], outputs: Sequence[Numbers], finite_order: Int[Numbers, ""]
 ) -> Bool[Numbers, "result batch"]:
     """Tell where the pose and each output are finite up to the order wanted."""
     posed = [jnp.max(part, axis=-2, keepdims=True) for part in coordinates]
-    finite = _finite([*(x.reshape(x.shape[0], -1, 1, x.shape[-1]) for x in posed), *outputs], wanted)
+    finite = _finite([*(x.reshape(x.shape[0], -1, 1, x.shape[-1]) for x in posed), *outputs], finite_order)
     return jnp.concatenate([jnp.all(finite[: len(posed)], axis=0, keepdims=True), finite[len(posed) :]])
 
 
@@ -227,7 +227,7 @@ def advance(
     tolerance: Float[Numbers, ""],
     refine: Bool[Numbers, ""],
     search: Bool[Numbers, ""],
-    wanted: Int[Numbers, ""],
+    finite_order: Int[Numbers, ""],
     *,
     pose_type: type[Pose],
     order: int,
@@ -252,14 +252,14 @@ def advance(
         Whether to correct accepted poses to rounding.
     search : bool
         Whether to look for the nearest singular position.
-    wanted : int
+    finite_order : int
         Highest derivative that must be finite.
     pose_type, order
         PlanarPose or SpatialPose; derivatives wanted.
     with_det_rate : bool, default True
         Whether the rate of the determinant is looked for here, too; else it is left at zero.
     """
-    given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
+    given = coordinates, angles, sign, step, instant, tolerance, refine, finite_order
     arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order)
     first = arrival.status[:1]
 
@@ -280,7 +280,7 @@ def solved_batch(
     instant: Lanes,
     tolerance: Float[Numbers, ""],
     refine: Bool[Numbers, ""],
-    wanted: Int[Numbers, ""],
+    finite_order: Int[Numbers, ""],
     *,
     pose_type: type[Pose],
     order: int,
@@ -305,7 +305,7 @@ def solved_batch(
     predictable = near_prediction(departure, travel) & laws_predictable(system, instant, step, order)
     predictable &= correction.contracts() & ((sign == 0) | (found == sign))
     admissible, pivot_ratio = system.admissible(time), factor.pivot_ratio()
-    finite = _finite_results([coordinates[name] for name in pose_type.predictor], outputs, wanted)
+    finite = _finite_results([coordinates[name] for name in pose_type.predictor], outputs, finite_order)
     admitted, defined = jnp.all(admissible, axis=0), jnp.all(finite, axis=0)
     terms = _terms(system, reached, pose_type.predictor)
     gaps = _gaps(system, pose, time, terms, tolerance)

@@ -34,9 +34,12 @@ def round_width(system: System) -> int:
 
 def _of_many(shared: Any, instants: Any, *, pose_type: type[Pose], order: int) -> StepResult:
     """Solve many instants as `advance_instant` does one; those of one motion are not searched."""
-    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, own, search) = shared, instants
+    (system, tolerance, refine, finite_order), ((coordinates, angles, sign), step, instant, own, search) = (
+        shared,
+        instants,
+    )
     system = of_design(system, own)
-    given = coordinates, angles, sign, step, instant, tolerance, refine, wanted
+    given = coordinates, angles, sign, step, instant, tolerance, refine, finite_order
     arrival, factor, reached = solved_batch(system, *given, pose_type=pose_type, order=order)
     nothing = jnp.zeros_like(step)
     if own is None:
@@ -65,7 +68,10 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
     pose_type, order
         As those of `advance`.
     """
-    (system, tolerance, refine, wanted), ((coordinates, angles, sign), step, instant, own, search) = shared, instants
+    (system, tolerance, refine, finite_order), ((coordinates, angles, sign), step, instant, own, search) = (
+        shared,
+        instants,
+    )
     return advance(
         with_fields(of_design(system, own), reflected=True),
         coordinates,
@@ -76,7 +82,7 @@ def advance_instant(shared: Any, instants: Any, *, pose_type: type[Pose], order:
         tolerance,
         refine,
         search[0],
-        wanted,
+        finite_order,
         pose_type=pose_type,
         order=order,
         with_det_rate=own is not None or finds_det_rate(system),

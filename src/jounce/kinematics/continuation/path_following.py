@@ -20,7 +20,7 @@ from jounce.execution.backends import backend_of
 from jounce.kinematics.continuation.continuation_steps import StepState, TakenSteps
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState, StepResult
 from jounce.kinematics.continuation.solver import NO_GRID, Solver
-from jounce.kinematics.continuation.step_control import Place, StopReason
+from jounce.kinematics.continuation.step_control import ExpansionPoint, StopReason
 from jounce.kinematics.status import Status
 from jounce.mechanism.axis_angles import AttitudeHistory
 
@@ -66,7 +66,7 @@ class Anchor:
         return cls(float(instant), arrival.state(slice(1)), safe_step, radius, det_rate, Status(int(arrival.status[0])))
 
     @property
-    def place(self) -> tuple[float, float, float, float]:
+    def expansion_point(self) -> tuple[float, float, float, float]:
         """Instant, safe step, radius and rate of the determinant, as a run takes them."""
         return self.instant, self.safe_step, self.radius, self.det_rate
 
@@ -96,7 +96,7 @@ class FollowedPath:
     """
 
     anchors: list[Anchor]
-    on_the_way: list[tuple[Int[np.ndarray, " lane"], SolvedState]] = dataclasses.field(default_factory=list)
+    solved_instants: list[tuple[Int[np.ndarray, " lane"], SolvedState]] = dataclasses.field(default_factory=list)
     change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
     status: Status = Status.OK
     ended_at: float = np.inf
@@ -111,14 +111,14 @@ class FollowedPath:
         leaves, structure = jax.tree.flatten((records.coordinates, records.outputs, records.sign))
         steps = np.flatnonzero(records.taken)
         taken = [x[steps, ..., :1] for x in leaves]  # copies: an anchor is kept for long, the other lanes are not
-        places = zip(*(x[steps].tolist() for x in (*records.place, records.status[:, 0])), strict=True)
+        places = zip(*(x[steps].tolist() for x in (*records.expansion_point, records.status[:, 0])), strict=True)
         for parts, (instant, safe_step, radius, det_rate, status) in zip(zip(*taken, strict=True), places, strict=True):
             state = jax.tree.unflatten(structure, parts)
             self.anchors.append(Anchor(instant, state, safe_step, radius, det_rate, Status(status)))
         solved = (records.lane >= 0) & (records.status == Status.OK)
         if solved.any():
             found = [np.moveaxis(x, 0, -2)[..., solved] for x in leaves]
-            self.on_the_way.append((first + records.lane[solved], jax.tree.unflatten(structure, found)))
+            self.solved_instants.append((first + records.lane[solved], jax.tree.unflatten(structure, found)))
 
     def anchors_around(self, first: float, last: float) -> list[Anchor]:
         """Return the anchors between two instants, with one before them and one after, where there are some."""
@@ -162,24 +162,26 @@ class FollowedPath:
         return [ChangePoint(x.instant + x.reach, x.radius) for x in ahead if x.radius >= 0.5 * largest][:1]
 
 
-def _is_left(place: "Anchor | Place") -> Any:
+def _is_left(point: "Anchor | ExpansionPoint") -> Any:
     """Tell whether a motion leaves a singular position close behind a place."""
-    return (place.det_rate > 0) & (place.det_rate * place.radius > 1 / NEARBY)
+    return (point.det_rate > 0) & (point.det_rate * point.radius > 1 / NEARBY)
 
 
-def _is_just_beyond(place: "Anchor | Place", end: float) -> Any:
+def _is_just_beyond(point: "Anchor | ExpansionPoint", end: float) -> Any:
     """Tell whether a motion nears a singular position close to a place, and comes to its end next to it or before."""
-    near = (place.det_rate < 0) & (-place.det_rate * place.radius > 1 / NEARBY)
-    return near & ((end - place.instant) * -place.det_rate < 1 + LEAST_PASSAGE)
+    near = (point.det_rate < 0) & (-point.det_rate * point.radius > 1 / NEARBY)
+    return near & ((end - point.instant) * -point.det_rate < 1 + LEAST_PASSAGE)
 
 
-def is_spoiled_outside(place: Place, begins: Bool[np.ndarray, " lane"], end: float) -> Bool[np.ndarray, " lane"]:
+def is_spoiled_outside(
+    point: ExpansionPoint, begins: Bool[np.ndarray, " lane"], end: float
+) -> Bool[np.ndarray, " lane"]:
     """Tell which motions may be singular just before they begin, at a place, or after their end.
 
     Those that are followed alone tell by `singular_positions_outside`, which this leaves nothing to.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # of steps that failed
-        return begins & _is_left(place) | _is_just_beyond(place, end)
+        return begins & _is_left(point) | _is_just_beyond(point, end)
 
 
 def follow(
@@ -208,7 +210,7 @@ def follow(
         Instants to be solved on the way, s, from where it begins.
     """
     if isinstance(start, Anchor):
-        path, run = FollowedPath([start]), solver.run_from(start.state, start.place, first_step)
+        path, run = FollowedPath([start]), solver.run_from(start.state, start.expansion_point, first_step)
     else:
         path, run = FollowedPath([]), start
     first = 0
@@ -233,7 +235,9 @@ def follow(
             far_side, change_point = passed
             path.anchors.append(far_side)
             path.change_points.append(change_point)
-            run = solver.run_from(far_side.state, far_side.place, float(control.largest), int(control.crawled))
+            run = solver.run_from(
+                far_side.state, far_side.expansion_point, float(control.largest), int(control.crawled)
+            )
             first = int(np.searchsorted(grid, far_side.instant, side="right"))
         elif ending == StopReason.COLLAPSED:
             beyond = float(np.nextafter(here.instant, np.inf))

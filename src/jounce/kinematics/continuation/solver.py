@@ -14,7 +14,7 @@ from jounce.execution.mapped import OnLlvm, OnXla, Rounds
 from jounce.kinematics.continuation.continuation_steps import Settings, StepState, TakenSteps, take_steps
 from jounce.kinematics.continuation.correct_and_differentiate import LARGEST_GAP, SolvedState, StepResult, predictor
 from jounce.kinematics.continuation.instant_program import advance_instant, round_width
-from jounce.kinematics.continuation.step_control import Place, StepLimits, steps_begin
+from jounce.kinematics.continuation.step_control import ExpansionPoint, StepLimits, initial_control
 from jounce.kinematics.status import Status
 from jounce.mechanism import Model
 
@@ -40,7 +40,7 @@ class Solver:
     order: int
     tolerance: float
     refine: bool = True
-    wanted: int = 0  # highest derivative that must be finite
+    finite_order: int = 0  # highest derivative that must be finite
     hasty: bool = False  # whether machine code is to be there soon rather than fast
     own: Mapping[int, Any] | None = None  # of one of many designs, see `of_design`
 
@@ -105,9 +105,9 @@ class Solver:
         """
         coordinates, outputs, sign = store
         nothing: dict[str, Any] = dict.fromkeys(StepResult._fields)
-        wanted = {"coordinates": coordinates, "outputs": outputs, "status": status, "sign": sign}
+        finite_order = {"coordinates": coordinates, "outputs": outputs, "status": status, "sign": sign}
         lanes = self.needed(store), (step, instant, own), np.zeros(1, bool)
-        return self.program.rounds(lanes, StepResult(**(nothing | wanted)), sources)
+        return self.program.rounds(lanes, StepResult(**(nothing | finite_order)), sources)
 
     def take_steps(self, run: StepState, grid: Float[np.ndarray, " time"], stop: float, smallest: float) -> TakenSteps:
         """Go on with a run and the next instants of a grid, as far as they fit; see `continuation_steps`."""
@@ -119,10 +119,12 @@ class Solver:
         run = self.beginning(self.still(self.model.guess), 0.0)
         self._take_steps(run, NO_GRID, _limits(0.0, 0.0), 0, search=True, only_made=True)
 
-    def run_from(self, solved: SolvedState, place: Sequence[float], largest: float, crawled: int = 0) -> StepState:
-        """Return the run that begins at a solved instant, the place of an anchor, with a largest first step, s."""
+    def run_from(
+        self, solved: SolvedState, expansion_point: Sequence[float], largest: float, crawled: int = 0
+    ) -> StepState:
+        """Return the run from a solved instant, an expansion point; the first step is at most `largest`, s."""
         known = jax.tree.map(lambda x: _filled(x, SMALL_BATCH), self.needed(solved))
-        return _run_from(known, place, largest=largest, crawled=crawled)
+        return _run_from(known, expansion_point, largest=largest, crawled=crawled)
 
     def beginning(self, guess: SolvedState, instant: float) -> StepState:
         """Return the run that begins with solving an instant, from a position put together there."""
@@ -160,7 +162,7 @@ class Solver:
     @cached_property
     def program(self) -> OnLlvm | OnXla:
         """What solves many instants."""
-        system, (tolerance, refine, _, wanted) = self.model.system, self._settings
+        system, (tolerance, refine, _, finite_order) = self.model.system, self._settings
         nothing, still = np.zeros(1), self.still(self.model.guess)
         instants = self.needed(still), nothing, nothing, self.own, np.zeros(1, bool)
         kind = self.model.pose_type
@@ -169,7 +171,7 @@ class Solver:
         laws = [getattr(group.element, "motion", ()) for group in system.groups]
         tables = max(map(np.size, jax.tree.leaves(laws)), default=0) > LARGE
         how = {"large": (LARGE_BESIDE_TABLES if tables else None) if small else LARGE, "hasty": self.hasty}
-        shared = system, tolerance, refine, wanted
+        shared = system, tolerance, refine, finite_order
         width = round_width(system)
         return advance_instant.program(shared, instants, **how, width=width, pose_type=kind, order=self.order)
 
@@ -185,7 +187,7 @@ class Solver:
 
     @cached_property
     def _settings(self) -> Settings:
-        return Settings(*map(np.asarray, (self.tolerance, self.refine, True, self.wanted)))
+        return Settings(*map(np.asarray, (self.tolerance, self.refine, True, self.finite_order)))
 
     def _take_steps(
         self,
@@ -197,9 +199,9 @@ class Solver:
         search: bool,
         only_made: bool = False,
     ) -> Any:
-        room = (self._batches + 1) * (SMALL_BATCH - 1)
-        window = np.full(room, np.inf)
-        window[: len(grid)] = grid[:room]
+        length = (self._batches + 1) * (SMALL_BATCH - 1)
+        window = np.full(length, np.inf)
+        window[: len(grid)] = grid[:length]
         settings, kind = self._settings._replace(search=np.asarray(search)), self.model.pose_type
         call = take_steps.prepare if only_made else take_steps
         return call(
@@ -238,7 +240,7 @@ class Solver:
 
 def _run_from(
     known: SolvedState,
-    place: Sequence[float],
+    expansion_point: Sequence[float],
     *,
     away: Any = None,
     instant: Any = None,
@@ -248,7 +250,7 @@ def _run_from(
     """Return a run that begins, with what is solved first, if that is told."""
     nothing = np.zeros(SMALL_BATCH)
     here = nothing if instant is None else instant
-    control = steps_begin(Place(*map(np.asarray, place)), np.asarray(here[0]))
+    control = initial_control(ExpansionPoint(*map(np.asarray, expansion_point)), np.asarray(here[0]))
     control = control._replace(largest=np.asarray(largest), crawled=np.asarray(crawled))
     decided, first = np.asarray(instant is not None), np.zeros((), int)
     return StepState(known, control, nothing if away is None else away, here, decided, first)
@@ -258,11 +260,11 @@ def _limits(stop: float, smallest: float) -> StepLimits:
     return StepLimits(np.asarray(stop), np.asarray(smallest))
 
 
-def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int, room: int = 0) -> Shaped[np.ndarray, "*rest room"]:
+def _filled(x: Shaped[np.ndarray, "*rest batch"], width: int, length: int = 0) -> Shaped[np.ndarray, "*rest room"]:
     """Repeat the last lane up to a width; what lies beyond it, where there is more room, is not looked at."""
-    lanes, room = x.shape[-1], max(width, room)
-    if lanes == room:
+    lanes, length = x.shape[-1], max(width, length)
+    if lanes == length:
         return x
-    filled = np.empty((*x.shape[:-1], room), x.dtype)
+    filled = np.empty((*x.shape[:-1], length), x.dtype)
     filled[..., :lanes], filled[..., lanes:width] = x, x[..., -1:]
     return filled

@@ -40,7 +40,7 @@ class StopReason(enum.IntEnum):
     REFUSED = 4  # no step, however small, is accepted
 
 
-class Place(NamedTuple):
+class ExpansionPoint(NamedTuple):
     """Where a motion has come to: the instant, s, and how far it may be followed from there; see `StepResult`."""
 
     instant: Lanes
@@ -65,7 +65,7 @@ class StepLimits(NamedTuple):
 class StepControl(NamedTuple):
     """The next step: from where, how long, and what came of those before."""
 
-    place: Place  # of the last anchor
+    expansion_point: ExpansionPoint  # of the last anchor
     step: Lanes  # to be tried next, s; zero to solve the first instant itself
     target: Lanes  # where it leads to, s
     may_pass: Truths  # whether a singular position just ahead ends the steps
@@ -75,22 +75,22 @@ class StepControl(NamedTuple):
     ending: Int[Numbers, "*batch"]  # see StopReason
 
 
-def steps_begin(place: Place, target: Float[np.ndarray, "*batch"]) -> StepControl:
+def initial_control(point: ExpansionPoint, target: Float[np.ndarray, "*batch"]) -> StepControl:
     """Return the step that solves the first instant itself, s; or, at a place that is known, none that is planned."""
     blank = np.zeros(target.shape)
     no, none = np.zeros(target.shape, bool), np.zeros(target.shape, int)
-    return StepControl(place, blank, target, ~no, blank + np.inf, none, blank + np.nan, none)
+    return StepControl(point, blank, target, ~no, blank + np.inf, none, blank + np.nan, none)
 
 
-def planned(control: StepControl, limits: StepLimits) -> StepControl:
+def plan_next_step(control: StepControl, limits: StepLimits) -> StepControl:
     """Return the next step from a place, or why there is none."""
-    place = control.place
-    left = limits.stop - place.instant
-    step = jnp.minimum(jnp.minimum(place.safe_step, SAFE_FRACTION * place.reach), jnp.minimum(control.largest, left))
+    point = control.expansion_point
+    left = limits.stop - point.instant
+    step = jnp.minimum(jnp.minimum(point.safe_step, SAFE_FRACTION * point.reach), jnp.minimum(control.largest, left))
     crawled = jnp.where(step < CRAWLING * left, control.crawled + 1, 0)
-    singular = control.may_pass & (place.det_rate < 0) & (place.reach < PASSAGE * place.radius)
+    singular = control.may_pass & (point.det_rate < 0) & (point.reach < PASSAGE * point.radius)
     endings = (
-        ((crawled > LONGEST_CRAWL) | (place.instant + step == place.instant), StopReason.COLLAPSED),
+        ((crawled > LONGEST_CRAWL) | (point.instant + step == point.instant), StopReason.COLLAPSED),
         (singular, StopReason.PASSAGE),
         (~(left > 0), StopReason.ARRIVED),
     )
@@ -98,46 +98,50 @@ def planned(control: StepControl, limits: StepLimits) -> StepControl:
     for happened, why in endings:
         ending = jnp.where(happened, int(why), ending)
     step = jnp.where(left - step < SLIVER * step, left, step)
-    target = jnp.where(step == left, limits.stop, place.instant + step)
+    target = jnp.where(step == left, limits.stop, point.instant + step)
     crawled = jnp.where(ending == StopReason.PASSAGE, control.crawled, crawled)  # the step is planned again
     refused = jnp.full(left.shape, jnp.nan)
     return control._replace(step=step, target=target, ending=ending, crawled=crawled, refused=refused)
 
 
-def accepted(control: StepControl, status: Int[Numbers, "*batch"], there: Place) -> Truths:
+def is_accepted(control: StepControl, status: Int[Numbers, "*batch"], there: ExpansionPoint) -> Truths:
     """Tell whether a step may be taken, of which the status is known, and the place that it led to."""
     passable = (status == int(Status.OK)) | (status == int(Status.UNDEFINED))
     return passable & ((control.step == 0) | (control.step * jnp.abs(there.det_rate) <= LARGEST_DET_RATE))
 
 
-def after(
+def next_control(
     control: StepControl,
     status: Int[Numbers, "*batch"],
-    there: Place,
+    there: ExpansionPoint,
     limits: StepLimits,
     chosen: tuple[Truths, Truths],
 ) -> StepControl:
     """Return the step after one, which was `chosen` to be accepted, and to be taken.
 
-    One that was accepted but not taken is made again; see `accepted` for what is known of it.
+    One that was accepted but not taken is made again; see `is_accepted` for what is known of it.
     """
     good, taken = chosen
-    stuck = ~good & ((control.step < limits.smallest) | (control.target <= control.place.instant))
+    stuck = ~good & ((control.step < limits.smallest) | (control.target <= control.expansion_point.instant))
     inadmissible = ~good & (status == int(Status.INADMISSIBLE)) & jnp.isnan(control.refused)
     control = control._replace(
         ending=jnp.where(stuck, int(StopReason.REFUSED), int(StopReason.UNFINISHED)),
         refused=jnp.where(inadmissible, control.target, control.refused),
     )
     largest = jnp.where(control.step == 0, control.largest, GROWTH * control.step)
-    arrived = control._replace(place=there, may_pass=jnp.ones_like(taken), largest=largest)
+    arrived = control._replace(expansion_point=there, may_pass=jnp.ones_like(taken), largest=largest)
     halved = ~good & ~stuck
     step = jnp.where(halved, 0.5 * control.step, control.step)
-    again = control._replace(step=step, target=jnp.where(halved, control.place.instant + step, control.target))
-    return jax.tree.map(lambda new, old: jnp.where(taken, new, old), planned(arrived, limits), again)
+    again = control._replace(
+        step=step, target=jnp.where(halved, control.expansion_point.instant + step, control.target)
+    )
+    return jax.tree.map(lambda new, old: jnp.where(taken, new, old), plan_next_step(arrived, limits), again)
 
 
 @mapped()
-def step_on(limits: StepLimits, lanes: tuple[StepControl, Int[Numbers, " batch"], Place]) -> tuple[StepControl, Any]:
+def next_controls(
+    limits: StepLimits, lanes: tuple[StepControl, Int[Numbers, " batch"], ExpansionPoint]
+) -> tuple[StepControl, Any]:
     """Return the next step of each of many designs, and whether the last one was taken, all of which is decided by it.
 
     Parameters
@@ -148,5 +152,5 @@ def step_on(limits: StepLimits, lanes: tuple[StepControl, Int[Numbers, " batch"]
         Of each the step that was made, its status, and the place that it led to.
     """
     control, status, there = lanes
-    good = accepted(control, status, there)
-    return after(control, status, there, limits, (good, good)), good
+    good = is_accepted(control, status, there)
+    return next_control(control, status, there, limits, (good, good)), good

@@ -16,13 +16,13 @@ from jounce.kinematics.assembly.assemble import (
     redundancy_of,
     settled,
 )
-from jounce.kinematics.assembly.axis_directions import drawn_senses, senses
+from jounce.kinematics.assembly.axis_directions import axis_signs, drawn_axis_signs
 from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
 from jounce.kinematics.curves.curve import Curve, posed
+from jounce.kinematics.curves.path_tracker import PathTracker
 from jounce.kinematics.curves.start import first_instant
 from jounce.kinematics.curves.starts import assemble_side_by_side
 from jounce.kinematics.curves.tracing import check_number, traced
-from jounce.kinematics.curves.walker import Walker
 from jounce.mechanism import Mechanism, build, check_mechanism
 from jounce.mechanism.carriages import check_without_ends
 from jounce.mechanism.preconditions import check_holonomic, concrete
@@ -226,9 +226,9 @@ class _Search:
         system = with_fields(self.first.system, row_scale=trial.scale[:, None])
         self.system = resident(with_fields(system, outputs=(), forces=(), fronts=None))
         self.model = dataclasses.replace(self.first, system=system)
-        self.walker = Walker(self.model, driven=False)
+        self.tracker = PathTracker(self.model, driven=False)
         self.found: list[_Found] = []
-        self.senses = senses(self.system, trial.coordinates) if trial.closed else drawn_senses(model)
+        self.axis_signs = axis_signs(self.system, trial.coordinates) if trial.closed else drawn_axis_signs(model)
         self.starts = self.since_last_new = self.movable = 0
         if trial.closed:
             check_mobility(self.model, redundancy_of(self.first, trial, instant)[1])
@@ -286,17 +286,17 @@ class _Search:
     def add(self, coordinates: dict[str, np.ndarray], hits: int = 1) -> bool:
         """Add an assembly, and tell whether it is new; one with a part turned over in its joint is none."""
         there = {name: x[..., None] for name, x in coordinates.items()}
-        if not np.array_equal(senses(self.system, there), self.senses):
+        if not np.array_equal(axis_signs(self.system, there), self.axis_signs):
             return False
         for known in self.found:
             same = SAME if known.smallest > NEARLY_SINGULAR else SAME_IF_SINGULAR
-            if np.max(np.abs(self.walker.difference(coordinates, known.coordinates))) < same:
+            if np.max(np.abs(self.tracker.difference(coordinates, known.coordinates))) < same:
                 known.hits += hits
                 return False
         coordinates = self._polished(coordinates)
-        place = self.walker.placed({name: x[..., None] for name, x in coordinates.items()}, self.instant)
-        sizes = np.linalg.svd(place.jacobian, compute_uv=False)
-        self.found.append(_Found(coordinates, float(sizes[: self.walker.columns][-1]), hits))
+        point = self.tracker.point_without_series({name: x[..., None] for name, x in coordinates.items()}, self.instant)
+        sizes = np.linalg.svd(point.jacobian, compute_uv=False)
+        self.found.append(_Found(coordinates, float(sizes[: self.tracker.columns][-1]), hits))
         return True
 
     def _polished(self, coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -335,13 +335,13 @@ class _Search:
                 known.circuit, known.branch = circuit, before + curve.branch_at(arc_length)
 
     def _nearest(self, coordinates: dict[str, np.ndarray]) -> _Found:
-        away = [np.max(np.abs(self.walker.difference(coordinates, x.coordinates))) for x in self.found]
+        away = [np.max(np.abs(self.tracker.difference(coordinates, x.coordinates))) for x in self.found]
         return self.found[int(np.argmin(away))]
 
     def result(self, circuits: tuple[Curve, ...]) -> Assemblies:
         """Return the assemblies in the order of how far they are from the starting guess."""
         guess = {name: np.asarray(x)[..., 0] for name, x in self.model.guess.items()}
-        away = [float(np.linalg.norm(self.walker.difference(x.coordinates, guess))) for x in self.found]
+        away = [float(np.linalg.norm(self.tracker.difference(x.coordinates, guess))) for x in self.found]
         order = np.argsort(away, kind="stable")
         renumbered: dict[int, int] = {}
         for k in order:

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import SolveError
-from jounce.kinematics.curves.walker import Place, Walker, all_finite
+from jounce.kinematics.curves.path_tracker import CurvePoint, PathTracker, all_finite
 from jounce.kinematics.status import Status
 from jounce.linear_algebra.quadratic_forms import polarized
 
@@ -36,7 +36,7 @@ class ChangePoint:
 
     Attributes
     ----------
-    place : Place
+    point : Place
         With the series of the branch that is followed.
     tangents : array of shape (branches, unknowns)
         Directions of all branches, the one followed first, of length one in the coordinates.
@@ -46,65 +46,65 @@ class ChangePoint:
         Whether the second order tells all branches apart; where it does not, there may be others, or fewer.
     """
 
-    place: Place
+    center: CurvePoint
     tangents: Float[np.ndarray, "branch unknown"]
     dimension: int
     decided: bool
 
     def __repr__(self) -> str:
-        where = f"arc length {self.arc_length:.6g}, driver value {self.place.value[0]:.6g}"
+        where = f"arc length {self.arc_length:.6g}, driver value {self.center.value[0]:.6g}"
         return f"<ChangePoint at {where}, {len(self.tangents)} branches>"
 
     @property
     def arc_length(self) -> float:
         """Where on the curve."""
-        return self.place.arc_length
+        return self.center.arc_length
 
     def reversed(self) -> "ChangePoint":
         """Return it on the curve gone along the other way."""
         tangents = self.tangents.copy()
         tangents[0] *= -1
-        return dataclasses.replace(self, place=self.place.reversed(), tangents=tangents)
+        return dataclasses.replace(self, center=self.center.reversed(), tangents=tangents)
 
     def shifted(self, arc_length: float) -> "ChangePoint":
         """Return it with its arc length counted from somewhere else."""
-        return dataclasses.replace(self, place=self.place.shifted(arc_length))
+        return dataclasses.replace(self, center=self.center.shifted(arc_length))
 
 
-def crossing(walker: Walker, here: Place, ahead: complex) -> tuple[ChangePoint, Place] | None:
+def crossing(tracker: PathTracker, here: CurvePoint, ahead: complex) -> tuple[ChangePoint, CurvePoint] | None:
     """Return the change point just ahead and the place beyond it, as far from it as this one, if there is one.
 
     Parameters
     ----------
-    walker : Walker
+    tracker : PathTracker
     here : Place
         Before it.
     ahead : complex
         Arc length to the nearest singular place, to first order.
     """
-    near = NEAR * walker.radius(here, PASSAGE_ORDER - 2)
+    near = NEAR * tracker.radius(here, PASSAGE_ORDER - 2)
     if not (0 < ahead.real < near and abs(ahead.imag) <= REAL * ahead.real):
         return None
     short = here.shortened(PASSAGE_ORDER)
-    place = _located(walker, short, ahead.real)
-    if place is None:
+    point = _located(tracker, short, ahead.real)
+    if point is None:
         return None
-    step = place.arc_length - here.arc_length
-    points = walker.points(short, np.array([2 * step]))
-    beyond = walker.place(points, 0, here.arc_length + 2 * step, here.rows)
+    step = point.arc_length - here.arc_length
+    points = tracker.points(short, np.array([2 * step]))
+    beyond = tracker.point_at_lane(points, 0, here.arc_length + 2 * step, here.rows)
     arrived = {name: c[0] for name, c in beyond.coordinates.items()}
-    departure = walker.difference(arrived, short.at(2 * step))
+    departure = tracker.difference(arrived, short.at(2 * step))
     if not all_finite(points)[0] or np.max(np.abs(departure)) > LARGEST_DEPARTURE:
         return None
-    null = walker.null_space(place.jacobian, NEARLY_SINGULAR)
-    own = walker.tangent(place)
-    if null.shape[1] < 2 or float(own @ walker.tangent(beyond)) < 0:
+    null = tracker.null_space(point.jacobian, NEARLY_SINGULAR)
+    own = tracker.tangent(point)
+    if null.shape[1] < 2 or float(own @ tracker.tangent(beyond)) < 0:
         return None
-    tangents, decided = _tangents(walker, place, null, own)
-    return ChangePoint(place, tangents, null.shape[1], decided), beyond
+    tangents, decided = _tangents(tracker, point, null, own)
+    return ChangePoint(point, tangents, null.shape[1], decided), beyond
 
 
-def departed(walker: Walker, point: ChangePoint, branch: int) -> Place:
+def departed(tracker: PathTracker, change_point: ChangePoint, branch: int) -> CurvePoint:
     """Return a place on a branch a little way off a change point, from which arc length is counted.
 
     Raises
@@ -112,46 +112,47 @@ def departed(walker: Walker, point: ChangePoint, branch: int) -> Place:
     SolveError
         If the branch is not there where its direction says it is.
     """
-    direction = point.tangents[branch]
-    place = walker.directed(point.place, direction)
+    direction = change_point.tangents[branch]
+    point = tracker.directed(change_point.center, direction)
     for step in FIRST_STEPS:
-        predicted = dataclasses.replace(place.recentered(step), arc_length=0.0)
-        start = walker.begun(walker.with_jacobian(predicted), direction)
+        predicted = dataclasses.replace(point.recentered(step), arc_length=0.0)
+        start = tracker.with_series(tracker.with_jacobian(predicted), direction)
         finite = all(np.isfinite(c).all() for c in start.coordinates.values())
-        if finite and float(walker.tangent(start)[: walker.columns] @ direction[: walker.columns]) > 1 - LARGEST_BEND:
+        columns = tracker.columns
+        if finite and float(tracker.tangent(start)[:columns] @ direction[:columns]) > 1 - LARGEST_BEND:
             return start
     message = "the branch cannot be entered: near the change point it does not go in the direction of its tangent"
     raise SolveError(message, status=Status.SINGULAR)
 
 
-def _located(walker: Walker, short: Place, step: float) -> Place | None:
+def _located(tracker: PathTracker, short: CurvePoint, step: float) -> CurvePoint | None:
     """Return the place on the series where the bordered Jacobian is singular, if the rows hold there."""
 
-    def at(step: float) -> tuple[Place, float]:
-        points = walker.points(short, np.array([step]), corrected=False)
+    def at(step: float) -> tuple[CurvePoint, float]:
+        points = tracker.points(short, np.array([step]), corrected=False)
         known = {"jacobian": points.jacobian[..., 0], "slope": points.slope[..., 0]}
         return dataclasses.replace(short.recentered(step, PASSAGE_ORDER), **known), float(points.residual[0])
 
     first = step
-    place, residual = at(step)
+    point, residual = at(step)
     for _ in range(MAX_CORRECTIONS):
-        ahead = walker.nearing(place)
+        ahead = tracker.singularity_distance(point)
         if abs(ahead) < LOCATED * first:
             break
         step += ahead.real
         if not abs(step - first) < 0.5 * first:
             return None
-        place, residual = at(step)
-    return place if residual <= OPEN else None
+        point, residual = at(step)
+    return point if residual <= OPEN else None
 
 
 def _tangents(
-    walker: Walker, place: Place, null: Float[np.ndarray, "unknown k"], own: Float[np.ndarray, " unknown"]
+    tracker: PathTracker, point: CurvePoint, null: Float[np.ndarray, "unknown k"], own: Float[np.ndarray, " unknown"]
 ) -> tuple[Float[np.ndarray, "branch unknown"], bool]:
     """Return the directions of all branches that the second order allows, and whether it tells them apart."""
-    rows = walker.left_null_space(place.jacobian, NEARLY_SINGULAR)
+    rows = tracker.left_null_space(point.jacobian, NEARLY_SINGULAR)
     # how combinations of rows that vanish see directions of the first order
-    forms = polarized(lambda along: rows.T @ walker.second_order(place, null @ along.T), null.shape[1])
+    forms = polarized(lambda along: rows.T @ tracker.second_order(point, null @ along.T), null.shape[1])
     size = np.max(np.abs(forms), initial=0.0)
     known = null.T @ own
     if not size > VANISHING:
@@ -160,7 +161,7 @@ def _tangents(
     along = [x for x in found if abs(x @ known) < (1 - SAME_DIRECTION) * np.linalg.norm(known)]
     decided &= len(along) < len(found)  # the branch that is followed is among them
     others = [null @ x for x in along]
-    scaled = [x / np.linalg.norm(x[: walker.columns]) for x in others]
+    scaled = [x / np.linalg.norm(x[: tracker.columns]) for x in others]
     return np.stack([own, *scaled]), decided
 
 

@@ -15,9 +15,9 @@ from jounce.errors import MechanismError
 from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.curves.crossings import ChangePoint, departed
 from jounce.kinematics.curves.limits import LimitPosition, limits_between, values_between
-from jounce.kinematics.curves.path import End, Path, meets, walk_both_ways
+from jounce.kinematics.curves.path import End, Path, step_to_configuration, track_both_directions
+from jounce.kinematics.curves.path_tracker import LANES, CurvePoint, PathTracker, spin
 from jounce.kinematics.curves.start import Freed
-from jounce.kinematics.curves.walker import LANES, Place, Walker, spin
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.results.pose_outputs import output_values
 from jounce.kinematics.status import Status
@@ -78,24 +78,24 @@ class Curve(Displayed):
         self,
         mechanism: Mechanism,
         free: Freed,
-        walker: Walker,
+        tracker: PathTracker,
         paths: tuple[Path, Path | None],
         settings: tuple[int, int, float],
     ):
         self.mechanism, self.driver, self.unit = mechanism, free.driver, free.unit
-        self._free, self._walker, self._settings = free, walker, settings
+        self._free, self._tracker, self._settings = free, tracker, settings
         self._order, self._count, self._longest = settings
         self.first_value = free.value
         self._paths = paths
         forward, backward = paths
         self.closed = forward.end is End.CLOSED
-        self._places = list(forward.places)
+        self._track = list(forward.points)
         self._crossings = list(forward.change_points)
         self.ends = (forward.end.value, forward.end.value)
         self.start, self.stop = 0.0, forward.length
         if backward is not None:
             before = backward.reversed()
-            self._places = [*before.places[:-1], *self._places]
+            self._track = [*before.points[:-1], *self._track]
             self._crossings = [*before.change_points, *self._crossings]
             self.start, self.ends = -backward.length, (backward.end.value, forward.end.value)
 
@@ -107,12 +107,12 @@ class Curve(Displayed):
 
     def sampled(self, order: int, count: int) -> "Curve":
         """Return the curve with outputs to another order at another number of points."""
-        return Curve(self.mechanism, self._free, self._walker, self._paths, (order, count, self._longest))
+        return Curve(self.mechanism, self._free, self._tracker, self._paths, (order, count, self._longest))
 
     @property
     def size(self) -> float:
         """Length by which shifts are divided in arc length, m."""
-        return self._walker.model.length
+        return self._tracker.model.length
 
     @property
     def length(self) -> float:
@@ -124,8 +124,8 @@ class Curve(Displayed):
         """Limit positions in the order of arc length, located to rounding; none where nothing is driven."""
         if self.driver is None:
             return ()
-        unit, stops = self._walker.value_scale, [*(p.arc_length for p in self._places[1:]), self.stop]
-        found = [x for p, stop in zip(self._places, stops, strict=True) for x in limits_between(p, stop, unit)]
+        unit, stops = self._tracker.value_scale, [*(p.arc_length for p in self._track[1:]), self.stop]
+        found = [x for p, stop in zip(self._track, stops, strict=True) for x in limits_between(p, stop, unit)]
         return tuple(sorted(found, key=lambda x: x.arc_length))
 
     @property
@@ -176,19 +176,19 @@ class Curve(Displayed):
 
     @cached_property
     def _gain(self) -> float:
-        last = self._places[-1]
-        return float(last.recentered(self.stop - last.arc_length, 20).value[0]) - float(self._places[0].value[0])
+        last = self._track[-1]
+        return float(last.recentered(self.stop - last.arc_length, 20).value[0]) - float(self._track[0].value[0])
 
     def _around(self, arc_length: float) -> float:
         if self.closed and not self.start <= arc_length <= self.stop:
             return self.start + (arc_length - self.start) % self.length
         return arc_length
 
-    def _at(self, arc_length: float) -> Place:
+    def _at(self, arc_length: float) -> CurvePoint:
         """Return the place at an arc length, with the series of the nearest of those that were solved."""
-        known = [place.arc_length for place in self._places]
+        known = [point.arc_length for point in self._track]
         after = bisect.bisect_left(known, arc_length)
-        near = min(self._places[max(after - 1, 0) : after + 1], key=lambda p: abs(p.arc_length - arc_length))
+        near = min(self._track[max(after - 1, 0) : after + 1], key=lambda p: abs(p.arc_length - arc_length))
         return near.recentered(arc_length - near.arc_length)
 
     def at(self, arc_length: float) -> Mechanism:
@@ -210,9 +210,9 @@ class Curve(Displayed):
         if self.driver is None:
             return []
         period = WHOLE_TURN if self.unit == "rad" else None
-        stops = [*(place.arc_length for place in self._places[1:]), self.stop]
-        pairs = zip(self._places, stops, strict=True)
-        return [s for place, stop in pairs for s in values_between(place, stop, value, period)]
+        stops = [*(point.arc_length for point in self._track[1:]), self.stop]
+        pairs = zip(self._track, stops, strict=True)
+        return [s for point, stop in pairs for s in values_between(point, stop, value, period)]
 
     def branch_at(self, arc_length: float) -> int:
         """Return on which of the branches an arc length is, from 1."""
@@ -224,14 +224,16 @@ class Curve(Displayed):
 
     def coordinates_at(self, arc_length: float) -> dict[str, np.ndarray]:
         """Return the coordinates of all bodies at an arc length, the ground first, shape (..., bodies)."""
-        place = self._at(self._around(arc_length))
-        return {name: c[0] for name, c in place.coordinates.items()}
+        point = self._at(self._around(arc_length))
+        return {name: c[0] for name, c in point.coordinates.items()}
 
     def passes(self, coordinates: dict[str, np.ndarray]) -> bool:
         """Tell whether the curve goes through a configuration."""
-        stops = [*(place.arc_length for place in self._places[1:]), self.stop]
-        pairs = zip(self._places, stops, strict=True)
-        return any(meets(self._walker, p, stop - p.arc_length, coordinates) is not None for p, stop in pairs)
+        stops = [*(point.arc_length for point in self._track[1:]), self.stop]
+        pairs = zip(self._track, stops, strict=True)
+        return any(
+            step_to_configuration(self._tracker, p, stop - p.arc_length, coordinates) is not None for p, stop in pairs
+        )
 
     def connected(self) -> tuple["Curve", ...]:
         """Return this curve and those that cross it at change points, and those that cross these: the whole circuit."""
@@ -266,9 +268,9 @@ class Curve(Displayed):
         """
         point = _one_of(self.change_points, change_point, "change_point", "change points")
         _one_of(point.tangents, branch, "branch", "branches")
-        start = departed(self._walker, point, branch)
-        paths = walk_both_ways(self._walker, start, self._longest)
-        return Curve(self.mechanism, self._free, self._walker, paths, self._settings)
+        start = departed(self._tracker, point, branch)
+        paths = track_both_directions(self._tracker, start, self._longest)
+        return Curve(self.mechanism, self._free, self._tracker, paths, self._settings)
 
     def directions(self, change_point: int) -> list[dict[str, tuple[np.ndarray, np.ndarray]]]:
         """Return how all bodies move along each branch through a change point, for a unit of arc length.
@@ -285,7 +287,7 @@ class Curve(Displayed):
             turn, (1,) or (3,) in rad about the axes of the body. The sign of the others is arbitrary.
         """
         point = _one_of(self.change_points, change_point, "change_point", "change points")
-        found = [self._walker.parts(tangent) for tangent in point.tangents]
+        found = [self._tracker.parts(tangent) for tangent in point.tangents]
         names = list(enumerate(self.mechanism.bodies, start=1))
         return [{name: (shift[:, k], turn[:, k]) for k, name in names} for shift, turn in found]
 
@@ -301,10 +303,10 @@ class Curve(Displayed):
     @cached_property
     def _points(self) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Taylor coefficients of the coordinates and of the value at the points, the points last."""
-        places = [self._at(s) for s in self.arc_lengths]
-        names = places[0].coordinates
-        coordinates = {name: np.stack([p.coordinates[name] for p in places], axis=-1) for name in names}
-        return coordinates, np.stack([p.value for p in places], axis=-1)
+        points = [self._at(s) for s in self.arc_lengths]
+        names = points[0].coordinates
+        coordinates = {name: np.stack([p.coordinates[name] for p in points], axis=-1) for name in names}
+        return coordinates, np.stack([p.value for p in points], axis=-1)
 
     @cached_property
     def _motion(self) -> Motion:
@@ -318,7 +320,7 @@ class Curve(Displayed):
         lost = max((output.lost_orders for output in posed_outputs.values()), default=0)
         levels = self._order + lost + 1
         coordinates = with_angular_velocity({name: c[:levels] for name, c in self._points[0].items()})
-        model, instants, history = self._walker.model, self.arc_lengths, self._history
+        model, instants, history = self._tracker.model, self.arc_lengths, self._history
         groups = model.system.outputs if history is None else history.counting(model.system.outputs, instants)
         series = output_values(groups, coordinates, model.pose_type)
         status = np.full(len(instants), int(Status.OK))
@@ -326,13 +328,13 @@ class Curve(Displayed):
 
     @cached_property
     def _history(self) -> AttitudeHistory | None:
-        if self._walker.is_planar:
+        if self._tracker.is_planar:
             return None
-        stops = [place.arc_length for place in self._places[1:]] + [self.stop]
+        stops = [point.arc_length for point in self._track[1:]] + [self.stop]
         parts = [
-            np.linspace(p.arc_length, stop, PLACES, endpoint=False) for p, stop in zip(self._places, stops, strict=True)
+            np.linspace(p.arc_length, stop, PLACES, endpoint=False) for p, stop in zip(self._track, stops, strict=True)
         ]
-        begun = float(self._places[0].arc_length)
+        begun = float(self._track[0].arc_length)
         instants = np.concatenate([*parts, [self.stop]])
         instants = instants[(instants >= begun)]
         quaternions = [self._at(s).coordinates["quaternion"][0] for s in instants]
@@ -347,13 +349,13 @@ class Curve(Displayed):
     @cached_property
     def smallest_singular_values(self) -> Float[np.ndarray, " point"]:
         """Smallest singular value of the scaled Jacobian with the driver held, at the points: zero at dead points."""
-        columns, found = self._walker.columns, []
-        places = [self._at(s) for s in self.arc_lengths]
-        for first in range(0, len(places), LANES):
-            some = places[first : first + LANES]
-            lanes = [dataclasses.replace(place, rows=some[0].rows) for place in some]
-            points = self._walker.points(lanes, np.zeros(len(lanes)), corrected=False)
-            found.append(np.linalg.svd(np.moveaxis(points.jacobian[:, :columns], -1, 0), compute_uv=False)[:, -1])
+        columns, found = self._tracker.columns, []
+        points = [self._at(s) for s in self.arc_lengths]
+        for first in range(0, len(points), LANES):
+            some = points[first : first + LANES]
+            lanes = [dataclasses.replace(point, rows=some[0].rows) for point in some]
+            batch = self._tracker.points(lanes, np.zeros(len(lanes)), corrected=False)
+            found.append(np.linalg.svd(np.moveaxis(batch.jacobian[:, :columns], -1, 0), compute_uv=False)[:, -1])
         return np.concatenate(found)
 
     @cached_property

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from jounce.kinematics.curves.walker import Place
+from jounce.kinematics.curves.path_tracker import CurvePoint
 
 Kind = Literal["maximum", "minimum", "stationary"]
 ON_THE_CURVE = 1e-7  # of a step: imaginary part of a root that rounding may have made of a double one
@@ -42,14 +42,14 @@ class LimitPosition:
     kind: Kind
 
 
-def limits_between(place: Place, stop: float, unit: float) -> list[LimitPosition]:
+def limits_between(point: CurvePoint, stop: float, unit: float) -> list[LimitPosition]:
     """Return the limit positions from a place, that excluded, to an arc length, that included.
 
     The unit of the value is what it is worth as an unknown; a driver that stands all the way has none.
     """
-    step = stop - place.arc_length
-    orders = np.arange(len(place.value))
-    slopes = (place.value * step**orders * orders)[1:]  # of the value along the part of the step
+    step = stop - point.arc_length
+    orders = np.arange(len(point.value))
+    slopes = (point.value * step**orders * orders)[1:]  # of the value along the part of the step
     size = np.max(np.abs(slopes), initial=0.0)
     if size <= STANDING * unit * step or abs(slopes[0]) > np.sum(np.abs(slopes[1:])):
         return []
@@ -57,7 +57,7 @@ def limits_between(place: Place, stop: float, unit: float) -> list[LimitPosition
     for part in roots(slopes):
         if not 0 < part <= 1:
             continue
-        here = place.recentered(part * step)
+        here = point.recentered(part * step)
         found.append(LimitPosition(here.arc_length, float(here.value[0]), _kind(slopes, part, size)))
     return found
 
@@ -99,10 +99,10 @@ def _kind(slopes: Float[np.ndarray, " order"], part: float, size: float) -> Kind
     return "maximum" if before > 0 else "minimum"
 
 
-def values_between(place: Place, stop: float, value: float, period: float | None) -> list[float]:
+def values_between(point: CurvePoint, stop: float, value: float, period: float | None) -> list[float]:
     """Return the arc lengths from a place to another at which the driver has a value, or one some periods away."""
-    step = stop - place.arc_length
-    terms = place.value * step ** np.arange(len(place.value))
+    step = stop - point.arc_length
+    terms = point.value * step ** np.arange(len(point.value))
     reach = float(np.sum(np.abs(terms[1:])))
     if reach == 0:
         return []
@@ -111,4 +111,4 @@ def values_between(place: Place, stop: float, value: float, period: float | None
         least, most = ((terms[0] + side * reach - value) / period for side in (-1, 1))
         targets = [value + period * k for k in range(int(np.floor(least)), int(np.ceil(most)) + 1)]
     found = [part for target in targets for part in roots(np.array([terms[0] - target, *terms[1:]]))]
-    return [place.arc_length + part * step for part in found]
+    return [point.arc_length + part * step for part in found]

@@ -13,18 +13,26 @@ import numpy as np
 from jaxtyping import Bool
 
 from jounce.kinematics.curves.crossings import PASSAGE_ORDER, ChangePoint, crossing
+from jounce.kinematics.curves.path_tracker import (
+    LANES,
+    ORDER,
+    TAIL,
+    CurvePoint,
+    PathTracker,
+    all_finite,
+    evaluate_series,
+)
 from jounce.kinematics.curves.series import CurvePoints
-from jounce.kinematics.curves.walker import LANES, ORDER, TAIL, Place, Walker, all_finite, horner
 
 LARGEST_DEPARTURE = 1e-8  # of the curve from the series, rad or sizes of the mechanism
 LARGEST_CORRECTION = 1e-10  # the last one, where rounding allows that
 ROUNDINGS = 16  # of a correction, over the smallest singular value: what is left of the last one near a crossing
 LARGEST_RESIDUAL = 1e-9  # of rows that repeat others
 SMALLEST_STEP = 1e-9
-SAME_PLACE = 1e-9
+NEGLIGIBLE = 1e-9
 SAME_DIRECTION = 1e-6
 MOST_CORRECTIONS = 50
-PART_OF_WAY = 0.5  # to a singular place, made in one step
+SHARE_OF_DISTANCE = 0.5  # to a singular place, made in one step
 
 
 class End(enum.Enum):
@@ -40,108 +48,111 @@ class End(enum.Enum):
 class Path:
     """Places on a curve in the order of arc length, the change points passed, and how it ends."""
 
-    places: list[Place]
+    points: list[CurvePoint]
     change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
     end: End = End.LENGTH
     length: float = 0.0
 
     def reversed(self) -> "Path":
         """Return the path gone along the other way."""
-        places = [place.reversed() for place in reversed(self.places)]
-        points = [point.reversed() for point in reversed(self.change_points)]
-        return Path(places, points, self.end, self.length)
+        points = [point.reversed() for point in reversed(self.points)]
+        change_points = [point.reversed() for point in reversed(self.change_points)]
+        return Path(points, change_points, self.end, self.length)
 
 
-def walk_both_ways(walker: Walker, start: Place, length: float) -> tuple[Path, Path | None]:
+def track_both_directions(tracker: PathTracker, start: CurvePoint, length: float) -> tuple[Path, Path | None]:
     """Return the path from a place forward, and unless that closes, the one backward."""
-    forward = walk(walker, start, length)
-    return forward, None if forward.end is End.CLOSED else walk(walker, start.reversed(), length)
+    forward = track(tracker, start, length)
+    return forward, None if forward.end is End.CLOSED else track(tracker, start.reversed(), length)
 
 
-def walk(walker: Walker, start: Place, length: float) -> Path:
+def track(tracker: PathTracker, start: CurvePoint, length: float) -> Path:
     """Follow a curve from a place, until it closes, ends, or is as long as asked for."""
-    path, here = Path([start]), start
-    while here.arc_length - start.arc_length < length:
-        ahead = walker.nearing(here)
-        if (found := crossing(walker, here, ahead)) is not None:
-            point, there = found
-            path.change_points.append(point)
-            here = path.places[-1] = here.shortened(PASSAGE_ORDER)
+    path, point = Path([start]), start
+    while point.arc_length - start.arc_length < length:
+        ahead = tracker.singularity_distance(point)
+        if (crossed := crossing(tracker, point, ahead)) is not None:
+            change_point, next_point = crossed
+            path.change_points.append(change_point)
+            point = path.points[-1] = point.shortened(PASSAGE_ORDER)
         else:
-            there = _step(walker, here, abs(ahead))
-            if isinstance(there, End):
-                path.end = there
+            next_point = _next_point(tracker, point, abs(ahead))
+            if isinstance(next_point, End):
+                path.end = next_point
                 break
-        back = _back_at(walker, here, start, there.arc_length - here.arc_length) if len(path.places) > 1 else None
+        reach = next_point.arc_length - point.arc_length
+        back = _closing_step(tracker, point, start, reach) if len(path.points) > 1 else None
         if back is not None:
-            path.end, path.length = End.CLOSED, here.arc_length + back - start.arc_length
+            path.end, path.length = End.CLOSED, point.arc_length + back - start.arc_length
             break
-        path.places.append(there)
-        here = there
+        path.points.append(next_point)
+        point = next_point
     if path.end is not End.CLOSED:
-        path.length = here.arc_length - start.arc_length
+        path.length = point.arc_length - start.arc_length
     return path
 
 
-def nominal(walker: Walker, place: Place) -> float:
+def nominal_step(tracker: PathTracker, point: CurvePoint) -> float:
     """Return the arc length over which the series of a place is good to rounding."""
-    return walker.radius(place) * TAIL ** (1 / ORDER)
+    return tracker.radius(point) * TAIL ** (1 / ORDER)
 
 
-def _step(walker: Walker, here: Place, reach: float) -> Place | End:
+def _next_point(tracker: PathTracker, point: CurvePoint, reach: float) -> CurvePoint | End:
     """Return a place further on, or why there is none."""
-    step = min(nominal(walker, here), PART_OF_WAY * reach)
+    step = min(nominal_step(tracker, point), SHARE_OF_DISTANCE * reach)
     parts = np.arange(1, LANES + 1) / LANES
     end = End.SINGULAR
     if not np.isfinite(step):
         return end
-    bordered = walker.bordered(here.jacobian, walker.tangent(here), here.rows)
+    bordered = tracker.bordered(point.jacobian, tracker.tangent(point), point.rows)
     sign, sizes = np.linalg.slogdet(bordered)[0], np.linalg.svd(bordered, compute_uv=False)
     rounding = ROUNDINGS * np.finfo(float).eps * sizes[0] / max(sizes[-1], np.finfo(float).tiny)
     correction = np.clip(rounding, LARGEST_CORRECTION, LARGEST_DEPARTURE)
     while step > SMALLEST_STEP:
-        points = walker.points(here, step * parts)
-        if np.all(_good(walker, here, points, sign, correction)):
-            return walker.place(points, LANES - 1, here.arc_length + step, here.rows)
+        points = tracker.points(point, step * parts)
+        if np.all(_accepted(tracker, point, points, sign, correction)):
+            return tracker.point_at_lane(points, LANES - 1, point.arc_length + step, point.rows)
         end = End.SINGULAR if np.all(points.admissible) else End.INADMISSIBLE
         step *= 0.5
     return end
 
 
-def _good(
-    walker: Walker, here: Place, points: CurvePoints, sign: float, correction: float
+def _accepted(
+    tracker: PathTracker, point: CurvePoint, points: CurvePoints, sign: float, correction: float
 ) -> Bool[np.ndarray, " lane"]:
     """Tell which points are on the curve that the series describes, and on the same branch of it."""
     good = all_finite(points) & points.admissible & (points.residual <= LARGEST_RESIDUAL)
     good &= (points.first <= LARGEST_DEPARTURE) & (points.last <= correction)
-    return good & (walker.signs(points, here.rows) == sign)
+    return good & (tracker.signs(points, point.rows) == sign)
 
 
-def _back_at(walker: Walker, here: Place, start: Place, stretch: float) -> float | None:
-    """Return how far from here, within a stretch, a curve is back at its start, in the same direction."""
-    step = meets(walker, here, stretch, {name: c[0] for name, c in start.coordinates.items()})
+def _closing_step(tracker: PathTracker, point: CurvePoint, start: CurvePoint, length: float) -> float | None:
+    """Return how far from here, within a length, a curve is back at its start, in the same direction."""
+    step = step_to_configuration(tracker, point, length, {name: c[0] for name, c in start.coordinates.items()})
     if step is None:
         return None
-    if walker.timed and abs(horner(here.value, step) - start.value[0]) > SAME_PLACE * walker.value_scale:
+    if tracker.timed and abs(evaluate_series(point.value, step) - start.value[0]) > NEGLIGIBLE * tracker.value_scale:
         return None
-    ahead, first = (walker.tangent(place)[: walker.columns] for place in (here.recentered(step), start))
+    ahead, first = (tracker.tangent(point)[: tracker.columns] for point in (point.recentered(step), start))
     return step if float(ahead @ first) > 1 - SAME_DIRECTION else None
 
 
-def meets(walker: Walker, here: Place, stretch: float, target: dict[str, np.ndarray]) -> float | None:
-    """Return how far from a place, within a stretch, its curve goes through a configuration, if it does."""
-    if np.max(np.abs(walker.difference(here.at(0.0), target))) > 1.5 * stretch + SAME_PLACE:
+def step_to_configuration(
+    tracker: PathTracker, point: CurvePoint, length: float, target: dict[str, np.ndarray]
+) -> float | None:
+    """Return how far from a place, within a length, its curve goes through a configuration, if it does."""
+    if np.max(np.abs(tracker.difference(point.at(0.0), target))) > 1.5 * length + NEGLIGIBLE:
         return None
     step = 0.0
     for _ in range(MOST_CORRECTIONS):
-        there = here.recentered(step)
-        away = walker.difference({name: c[0] for name, c in there.coordinates.items()}, target)
-        change = float(walker.tangent(there)[: walker.columns] @ away)
+        next_point = point.recentered(step)
+        away = tracker.difference({name: c[0] for name, c in next_point.coordinates.items()}, target)
+        change = float(tracker.tangent(next_point)[: tracker.columns] @ away)
         step -= change
-        if not -stretch <= step <= 2 * stretch:
+        if not -length <= step <= 2 * length:
             return None
         if abs(change) < 1e-14:
             break
-    if not -SAME_PLACE < step <= stretch or np.max(np.abs(walker.difference(here.at(step), target))) > SAME_PLACE:
+    if not -NEGLIGIBLE < step <= length or np.max(np.abs(tracker.difference(point.at(step), target))) > NEGLIGIBLE:
         return None
     return step

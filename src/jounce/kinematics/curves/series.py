@@ -183,11 +183,11 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
     null = factor.solve(jnp.zeros((curve.rows.shape[0] + 1, lanes)).at[-1].set(1.0))
     null = null / jnp.sqrt(jnp.sum(null[:count] ** 2, axis=0, keepdims=True))
     tangent, planar = null[:count], isinstance(pose, PlanarPose)
-    place = pose.position.coefficients[0]
+    point = pose.position.coefficients[0]
     attitude = (pose.angle if planar else pose.quaternion).coefficients[0]
 
-    def program(place: Any, attitude: Any, value: Any) -> Any:
-        return curve.system.residual(_still(place, attitude), Jet([value[None]])).coefficients[0]
+    def program(point: Any, attitude: Any, value: Any) -> Any:
+        return curve.system.residual(_still(point, attitude), Jet([value[None]])).coefficients[0]
 
     def parts(solution: Any) -> Any:
         shift, turn = curve.system.coordinates(solution[:count], shifts)
@@ -197,9 +197,9 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
         return turn[0] if planar else _spun(attitude, turn)
 
     shift, turn, rate = parts(null)
-    recursion = Recursion(program, (place, attitude, value), order)
+    recursion = Recursion(program, (point, attitude, value), order)
     _, history = recursion.advanced(recursion.history, 1, (shift, spun(turn), rate))
-    series = tuple(begun_series([x, y], order) for x, y in ((place, shift), (attitude, spun(turn)), (value, rate)))
+    series = tuple(begun_series([x, y], order) for x, y in ((point, shift), (attitude, spun(turn)), (value, rate)))
     turns, rates = begun_series([turn], order - 1), begun_series([tangent], order - 1)
 
     def level(k: Any, carry: Any) -> Any:
@@ -225,12 +225,12 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
     return {"position": series[0], name: series[1]}, series[2]
 
 
-def _still(place: Any, attitude: Any) -> Any:
+def _still(point: Any, attitude: Any) -> Any:
     """Return the pose of order zero at a place; Euler parameters are of unit length already."""
-    if attitude.ndim < place.ndim:
-        return PlanarPose.from_jets(Jet([place]), Jet([attitude]))
+    if attitude.ndim < point.ndim:
+        return PlanarPose.from_jets(Jet([point]), Jet([attitude]))
     spins, axes = (tuple(Jet([x]) for x in f(attitude)) for f in (quaternion_spins, body_axes))
-    return SpatialPose(Jet([place]), Jet([attitude]), spins, axes, None)
+    return SpatialPose(Jet([point]), Jet([attitude]), spins, axes, None)
 
 
 def _spun(quaternion: Any, turn: Any) -> Any:

@@ -11,7 +11,7 @@ from jounce.errors import MechanismError, MobilityError, SingularityError, check
 from jounce.execution.device import resident
 from jounce.jet import Jet
 from jounce.kinematics.assembly.assemble import check_assembled, freely_moving, settled
-from jounce.kinematics.curves.walker import Place, Walker
+from jounce.kinematics.curves.path_tracker import CurvePoint, PathTracker
 from jounce.mechanism import Mechanism, build, time_grid
 from jounce.modules import with_fields
 from jounce.trajectory import ExpressionMotion
@@ -112,7 +112,7 @@ def first_instant(mechanism: Mechanism) -> float:
     return float(time_grid(mechanism.time, mechanism.parameter_values)[0])
 
 
-def begun(free: Freed, tolerance: float = 1e-12) -> tuple[Walker, Place]:
+def start_of_curve(free: Freed, tolerance: float = 1e-12) -> tuple[PathTracker, CurvePoint]:
     """Return what walks along the curve of a mechanism, and where it starts.
 
     Raises
@@ -132,29 +132,29 @@ def begun(free: Freed, tolerance: float = 1e-12) -> tuple[Walker, Place]:
     check_assembled(model, found, free.value, free=not driven)
     system = resident(with_fields(model.system, row_scale=found.scale[:, None]))
     model = dataclasses.replace(model, system=system)
-    walker = Walker(model, driven, timed=free.driver == TIME)
-    place = walker.placed(found.coordinates, free.value)
-    _check_freedom(walker, place)
-    walker = walker.scaled_at(place)
-    return walker, walker.begun(place)
+    tracker = PathTracker(model, driven, timed=free.driver == TIME)
+    point = tracker.point_without_series(found.coordinates, free.value)
+    _check_freedom(tracker, point)
+    tracker = tracker.scaled_at(point)
+    return tracker, tracker.with_series(point)
 
 
-def _check_freedom(walker: Walker, place: Place) -> None:
+def _check_freedom(tracker: PathTracker, point: CurvePoint) -> None:
     """Raise an error unless there is one direction to go in."""
-    jacobian = place.jacobian
-    null = walker.null_space(jacobian)
+    jacobian = point.jacobian
+    null = tracker.null_space(jacobian)
     if null.shape[1] == 1:
         return
     if not null.shape[1]:
         message = "nothing can move: with the driver free, joints and drivers leave no degree of freedom"
-        raise MobilityError(message if walker.driven else "nothing can move: the joints leave no degree of freedom")
+        raise MobilityError(message if tracker.driven else "nothing can move: the joints leave no degree of freedom")
     missing = jacobian.shape[1] - jacobian.shape[0]
-    if missing > 1 or _unopposed(walker, place, jacobian, null):
+    if missing > 1 or _unopposed(tracker, point, jacobian, null):
         count = null.shape[1]
-        directions = null[: walker.columns].T
+        directions = null[: tracker.columns].T
         message = (
-            f"a curve needs one degree of freedom, and {'with the driver free ' if walker.driven else ''}there are "
-            f"{count}, with which {freely_moving(walker.model, directions)} can move: add drivers, which are held, "
+            f"a curve needs one degree of freedom, and {'with the driver free ' if tracker.driven else ''}there are "
+            f"{count}, with which {freely_moving(tracker.model, directions)} can move: add drivers, which are held, "
             "and name the one that is free"
         )
         raise MobilityError(message)
@@ -164,9 +164,12 @@ def _check_freedom(walker: Walker, place: Place) -> None:
 
 
 def _unopposed(
-    walker: Walker, place: Place, jacobian: Float[np.ndarray, "row column"], null: Float[np.ndarray, "column k"]
+    tracker: PathTracker,
+    point: CurvePoint,
+    jacobian: Float[np.ndarray, "row column"],
+    null: Float[np.ndarray, "column k"],
 ) -> bool:
     """Tell whether the second order leaves all directions of the first."""
-    rows = walker.left_null_space(jacobian)
-    half = walker.second_order(place, null)
+    rows = tracker.left_null_space(jacobian)
+    half = tracker.second_order(point, null)
     return bool(np.max(np.abs(rows.T @ half), initial=0.0) < VANISHING)

@@ -6,8 +6,8 @@ from typing import Any
 
 from jounce.errors import MechanismError
 from jounce.kinematics.curves.curve import Curve
-from jounce.kinematics.curves.path import walk_both_ways
-from jounce.kinematics.curves.start import begun, freed
+from jounce.kinematics.curves.path import track_both_directions
+from jounce.kinematics.curves.start import freed, start_of_curve
 from jounce.mechanism import Mechanism
 
 BRIEF = 0, 2, 200.0
@@ -16,8 +16,8 @@ BRIEF = 0, 2, 200.0
 def traced(mechanism: Mechanism, instant: float, driver: str | None, settings: tuple[int, int, float] = BRIEF) -> Curve:
     """Return the curve through the starting guess: settings are the order, the number of points and the length."""
     free = freed(mechanism, instant, driver)
-    walker, start = begun(free)
-    return Curve(mechanism, free, walker, walk_both_ways(walker, start, settings[2]), settings)
+    tracker, start = start_of_curve(free)
+    return Curve(mechanism, free, tracker, track_both_directions(tracker, start, settings[2]), settings)
 
 
 def check_number(name: str, value: Any, least: Any, most: Any, *, whole: bool = False) -> None:

@@ -213,20 +213,20 @@ def _slider_crank(hinges: list[Hinge], guide: Any, crank: str) -> SliderCrank | 
     (first, second), point_i, point_j, vector = guide
     slider = second if first == GROUND else ""
     closing = [h for h in hinges if slider and slider in h[0]]
-    begun = [h for h in hinges if set(h[0]) == {GROUND, crank}]
-    if len(closing) != 1 or len(begun) != 1:
+    start_of_curve = [h for h in hinges if set(h[0]) == {GROUND, crank}]
+    if len(closing) != 1 or len(start_of_curve) != 1:
         return None
     rod = _other(closing[0], slider)
     between = [h for h in hinges if set(h[0]) == {crank, rod}]
     if len(between) != 1 or GROUND in (rod,):
         return None
-    arm = _on(between[0], crank) - _on(begun[0], crank)
+    arm = _on(between[0], crank) - _on(start_of_curve[0], crank)
     length = float(np.linalg.norm(_on(closing[0], rod) - _on(between[0], rod)))
     if np.max(np.abs(_on(closing[0], slider) - point_j)) > 0:
         return None  # a hinge beside the guide's line: its distance depends on how the slider lies
     along = vector / np.linalg.norm(vector)
     normal = np.array([-along[1], along[0]])
-    eccentricity = float(normal @ (point_i - _on(begun[0], GROUND)))
+    eccentricity = float(normal @ (point_i - _on(start_of_curve[0], GROUND)))
     offset = math.atan2(along[1], along[0]) - math.atan2(arm[1], arm[0])
     return SliderCrank(float(np.linalg.norm(arm)), length, eccentricity, offset)
 

@@ -19,10 +19,16 @@ from jounce.jet.turns import brought_near
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.path_following import PLACES, SMALLEST_STEP, blended_attitudes, is_spoiled_outside
 from jounce.kinematics.continuation.solver import Solver
-from jounce.kinematics.continuation.step_control import Place, StepLimits, StopReason, step_on, steps_begin
+from jounce.kinematics.continuation.step_control import (
+    ExpansionPoint,
+    StepLimits,
+    StopReason,
+    initial_control,
+    next_controls,
+)
 from jounce.kinematics.families.design_assembly import Coordinates
 from jounce.kinematics.families.design_values import Designs
-from jounce.kinematics.position_analysis.rooms import Room, solve_in_rooms
+from jounce.kinematics.position_analysis.solve_buffers import SolveBuffer, solve_in_buffers
 from jounce.kinematics.status import Status
 from jounce.mechanism.axis_angles import measures_angle, raw_angles
 from jounce.mechanism.turn_counting import counted_along
@@ -120,14 +126,18 @@ class DesignPaths:
         limits = StepLimits(np.asarray(last), np.asarray(SMALLEST_STEP * (last - first)))
         known = solver.needed(solver.still({name: x[..., lanes] for name, x in coordinates.items()}))
         start = np.full(len(lanes), first)
-        control = steps_begin(Place(start, *[np.full(len(lanes), x) for x in (np.inf, np.inf, 0.0)]), start)
-        decide = step_on.program(limits, jax.tree.map(lambda x: x[:1], (control, control.crawled, control.place)))
+        control = initial_control(
+            ExpansionPoint(start, *[np.full(len(lanes), x) for x in (np.inf, np.inf, 0.0)]), start
+        )
+        decide = next_controls.program(
+            limits, jax.tree.map(lambda x: x[:1], (control, control.crawled, control.expansion_point))
+        )
         for _ in range(MOST_STEPS):
             if not lanes.size:
                 return found
-            away, own = control.target - control.place.instant, self.designs.own(lanes)
+            away, own = control.target - control.expansion_point.instant, self.designs.own(lanes)
             arrival = solver.program((known, away, control.target, own, np.ones(len(lanes), bool)))
-            there: Any = Place(control.target, arrival.safe_step, arrival.radius, arrival.det_rate)
+            there: Any = ExpansionPoint(control.target, arrival.safe_step, arrival.radius, arrival.det_rate)
             begins: Any = control.step == 0
             control, taken = decide((control, arrival.status, there))
             unlike = taken & ((arrival.status != Status.OK) | is_spoiled_outside(there, begins, last))
@@ -154,7 +164,7 @@ class DesignPaths:
         designs = np.flatnonzero(~self.apart)
         if not designs.size:
             return [], status
-        levels, width = self.solver.wanted + 1, self.solver.program.width
+        levels, width = self.solver.finite_order + 1, self.solver.program.width
         size = min(max(1, self.solver.longest_stride * width // times), len(designs))
         size -= size % width if size > width else 0
         items: list[tuple[Group, Indices]] = []
@@ -167,8 +177,8 @@ class DesignPaths:
         like = self._groups[0].steps[0].state
         wholes = [np.full((levels, *x.shape[1:-1], count, times), np.nan) for x in like[1]]
 
-        def new() -> Room:
-            return Room(self.solver, like, size * times, most)
+        def new() -> SolveBuffer:
+            return SolveBuffer(self.solver, like, size * times, most)
 
         def put(item: tuple[Group, Indices], state: SolvedState, outcome: Indices) -> None:
             block = item[1]
@@ -180,7 +190,7 @@ class DesignPaths:
                 whole[..., block, :] = self._as_given(values, block)
 
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
-            for _ in solve_in_rooms(new, items, self._begin, put, pool.map):
+            for _ in solve_in_buffers(new, items, self._begin, put, pool.map):
                 pass
         outputs = [[np.transpose(x, (2, 3, 0, 1)) for x in np.moveaxis(whole, 2, 0)] for whole in wholes]
         for group in self._groups:
@@ -197,25 +207,25 @@ class DesignPaths:
         rank = self._rank[block]
         return np.take_along_axis(values, rank.reshape(*[1] * (values.ndim - 2), *rank.shape), axis=-1)
 
-    def _begin(self, room: Room, item: tuple[Group, Indices]) -> int:
-        """Have a room take up all instants of some designs; they start from the one before, or the nearest anchor."""
+    def _begin(self, buffer: SolveBuffer, item: tuple[Group, Indices]) -> int:
+        """Load all instants of some designs; each starts from the one before, or from the nearest anchor."""
         group, block = item
         instants = self._instants[block]
         count, times = instants.shape
-        pieces = min(max(1, room.width // count), times)  # of a motion, so that lanes are in use
+        pieces = min(max(1, buffer.width // count), times)  # of a motion, so that lanes are in use
         length = -(-times // pieces)
         owner, at, parts, order = group.anchors_of(block)
-        room.put_anchors(parts)
+        buffer.put_anchors(parts)
         nearest = _nearest(owner[order], at[order], instants, self._ends)
         to_anchor = instants - at[order][nearest]
         to_one_before = np.diff(instants, axis=1, prepend=np.inf)
         to_one_before[:, ::length] = np.inf
         near = np.abs(to_one_before) <= np.abs(to_anchor)
         before = np.arange(-1, count * times - 1).reshape(count, times)
-        source = np.where(near, before, room.size + order[nearest])
+        source = np.where(near, before, buffer.size + order[nearest])
         step = np.where(near, to_one_before, to_anchor)
         own = {k: np.repeat(x, times, axis=-1) for k, x in self.designs.own(block).items()}
-        room.take_up(instants.ravel(), (source.ravel(), step.ravel()), _rounds(count, times, length, room.width), own)
+        buffer.load(instants.ravel(), (source.ravel(), step.ravel()), _rounds(count, times, length, buffer.width), own)
         return count * times
 
     def _count_turns(self, outputs: list[list[np.ndarray]], group: Group, designs: Indices) -> None:

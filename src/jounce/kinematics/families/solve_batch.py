@@ -27,7 +27,7 @@ from jounce.mechanism import (
     build,
     check_mechanism,
     time_grid,
-    with_outputs_held,
+    with_output_drivers,
 )
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.carriages import has_ends
@@ -200,7 +200,7 @@ class _Family:
         progress: Callable[[int, int], None] | None,
     ):
         self.mechanism, self.names, self.rows, self.instants = mechanism, names, rows, instants
-        self.held = with_outputs_held(mechanism)  # what is solved side by side
+        self.held = with_output_drivers(mechanism)  # what is solved side by side
         self.order, self.tolerance, self.progress = order, tolerance, progress
         self.outputs: dict[str, np.ndarray] = {}
         self._take(np.zeros((len(rows), 0)), np.zeros((len(rows), 0)))
@@ -354,7 +354,7 @@ class _Family:
     ) -> Int[np.ndarray, " design"]:
         """Follow designs side by side and keep what comes of them; return which are left to be solved alone."""
         solver = Solver(
-            designs.model, levels, self.tolerance, refine=True, wanted=self.order, own=designs.own(slice(1))
+            designs.model, levels, self.tolerance, refine=True, finite_order=self.order, own=designs.own(slice(1))
         )
         paths = DesignPaths(solver, designs, self.all_instants[chosen], float(self.instants[-1]))
         paths.follow(coordinates, plain, threads)

@@ -1,4 +1,4 @@
-"""A motion over more instants than fit into memory: solved stretch by stretch, each of them a motion of its own."""
+"""A motion over more instants than fit into memory: solved chunk by chunk, each chunk a motion."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -8,7 +8,7 @@ import numpy as np
 from jounce.kinematics.continuation.path_following import FollowedPath
 from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.position_analysis import grid_storage
-from jounce.kinematics.position_analysis.grid_storage import stretches
+from jounce.kinematics.position_analysis.grid_storage import solved_chunks
 from jounce.kinematics.results.actuation import actuated
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
@@ -17,8 +17,8 @@ from jounce.mechanism.belts import check_room
 from jounce.mechanism.time import Instants, instants_of
 
 
-class Stretches:
-    """The motion of a mechanism, of which each stretch is solved when it is iterated over, and none is kept.
+class ChunkedMotion:
+    """The motion of a mechanism in chunks: iterating solves them one after another, and none stays in memory.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Stretches:
     order : int
         Highest derivative of the outputs.
     status : numpy.ndarray of int8, shape (time,)
-        Outcome at each instant of the stretches so far, see `Status`; OK at those to come.
+        Outcome at each instant of the chunks so far, see `Status`; OK at those to come.
     faults : dict of int to str
         For the instants that failed so far, by index, as those of a `Motion`.
     change_points : numpy.ndarray of shape (points,)
@@ -39,7 +39,7 @@ class Stretches:
     backend : str
         Which arithmetic gives the numbers, as that of a `Motion`.
     derived : dict
-        What was computed of the stretches and may be wanted again, by name.
+        Values computed from the chunks that may be needed again, by name.
     """
 
     def __init__(
@@ -66,9 +66,9 @@ class Stretches:
         return len(self.time)
 
     def __iter__(self) -> Iterator[Motion]:
-        """Solve and yield one stretch after another; the results of an instant are those of `jounce.solve`."""
+        """Solve and yield one chunk after another; the results of an instant are those of `jounce.solve`."""
         history, model = self._path.history(), self._solver.model
-        for first, part in stretches(self._solver, self._path, self.time, self._progress, self._threads):
+        for first, part in solved_chunks(self._solver, self._path, self.time, self._progress, self._threads):
             failed = np.flatnonzero(part.status != Status.OK)
             self.status[first + failed] = part.status[failed]
             self.faults |= {first + lane: fault for lane, fault in part.faults.items()}
@@ -78,8 +78,8 @@ class Stretches:
             yield motion
 
 
-def takes_stretches(mechanism: Mechanism) -> bool:
-    """Tell whether the time grid of a mechanism is longer than one stretch."""
+def needs_chunks(mechanism: Mechanism) -> bool:
+    """Tell whether the time grid of a mechanism is longer than one chunk."""
     if mechanism.time is None:
         return False  # which a solve complains of
-    return len(instants_of(mechanism.time, mechanism.parameter_values)) > grid_storage.STRETCH
+    return len(instants_of(mechanism.time, mechanism.parameter_values)) > grid_storage.CHUNK

@@ -102,9 +102,9 @@ def cut_at_ends(path: FollowedPath, model: Model, grid: Float[np.ndarray, " time
             continue
         path.anchors = [anchor for anchor in path.anchors if anchor.instant <= instant] or path.anchors[:1]
         path.change_points = [point for point in path.change_points if point.instant <= instant]
-        path.on_the_way = [
+        path.solved_instants = [
             (lanes[kept], jax.tree.map(lambda x, kept=kept: x[..., kept], state))
-            for lanes, state in path.on_the_way
+            for lanes, state in path.solved_instants
             for kept in [grid[lanes] < instant]
         ]
         path.ended(Status.END_OF_CURVE, instant, ends.words(beyond_high))

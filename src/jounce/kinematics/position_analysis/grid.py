@@ -33,7 +33,7 @@ Indices = Int[np.ndarray, " lane"]
 
 
 class GridSolver:
-    """The instants of a time grid, or of a stretch of one, solved from the anchors of a path that lasts for a span, s.
+    """The instants of a time grid, or of a chunk of one, solved from the anchors of a path that lasts for a span, s.
 
     Attributes
     ----------
@@ -55,8 +55,8 @@ class GridSolver:
         self._anchors = path.anchors_around(time[0], time[-1])
         self._instants = np.concatenate([time, [anchor.instant for anchor in self._anchors]])
         self._reached = time < path.ended_at
-        self._store = room_for(self._anchors[0].state, len(self._instants))
-        for lanes, _ in path.on_the_way:
+        self._store = empty_state(self._anchors[0].state, len(self._instants))
+        for lanes, _ in path.solved_instants:
             self.status[lanes] = Status.OK
 
     @property
@@ -76,7 +76,7 @@ class GridSolver:
         stride = stride_of(self.solver, int(np.count_nonzero(left)), count, len(self._anchors))
         done = count - int(np.count_nonzero(left))
 
-        def tell(solved: int) -> None:
+        def report(solved: int) -> None:
             nonlocal done
             done = min(done + solved, count)
             if progress is not None:
@@ -84,16 +84,16 @@ class GridSolver:
 
         with Threads(threads, compiled=self.solver.is_compiled) as pool:
             if count > LONG_GRID:
-                left = self._in_blocks(left, stride, pool, tell)
-            if self.path.on_the_way or left.any() or not self._reached.all():
-                self._place_known()
+                left = self._in_blocks(left, stride, pool, report)
+            if self.path.solved_instants or left.any() or not self._reached.all():
+                self._insert_anchors()
             size = self.solver.together if count > LONG_GRID else SMALL_BATCH
-            for lanes in _in_turn(left, stride):
+            for lanes in _levels(left, stride):
                 source = self._sources(lanes, stride)
                 batches = [(lanes[k : k + size], source[k : k + size]) for k in range(0, len(lanes), size)]
-                for (batch, _), arrival in zip(batches, pool.map(self._solved, batches), strict=True):
-                    self._take(batch, arrival)
-                    tell(len(batch))
+                for (batch, _), arrival in zip(batches, pool.map(self._solve_batch, batches), strict=True):
+                    self._finish_batch(batch, arrival)
+                    report(len(batch))
         for point in self.path.change_points:
             self._bridge(point)
         for point in self.path.singular_positions_outside():
@@ -104,7 +104,7 @@ class GridSolver:
             progress(count, count)
 
     def _in_blocks(
-        self, left: Bool[np.ndarray, " time"], stride: int, pool: Threads, tell: Callable[[int], None]
+        self, left: Bool[np.ndarray, " time"], stride: int, pool: Threads, report: Callable[[int], None]
     ) -> Bool[np.ndarray, " time"]:
         """Solve instants in rounds; return what is left: those that failed, and what starts from them.
 
@@ -112,16 +112,16 @@ class GridSolver:
         """
         count = int(np.count_nonzero(left))  # a long grid is reached up to some instant, and nothing is solved yet
 
-        def put(place: slice, state: SolvedState, status: Indices) -> None:
-            self._keep(place, state)
-            self.status[place] = status
+        def put(lanes: slice, state: SolvedState, status: Indices) -> None:
+            self._store_lanes(lanes, state)
+            self.status[lanes] = status
 
         blocks = blocks_for(self.solver, 0, count, stride)
         for solved in solve_blocks(self.solver, self.path, self.time, blocks, put, pool.map):
-            tell(solved)
+            report(solved)
         failed = left & (self.status != Status.OK)
         if failed.any():
-            for lanes in _in_turn(left, stride):
+            for lanes in _levels(left, stride):
                 neighbor, known = neighbors(lanes, stride)
                 failed[lanes] |= failed[neighbor] & known
         return failed
@@ -135,15 +135,15 @@ class GridSolver:
         nearer = np.abs(time - self._instants[neighbor]) <= np.abs(time - self._instants[nearest])
         return np.where(nearer & known, neighbor, nearest)
 
-    def _solved(self, batch: tuple[Indices, Indices]) -> StepResult:
+    def _solve_batch(self, batch: tuple[Indices, Indices]) -> StepResult:
         """Return what comes of a batch of instants, with their sources; nothing is kept but the state at its lanes."""
         lanes, source = batch
         known = jax.tree.map(lambda x: x[..., source], self.solver.needed(self._store))
         arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
-        self._keep(lanes, arrival.state(slice(None)))
+        self._store_lanes(lanes, arrival.state(slice(None)))
         return arrival
 
-    def _take(self, lanes: Indices, arrival: StepResult) -> None:
+    def _finish_batch(self, lanes: Indices, arrival: StepResult) -> None:
         """Keep the outcome of a batch, and follow the motion to the instants that failed."""
         self.status[lanes] = arrival.status
         for k in np.flatnonzero(arrival.status != Status.OK).tolist():
@@ -151,19 +151,19 @@ class GridSolver:
             if arrival.status[k] not in PASSABLE:
                 self._rescue(int(lanes[k]))
 
-    def _place_known(self) -> None:
+    def _insert_anchors(self) -> None:
         """Put the anchors behind the instants, those solved on the way among them, and zeros where none is reached."""
         count, reached = len(self.time), int(np.count_nonzero(self._reached))
 
-        def place(whole: np.ndarray, *parts: np.ndarray) -> None:
+        def insert(whole: np.ndarray, *parts: np.ndarray) -> None:
             whole[..., reached:count] = 0
             whole[..., count : len(self._instants)] = np.concatenate(parts, axis=-1)
 
-        jax.tree.map(place, self._store, *(anchor.state for anchor in self._anchors))
-        for lanes, state in self.path.on_the_way:
-            self._keep(lanes, state)
+        jax.tree.map(insert, self._store, *(anchor.state for anchor in self._anchors))
+        for lanes, state in self.path.solved_instants:
+            self._store_lanes(lanes, state)
 
-    def _keep(self, lanes: slice | Indices, state: SolvedState) -> None:
+    def _store_lanes(self, lanes: slice | Indices, state: SolvedState) -> None:
         def put(whole: np.ndarray, part: np.ndarray) -> None:
             whole[..., lanes] = part
 
@@ -180,7 +180,7 @@ class GridSolver:
         elif len(local.anchors) > 1:
             self.status[lane] = local.anchors[-1].status
             self.faults.pop(lane)
-            self._keep(slice(lane, lane + 1), local.anchors[-1].state)
+            self._store_lanes(slice(lane, lane + 1), local.anchors[-1].state)
 
     def _bridge(self, point: ChangePoint) -> None:
         """Replace the instants next to a change point, and the one at it, by what the motion on both sides gives."""
@@ -201,7 +201,7 @@ class GridSolver:
         self.status[lanes] = Status.OK
         for lane in lanes.tolist():
             self.faults.pop(lane, None)
-        self._keep(lanes, (*state, self._store[2][lanes]))
+        self._store_lanes(lanes, (*state, self._store[2][lanes]))
 
     def _refuse(self, lanes: Bool[np.ndarray, " time"]) -> None:
         self.status[lanes & (self.status == Status.OK)] = Status.SINGULAR
@@ -216,12 +216,12 @@ class GridSolver:
             self.status[lost], self.faults[lost] = Status.INADMISSIBLE, self.solver.fault(arrival, 0)
 
 
-def room_for(state: Any, lanes: int) -> Any:
+def empty_state(state: Any, lanes: int) -> Any:
     """Return arrays for the states of so many instants and anchors; whoever solves an instant is first to touch it."""
     return jax.tree.map(lambda x: np.empty((*x.shape[:-1], lanes)), state)
 
 
-def _in_turn(left: Bool[np.ndarray, " time"], stride: int) -> Iterator[Indices]:
+def _levels(left: Bool[np.ndarray, " time"], stride: int) -> Iterator[Indices]:
     """Yield instants in groups, each after what it starts from: the number of ones in an index says how far down."""
     lanes = np.flatnonzero(left)
     depth = np.bitwise_count(lanes & (stride - 1))

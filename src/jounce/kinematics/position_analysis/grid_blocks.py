@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int
 
 from jounce.kinematics.continuation.path_following import Anchor, FollowedPath
 from jounce.kinematics.continuation.solver import SMALL_BATCH, Solver
-from jounce.kinematics.position_analysis.rooms import Room, solve_in_rooms
+from jounce.kinematics.position_analysis.solve_buffers import SolveBuffer, solve_in_buffers
 from jounce.mechanism.time import nearest_instants
 
 Indices = Int[np.ndarray, " lane"]
@@ -115,16 +115,16 @@ def _neighbors(count: int, stride: int) -> tuple[Indices, Bool[np.ndarray, " lan
     return neighbors(np.arange(count), stride)
 
 
-def _begin(room: Room, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
-    """Have a room take up the instants of a block, s, with the anchors around it."""
-    room.put_anchors(zip(*(jax.tree.leaves(anchor.state) for anchor in anchors), strict=True))
+def _begin(buffer: SolveBuffer, time: Float[np.ndarray, " time"], anchors: Sequence[Anchor], stride: int) -> None:
+    """Load the instants of a block, s, and the anchors around it into a buffer."""
+    buffer.put_anchors(zip(*(jax.tree.leaves(anchor.state) for anchor in anchors), strict=True))
     neighbor, known = _neighbors(len(time), stride)
     instants = np.array([anchor.instant for anchor in anchors])
     nearest = nearest_instants(instants, time)
     to_neighbor, to_anchor = time - time[neighbor], time - instants[nearest]
     near = known & (np.abs(to_neighbor) <= np.abs(to_anchor))
-    sources = np.where(near, neighbor, room.size + nearest), np.where(near, to_neighbor, to_anchor)
-    room.take_up(time, sources, rounds(len(time), stride, room.width))
+    sources = np.where(near, neighbor, buffer.size + nearest), np.where(near, to_neighbor, to_anchor)
+    buffer.load(time, sources, rounds(len(time), stride, buffer.width))
 
 
 def solve_blocks(
@@ -159,11 +159,13 @@ def solve_blocks(
     around = {block: path.anchors_around(time[block.first], time[block.first + block.count - 1]) for block in blocks}
     most = max(map(len, around.values()), default=0)
 
-    def begin(room: Room, block: Block) -> int:
-        _begin(room, time[block.place], around[block], block.stride)
+    def begin(buffer: SolveBuffer, block: Block) -> int:
+        _begin(buffer, time[block.place], around[block], block.stride)
         return block.count
 
     def put_block(block: Block, state: Any, status: Indices) -> None:
         put(block.place, state, status)
 
-    return solve_in_rooms(lambda: Room(solver, path.anchors[0].state, size, most), blocks, begin, put_block, each)
+    return solve_in_buffers(
+        lambda: SolveBuffer(solver, path.anchors[0].state, size, most), blocks, begin, put_block, each
+    )

@@ -1,4 +1,4 @@
-"""Time grids of any length, solved stretch by stretch, so that no more is kept of each than what is asked for."""
+"""Time grids of any length, solved chunk by chunk, so that only the requested results of each stay in memory."""
 
 import itertools
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -13,12 +13,12 @@ from jounce.kinematics.continuation.change_points import half_width, spoiled_wid
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
 from jounce.kinematics.continuation.path_following import FollowedPath
 from jounce.kinematics.continuation.solver import Solver
-from jounce.kinematics.position_analysis.grid import GridSolver, room_for
+from jounce.kinematics.position_analysis.grid import GridSolver, empty_state
 from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID, blocks_for, solve_blocks, stride_of
 from jounce.kinematics.status import Status
 from jounce.mechanism.time import Instants
 
-STRETCH = 2**16  # instants
+CHUNK = 2**16  # instants
 
 
 class Solved(NamedTuple):
@@ -64,16 +64,16 @@ def solve_grid(
     threads : int
         That solve batches.
     keep : bool, optional
-        Whether the jets of all bodies are kept; where they fit into one stretch, unless given. They are computed again
+        Whether the jets of all bodies are kept; where they fit into one chunk, unless given. They are computed again
         when they are asked for.
     """
-    kept = len(time) <= STRETCH if keep is None else keep
+    kept = len(time) <= CHUNK if keep is None else keep
     status, faults = np.empty(len(time), int), {}
-    store = None if len(time) <= STRETCH else _Store(path.anchors[0].state, len(time), kept=kept)
-    tell = None if progress is None else _rising(progress)
-    solved = frozenset() if store is None else _solved_at_once(solver, path, time, tell, threads, (store, status))
+    store = None if len(time) <= CHUNK else _Store(path.anchors[0].state, len(time), kept=kept)
+    report = None if progress is None else _without_decrease(progress)
+    solved = frozenset() if store is None else _solved_at_once(solver, path, time, report, threads, (store, status))
     state: Any = None
-    for first, part in stretches(solver, path, time, tell, threads, solved):
+    for first, part in solved_chunks(solver, path, time, report, threads, solved):
         status[first : first + len(part.time)] = part.status
         faults |= {first + lane: fault for lane, fault in part.faults.items()}
         if store is None:
@@ -86,16 +86,16 @@ def solve_grid(
     return Solved(lambda: _coordinates(solver, path, time, threads), outputs, status, faults)
 
 
-def _rising(progress: Callable[[int, int], None]) -> Callable[[int, int], None]:
+def _without_decrease(progress: Callable[[int, int], None]) -> Callable[[int, int], None]:
     """Return what tells the progress, where some instants may be solved twice: it never goes back."""
     furthest = 0
 
-    def tell(done: int, total: int) -> None:
+    def report(done: int, total: int) -> None:
         nonlocal furthest
         furthest = max(furthest, done)
         progress(furthest, total)
 
-    return tell
+    return report
 
 
 def _solved_at_once(
@@ -106,17 +106,17 @@ def _solved_at_once(
     threads: int,
     results: "tuple[_Store, Int[np.ndarray, ' time']]",
 ) -> frozenset[int]:
-    """Solve all stretches in which nothing out of the ordinary is known, so that no thread waits at the end of one.
+    """Solve all chunks without known singular positions at once, so that no thread waits at the end of one.
 
     Returns the first instants of those in which all are OK; the others are still to be solved, one after another.
     """
     (store, status), blocks = results, {}
-    if path.on_the_way:
+    if path.solved_instants:
         return frozenset()
     points = [(point, half_width(point, solver.order)) for point in path.change_points]
     points += [(point, spoiled_width(point, solver.order)) for point in path.singular_positions_outside()]
-    for first in range(0, len(time), STRETCH):
-        here = time[first : first + STRETCH]
+    for first in range(0, len(time), CHUNK):
+        here = time[first : first + CHUNK]
         begin, end, count = here[0], here[-1], len(here)
         near = any(begin - width < point.instant < end + width for point, width in points)
         if count > LONG_GRID and end < path.ended_at and not near:
@@ -124,26 +124,26 @@ def _solved_at_once(
             blocks[first] = blocks_for(solver, first, count, stride)
     done, wanted = 0, [*itertools.chain(*blocks.values())]
 
-    def put(place: slice, state: SolvedState, outcome: Int[np.ndarray, " lane"]) -> None:
-        store.put(place, *state[:2], series=True)
-        status[place] = outcome
+    def put(lanes: slice, state: SolvedState, outcome: Int[np.ndarray, " lane"]) -> None:
+        store.put(lanes, *state[:2], series=True)
+        status[lanes] = outcome
 
     with Threads(threads, compiled=solver.is_compiled) as pool:
         for solved in solve_blocks(solver, path, time, wanted, put, pool.map):
             done += solved
             if progress is not None:
                 progress(done, len(time))
-    return frozenset(first for first in blocks if np.all(status[first : first + STRETCH] == Status.OK))
+    return frozenset(first for first in blocks if np.all(status[first : first + CHUNK] == Status.OK))
 
 
 class _Store:
-    """Arrays for the states of all instants of a grid of several stretches: of outputs and, if kept, of coordinates."""
+    """Arrays for the states of all instants of a grid of several chunks: of outputs and, if kept, of coordinates."""
 
     def __init__(self, like: SolvedState, count: int, *, kept: bool):
-        self.state: Any = room_for((like[0] if kept else {}, like[1]), count)
+        self.state: Any = empty_state((like[0] if kept else {}, like[1]), count)
 
     def put(
-        self, place: slice, coordinates: Mapping[str, Any], outputs: Sequence[Any], *, series: bool = False
+        self, lanes: slice, coordinates: Mapping[str, Any], outputs: Sequence[Any], *, series: bool = False
     ) -> None:
         """Take over some instants: jets of the coordinates, and derivatives of the outputs, or their series.
 
@@ -151,13 +151,13 @@ class _Store:
         """
         kept, shown = self.state
         for name, whole in kept.items():
-            whole[..., place] = coordinates[name]
+            whole[..., lanes] = coordinates[name]
         for whole, part in zip(shown, outputs, strict=True):
             if series:
                 with np.errstate(over="ignore"):
-                    plain_derivatives(part, out=whole[..., place])
+                    plain_derivatives(part, out=whole[..., lanes])
             else:
-                whole[..., place] = part
+                whole[..., lanes] = part
 
 
 def _coordinates(
@@ -168,7 +168,7 @@ def _coordinates(
     return found
 
 
-def stretches(
+def solved_chunks(
     solver: Solver,
     path: FollowedPath,
     time: Instants,
@@ -176,19 +176,19 @@ def stretches(
     threads: int,
     without: Collection[int] = (),
 ) -> Iterator[tuple[int, GridSolver]]:
-    """Yield the stretches of a grid one after another, solved, with the index of their first instant.
+    """Yield the solved chunks of a grid one after another, with the index of their first instant.
 
     Those that are solved already are left out, by their first instants.
     """
-    for first in range(0, len(time), STRETCH):
+    for first in range(0, len(time), CHUNK):
         if first in without:
             continue
 
-        def told(done: int, _: int, first: int = first) -> None:
+        def report(done: int, _: int, first: int = first) -> None:
             if progress is not None:
                 progress(first + done, len(time))
 
         before = time[first - 1] if first else -np.inf
-        part = GridSolver(solver, path, time[first : first + STRETCH], time[-1] - time[0])
-        part.solve(None if progress is None else told, threads, explain=bool(before < path.ended_at))
+        part = GridSolver(solver, path, time[first : first + CHUNK], time[-1] - time[0])
+        part.solve(None if progress is None else report, threads, explain=bool(before < path.ended_at))
         yield first, part

@@ -20,7 +20,7 @@ from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.assembly.idle_motions import IdleMotions
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
-from jounce.mechanism import AbstractQuantity, Mechanism, build, with_outputs_held
+from jounce.mechanism import AbstractQuantity, Mechanism, build, with_output_drivers
 from jounce.mechanism.preconditions import holds_tracer
 from jounce.mechanism.time import instants_of
 
@@ -107,7 +107,7 @@ def with_idle_held_in_family(
 
     Outputs of the designs given are checked not to depend on them.
     """
-    model, first = build(with_outputs_held(designs[0])), float(instants[0])
+    model, first = build(with_output_drivers(designs[0])), float(instants[0])
     rows, columns = model.system.shape
     if rows >= columns:
         return mechanism

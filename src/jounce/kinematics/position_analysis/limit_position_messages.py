@@ -10,8 +10,8 @@ from jounce.kinematics.curves.curve import posed
 from jounce.kinematics.curves.start import TIME, law_values
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
-from jounce.mechanism import with_outputs_held
-from jounce.mechanism.held_outputs import led_outputs
+from jounce.mechanism import with_output_drivers
+from jounce.mechanism.output_drivers import output_laws
 
 ENDS = (Status.SINGULAR, Status.NOT_CONVERGED, Status.COLLAPSED)
 LENGTH = 40.0  # of the curve, looked at for where the other branch leads
@@ -23,7 +23,7 @@ def dead_end_words(motion: Motion, index: int) -> str:
 
     The curve of configurations is traced from the last instant that was solved.
     """
-    mechanism = with_outputs_held(motion.mechanism)
+    mechanism = with_output_drivers(motion.mechanism)
     drivers = mechanism.drivers
     if not drivers or index == 0 or motion.status[index] not in ENDS or motion.status[index - 1] != Status.OK:
         return ""
@@ -47,7 +47,7 @@ def dead_end_words(motion: Motion, index: int) -> str:
             f"its drivers lead it to a dead point at t = {value:.9g} s, where {told}: from there they can only go back"
         )
     far = "" if other is None else f", on another branch, which leads to {_words(other, curve.unit)}"
-    led = led_outputs(motion.mechanism)
+    led = output_laws(motion.mechanism)
     if name in led:
         return (
             f"{led[name].output} can go no further than {_words(value, curve.unit)}: there it says nothing of the "

@@ -17,7 +17,7 @@ from jounce.kinematics.assembly.assemble import assemble
 from jounce.kinematics.continuation.path_following import FollowedPath, follow
 from jounce.kinematics.continuation.solver import NO_GRID, Solver
 from jounce.kinematics.curves.choice import chosen
-from jounce.kinematics.position_analysis.chunked_motion import Stretches
+from jounce.kinematics.position_analysis.chunked_motion import ChunkedMotion
 from jounce.kinematics.position_analysis.curve_ends import beyond_end, cut_at_ends
 from jounce.kinematics.position_analysis.grid_blocks import LONG_GRID
 from jounce.kinematics.position_analysis.grid_storage import solve_grid
@@ -35,13 +35,13 @@ from jounce.mechanism import (
     build,
     check_mechanism,
     time_grid,
-    with_outputs_held,
+    with_output_drivers,
 )
 from jounce.mechanism.axis_angles import AttitudeHistory, lost_count
 from jounce.mechanism.belts import check_room
 from jounce.mechanism.builder import group_rows
-from jounce.mechanism.held_outputs import led_outputs
 from jounce.mechanism.law_checks import check_laws
+from jounce.mechanism.output_drivers import output_laws
 from jounce.mechanism.preconditions import check_holonomic, concrete, concrete_or
 from jounce.mechanism.time import Instants, TimeLike, instants_of
 
@@ -163,7 +163,7 @@ def solve(
 
 @holding_idle(lambda: solve)
 @concrete
-def solve_in_stretches(
+def solve_in_chunks(
     mechanism: Mechanism,
     time: TimeLike | None = None,
     order: int = 4,
@@ -172,10 +172,10 @@ def solve_in_stretches(
     refine: bool = True,
     progress: Callable[[int, int], None] | None = None,
     threads: int | None = None,
-) -> Stretches:
-    """Follow a motion as `jounce.solve` does, and solve its instants stretch by stretch, as many as are asked for.
+) -> ChunkedMotion:
+    """Follow a motion as `jounce.solve` does, and solve its instants chunk by chunk, as many as are asked for.
 
-    What is in memory at a time is one stretch, of 65,536 instants, and what following the motion takes, which grows
+    What is in memory at a time is one chunk, of 65,536 instants, and what following the motion takes, which grows
     with how far the mechanism moves, not with the number of instants.
 
     Parameters
@@ -185,20 +185,20 @@ def solve_in_stretches(
 
     Returns
     -------
-    Stretches
-        An iterable of motions; an instant that fails is NaN in its stretch, and nothing is raised for it.
+    ChunkedMotion
+        An iterable of motions; an instant that fails is NaN in its chunk, and nothing is raised for it.
 
     Raises
     ------
     MechanismError, AssemblyError, MobilityError, SolveError
-        As `jounce.solve`, of what is known before the first stretch.
+        As `jounce.solve`, of what is known before the first chunk.
 
     Examples
     --------
     >>> import jounce as jn
-    >>> from jounce.kinematics import solve_in_stretches
+    >>> from jounce.kinematics import solve_in_chunks
     >>> fine = jn.TimeGrid(start=0, stop=2, count=100_001)
-    >>> motion = solve_in_stretches(jn.load("examples/four_bar.yaml"), fine, order=1)
+    >>> motion = solve_in_chunks(jn.load("examples/four_bar.yaml"), fine, order=1)
     >>> [(len(part.time), round(float(part.outputs["psi"][:, 0].max()), 4)) for part in motion]
     [(65536, 2.6022), (34465, 2.6436)]
     """
@@ -206,7 +206,7 @@ def solve_in_stretches(
     count = thread_count(threads)
     instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
     found = _followed(mechanism, instants, order, tolerance, refine=refine)
-    return Stretches(mechanism, found, instants, order, progress, count, _backend(*found, instants))
+    return ChunkedMotion(mechanism, found, instants, order, progress, count, _backend(*found, instants))
 
 
 def checked_settings(mechanism: Mechanism, order: Any, tolerance: float) -> int:
@@ -234,7 +234,7 @@ def _followed(
     lost = lost_orders(mechanism)
     of_forces = any(output.of_forces for output in mechanism.outputs.values())
     check_laws(mechanism, np.array([first, last]), order + lost, forces=of_forces)
-    guessed = build(chosen(with_outputs_held(mechanism), first))
+    guessed = build(chosen(with_output_drivers(mechanism), first))
     expect(len(instants))
     solver = Solver(guessed, max(order + lost, LOWEST_ORDER), float(tolerance), refine, order, is_wanted_soon())
     if not guessed.system.rank_is_open:  # else its program depends on the assembled bodies
@@ -242,7 +242,7 @@ def _followed(
     try:
         model, coordinates = assemble(guessed, first, tolerance)
     except (AssemblyError, MobilityError) as error:
-        for name, motion in led_outputs(mechanism).items():
+        for name, motion in output_laws(mechanism).items():
             error.message += f"; the driver {name} follows from the output {motion.output}, which must determine it"
         raise
     if beyond := beyond_end(model, coordinates):
@@ -251,10 +251,10 @@ def _followed(
     prepare_outputs(mechanism, model, solver.order)
     solver = dataclasses.replace(solver, model=model)
     start = solver.beginning(solver.still(coordinates), first)
-    on_the_way = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
-    path = follow(solver, start, last, last - first, grid=on_the_way)
+    solved_instants = np.asarray(instants) if len(instants) <= LONG_GRID else NO_GRID
+    path = follow(solver, start, last, last - first, grid=solved_instants)
     if path.anchors:
-        path = cut_at_ends(path, model, on_the_way)
+        path = cut_at_ends(path, model, solved_instants)
     else:
         where = f"t = {first:g} s, {path.fault}"
         raise SolveError(f"{where}: {_words(path.status)}: {path.status.advice}", status=path.status)

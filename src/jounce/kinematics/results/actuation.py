@@ -11,7 +11,7 @@ from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.status import Status
 from jounce.mechanism import Mechanism, Model, build
 from jounce.mechanism.builder import counted_as_in
-from jounce.mechanism.held_outputs import led_outputs, with_laws_left_out
+from jounce.mechanism.output_drivers import output_laws, without_output_laws
 from jounce.modules import with_fields
 from jounce.trajectory import HermiteMotion
 
@@ -23,7 +23,7 @@ def actuated(motion: Motion) -> Motion:
     it is.
     """
     mechanism = motion.mechanism
-    led = led_outputs(mechanism)
+    led = output_laws(mechanism)
     if not led or not np.any(motion.status == Status.OK):
         return motion
     laws = {name: _law(motion, name) for name in led}
@@ -45,7 +45,7 @@ def _row_scale(mechanism: Mechanism, held: Model, instant: float) -> Float[np.nd
 
     Laws do not matter to them, and those found have as many pieces as there were instants: a program for each number.
     """
-    _, _, jacobian = Displacements(build(with_laws_left_out(mechanism)), instant).at(held.reference)
+    _, _, jacobian = Displacements(build(without_output_laws(mechanism)), instant).at(held.reference)
     return jacobian.row_scale[:, None]
 
 

@@ -6,7 +6,7 @@ from jounce.execution.background import prepare_later
 from jounce.kinematics.results.motion import Motion
 from jounce.mechanism import AbstractMotionOutput, Mechanism, Model
 from jounce.mechanism.axis_angles import AttitudeHistory
-from jounce.mechanism.held_outputs import led_outputs
+from jounce.mechanism.output_drivers import output_laws
 
 
 def prepare_outputs(mechanism: Mechanism, model: Model, order: int) -> None:
@@ -22,7 +22,7 @@ def prepare_outputs(mechanism: Mechanism, model: Model, order: int) -> None:
         Highest Taylor coefficient of the motion.
     """
     outputs = [x for x in mechanism.outputs.values() if isinstance(x, AbstractMotionOutput)]
-    if not outputs or led_outputs(mechanism):
+    if not outputs or output_laws(mechanism):
         return
 
     def prepare() -> None:

@@ -27,10 +27,10 @@ from jounce.jet.algebra import stacked
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.sensitivity.jacobian_series import jacobian_series, solved_series
 from jounce.kinematics.status import Status
-from jounce.mechanism import Mechanism, Model, with_outputs_held
+from jounce.mechanism import Mechanism, Model, with_output_drivers
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.builder import grouped_elements
-from jounce.mechanism.held_outputs import led_outputs, with_laws_left_out
+from jounce.mechanism.output_drivers import output_laws, without_output_laws
 from jounce.mechanism.system import System, movable
 from jounce.mechanism.traced import Angles, Part, angles_of, template, traced_model, traced_values
 from jounce.mechanism.user_code import holds_users_code, users_code
@@ -93,8 +93,8 @@ def differentiable_motion(
         Solves a mechanism of plain numbers at the instants, strictly or not. What it raises where JAX knows the numbers
         is raised; elsewhere a motion that cannot be begun is NaN.
     """
-    made, held = template(mechanism), _builder(mechanism, with_outputs_held)
-    driven = _builder(mechanism, with_laws_left_out) if led_outputs(mechanism) else held
+    made, held = template(mechanism), _builder(mechanism, with_output_drivers)
+    driven = _builder(mechanism, without_output_laws) if output_laws(mechanism) else held
     values = tuple(x if x.dtype == np.float64 else x.astype(float) for x in traced_values(mechanism))
     shapes = solved_shapes(mechanism, len(instants), levels)
 
@@ -149,8 +149,8 @@ def solved_shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
         "quaternion": of(levels, 4, bodies, count),
         "angular_velocity": of(levels - 1, 3, bodies, count),
     }
-    parts = [groups for groups, _ in grouped_elements(with_outputs_held(mechanism))]
-    (driven, _), *_ = grouped_elements(with_laws_left_out(mechanism))
+    parts = [groups for groups, _ in grouped_elements(with_output_drivers(mechanism))]
+    (driven, _), *_ = grouped_elements(without_output_laws(mechanism))
     measuring = [[group.instances for group in groups if measures_angle(group)] for groups in (*parts, driven)]
     angle: Any = tuple(tuple(of(n, 1) for n in part) for part in measuring)
     near: Any = tuple(tuple(of(n, count) for n in part) for part in measuring[1:3])

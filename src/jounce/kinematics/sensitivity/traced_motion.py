@@ -17,7 +17,7 @@ from jounce.kinematics.results.pose_outputs import output_series
 from jounce.kinematics.sensitivity.sensitivities import Solved
 from jounce.kinematics.status import Status
 from jounce.mechanism import AbstractMotionOutput, AbstractOutput, Mechanism, Model
-from jounce.mechanism.held_outputs import led_outputs
+from jounce.mechanism.output_drivers import output_laws
 from jounce.mechanism.system import Group
 from jounce.shapes import Numbers
 
@@ -71,7 +71,7 @@ class TracedMotion(Motion):
         UnsupportedError
             If they do: the laws found go through numbers.
         """
-        if led_outputs(self.mechanism):
+        if output_laws(self.mechanism):
             message = "the laws found go through numbers, and JAX traces this motion; solve it with numbers for them"
             raise UnsupportedError(message, name="motion.actuated")
         return self.mechanism

@@ -18,7 +18,7 @@ from jounce.errors import JounceError
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.output_types import OUTPUTS, output_holder
 from jounce.kinematics.curves.choice import chosen
-from jounce.mechanism import Mechanism, Model, ParameterOutput, build, time_grid, with_outputs_held
+from jounce.mechanism import Mechanism, Model, ParameterOutput, build, time_grid, with_output_drivers
 from jounce.mechanism.derivative_outputs import form_of
 from jounce.mechanism.masses import body_mass
 from jounce.mechanism.resolve import resolve
@@ -177,7 +177,7 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
     facts = mechanism_facts(mechanism, path)
     instant = 0.0 if facts["time"] is None else facts["time"]["start"]
     laws = [] if facts["time"] is None else law_facts(mechanism, instant, facts["time"]["stop"])
-    mechanism = chosen(with_outputs_held(mechanism), instant)
+    mechanism = chosen(with_output_drivers(mechanism), instant)
     model = build(mechanism)
     state = StartingState(mechanism, model, instant)
     for kind in ("joints", "drivers"):

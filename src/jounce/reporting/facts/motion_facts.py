@@ -9,8 +9,8 @@ from typing_extensions import TypedDict
 
 from jounce.dynamics.inverse.outputs import slack_ropes
 from jounce.integrate import Simulation
-from jounce.kinematics import Motion, Status, Stretches
-from jounce.mechanism import AbstractMotionOutput, build, with_outputs_held
+from jounce.kinematics import ChunkedMotion, Motion, Status
+from jounce.mechanism import AbstractMotionOutput, build, with_output_drivers
 from jounce.mechanism.time import last_step_words
 from jounce.reporting.unbounded import unbounded_outputs
 
@@ -78,13 +78,13 @@ class SimulationFacts(MotionFacts):
     kinks: list[Kink]
 
 
-def motion_facts(motion: Motion | Stretches) -> dict[str, Any]:
+def motion_facts(motion: Motion | ChunkedMotion) -> dict[str, Any]:
     """Return what was solved or simulated: MotionFacts, or SimulationFacts.
 
     Parameters
     ----------
-    motion : Motion or Stretches
-        Of stretches, all must have been solved.
+    motion : Motion or ChunkedMotion
+        Of chunks, all must have been solved.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def motion_facts(motion: Motion | Stretches) -> dict[str, Any]:
     """
     mechanism, times = motion.mechanism, motion.time
     failed = np.flatnonzero(motion.status != Status.OK)
-    rows = build(with_outputs_held(mechanism)).rows
+    rows = build(with_output_drivers(mechanism)).rows
     drives = sum(name.startswith("drivers.") for name in rows)
     interval = {"start": float(times[0]), "stop": float(times[-1])}
     facts = {
@@ -121,10 +121,10 @@ def motion_facts(motion: Motion | Stretches) -> dict[str, Any]:
     return facts | _simulated(motion) if isinstance(motion, Simulation) else facts
 
 
-def _remarks(motion: Motion | Stretches) -> list[str]:
+def _remarks(motion: Motion | ChunkedMotion) -> list[str]:
     """Return what is to be said of the instants, and of outputs, such as why their values are NaN, each once."""
     names: dict[str, list[str]] = {}
-    for name, values in (motion.outputs if isinstance(motion, Motion) else {}).items():  # stretches are not kept
+    for name, values in (motion.outputs if isinstance(motion, Motion) else {}).items():  # chunks are not kept
         output = motion.mechanism.outputs[name]
         if isinstance(output, AbstractMotionOutput) and (remark := output.remark(motion, values)):
             names.setdefault(remark, []).append(name)

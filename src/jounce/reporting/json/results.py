@@ -13,7 +13,7 @@ from jounce.dynamics.limits.limit_report import LimitReport
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
 from jounce.dynamics.limits.trajectories import drives_note
 from jounce.errors import UNSET, JounceError, show_value
-from jounce.kinematics import Motion, Stretches
+from jounce.kinematics import ChunkedMotion, Motion
 from jounce.reporting.facts.mechanism_facts import grid_facts
 from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.motion_ends import between_facts, ends_facts
@@ -83,7 +83,9 @@ def complaint(kind: str, problem: object) -> str:
     return json.dumps({kind: record}, allow_nan=False)
 
 
-def motion_result(motion: Motion | Stretches, file: Path, written: Path | None, refine: bool = True) -> dict[str, Any]:
+def motion_result(
+    motion: Motion | ChunkedMotion, file: Path, written: Path | None, refine: bool = True
+) -> dict[str, Any]:
     """Return what `jounce run` and `jounce simulate` tell of a motion."""
     peak_records = [peak_facts(peak) for peak in peaks(motion, refine=refine)]
     return {"file": file, **motion_facts(motion), "peaks": peak_records, "written": written}

@@ -11,7 +11,7 @@ from typing_extensions import TypedDict
 
 from jounce.mechanism import Mechanism
 from jounce.mechanism.driver_outputs import is_turning
-from jounce.mechanism.held_outputs import led_outputs, with_outputs_held
+from jounce.mechanism.output_drivers import output_laws, with_output_drivers
 from jounce.mechanism.resolve import resolve_motion
 from jounce.reporting.peaks import derivative_name
 from jounce.settings import under_own_settings
@@ -60,7 +60,7 @@ def law_facts(mechanism: Mechanism, first: float, last: float) -> list[dict[str,
     >>> facts["of"], facts["continuous_to"], facts["derivatives"][4]["jumps"]
     ('ram_y', 3, 6)
     """
-    led, fixed, facts = led_outputs(mechanism), with_outputs_held(mechanism), []
+    led, fixed, facts = output_laws(mechanism), with_output_drivers(mechanism), []
     for name, driver in fixed.drivers.items():
         motion = getattr(driver, "motion", None)
         if motion is None:

@@ -15,15 +15,15 @@ from jounce.execution.llvm.text.arrays import filled
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.stored import (
     any_lanes,
+    bytes_needed,
     copied,
     counted,
+    empty_state,
     fill,
     is_own,
     nest,
     put,
     reshaped,
-    room_for,
-    room_of,
     row,
     stored,
     values_of,
@@ -149,7 +149,7 @@ def _window(code: Code, array: Stored, sizes: Sequence[int], starts: Sequence[Ar
 
 
 def _concatenate(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    found, axis, start = room_of(code, equation, given), int(equation.params["dimension"]), 0
+    found, axis, start = bytes_needed(code, equation, given), int(equation.params["dimension"]), 0
     for array in given:
         put(code, between(code, found, axis, start, array.shape[axis]), array)
         start += array.shape[axis]
@@ -157,7 +157,7 @@ def _concatenate(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[
 
 
 def _stack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    found, axis = room_of(code, equation, given), int(equation.params["axis"])
+    found, axis = bytes_needed(code, equation, given), int(equation.params["axis"])
     rows = transposed(found, [axis, *(k for k in range(found.ndim) if k != axis)])
     for k, array in enumerate(given):
         target = between(code, rows, 0, k, 1)
@@ -173,7 +173,7 @@ def _tile(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
 
 
 def _pad(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    array, found = stored(code, given[0]), room_of(code, equation, given)
+    array, found = stored(code, given[0]), bytes_needed(code, equation, given)
     fill(code, found, values_of(code, given[1]).item())
     target = found
     for axis, (low, _, between_) in enumerate(tuple(map(int, sizes)) for sizes in equation.params["padding_config"]):
@@ -201,7 +201,7 @@ def _to_change(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
     array, *others = given
     if isinstance(array, Stored) and is_own(code, array) and (array.lanes or not any_lanes(others)):
         return array
-    found = room_of(code, equation, given)
+    found = bytes_needed(code, equation, given)
     put(code, found, array)
     return found
 
@@ -272,7 +272,7 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
     """Return parts of an array at indices."""
     p, array, indices = equation.params, stored(code, given[0]), stored(code, given[1])
     numbers, aval = p["dimension_numbers"], equation.outvars[0].aval
-    found = room_for(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
+    found = empty_state(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
     offsets = list(numbers.offset_dims)
     batch = [axis for axis in range(found.ndim) if axis not in offsets]
     taken = [

@@ -6,7 +6,7 @@ from typing import Any
 
 from jounce.execution.llvm.rules.axes import combination, is_better, nothing
 from jounce.execution.llvm.text.code import Code
-from jounce.execution.llvm.text.stored import counted, fill, nest, put, room_for, room_of, stored
+from jounce.execution.llvm.text.stored import bytes_needed, counted, empty_state, fill, nest, put, stored
 from jounce.execution.llvm.text.values import Value
 from jounce.execution.llvm.text.views import Array, Deferred, Stored, as_read, between, spread, transposed
 
@@ -22,7 +22,7 @@ def reduction(operation: str) -> StoredRule:
         if not isinstance(array, Deferred):
             array = as_read(stored(code, array))
         remaining = [axis for axis in range(array.ndim) if axis not in axes]
-        found = room_of(code, equation, [array])
+        found = bytes_needed(code, equation, [array])
         fill(code, found, code.constant(nothing(operation, found.kind), found.kind))
         if code.alone and operation in ORDERLESS and found.size == 1:
             for part in _in_vectors(code, operation, array):
@@ -58,7 +58,7 @@ def _in_vectors(code: Code, operation: str, array: Deferred) -> list[Deferred]:
     rest = row.viewed(lambda x: between(code, x, 0, row.size - left, left))
     if rows is None:
         return [array]
-    most = room_for(code, (code.width,), row.kind, lanes=False)
+    most = empty_state(code, (code.width,), row.kind, lanes=False)
     fill(code, most, code.constant(nothing(operation, row.kind), row.kind))
     _gathered(code, operation, spread(most, whole, (1,)), rows)
     return [as_read(most), rest]
@@ -76,10 +76,10 @@ REDUCTIONS = {
 
 def extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Return where the largest or smallest number along an axis is, the first of equals; NaN before all."""
-    array, found, word = stored(code, given[0]), room_of(code, equation, given), equation.primitive.name
+    array, found, word = stored(code, given[0]), bytes_needed(code, equation, given), equation.primitive.name
     (axis,) = map(int, equation.params["axes"])
     rows = transposed(array, [k for k in range(array.ndim) if k != axis] + [axis])
-    best = room_for(code, found.shape, array.kind, lanes=array.lanes)
+    best = empty_state(code, found.shape, array.kind, lanes=array.lanes)
     first = between(code, rows, rows.ndim - 1, 0, 1)
     put(code, best, replace(first, shape=first.shape[:-1], strides=first.strides[:-1]))
     fill(code, found, code.constant(0, found.kind))
@@ -103,7 +103,7 @@ def extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
 def dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Return products of matrices: sums of products over some axes, for each place along those that are joined."""
     (left_sum, right_sum), (left_batch, right_batch) = equation.params["dimension_numbers"]
-    found = room_of(code, equation, given)
+    found = bytes_needed(code, equation, given)
     fill(code, found, code.constant(0, found.kind))
     left, right = (stored(code, array) for array in given)
     left_free, right_free = (

@@ -28,7 +28,7 @@ from jounce.execution.llvm.text.views import (
 )
 
 
-def room_for(code: Code, shape: Sequence[int], kind: str, *, lanes: bool) -> Stored:
+def empty_state(code: Code, shape: Sequence[int], kind: str, *, lanes: bool) -> Stored:
     """Return an array of which nothing is known yet."""
     return contiguous(code.taken_room(math.prod(shape), kind, lanes=lanes), shape)
 
@@ -57,10 +57,10 @@ def kind_in(array: Array) -> str:
     return array.kind if isinstance(array, InMemory) else flat(array)[0].kind
 
 
-def room_of(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
+def bytes_needed(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
     """Return room for the result of an operation."""
     aval = equation.outvars[0].aval
-    return room_for(code, aval.shape, kind_of(aval.dtype), lanes=any_lanes(given))
+    return empty_state(code, aval.shape, kind_of(aval.dtype), lanes=any_lanes(given))
 
 
 # -- views ------------------------------------------------------------------------------------------------------------
@@ -133,7 +133,7 @@ def settled(code: Code, array: Array) -> Array:
 
 def copied(code: Code, array: Array) -> Stored:
     """Return an array with a place of its own, its numbers one after another."""
-    found = room_for(code, array.shape, kind_in(array), lanes=any_lanes([array]))
+    found = empty_state(code, array.shape, kind_in(array), lanes=any_lanes([array]))
     put(code, found, array)
     return found
 

@@ -29,7 +29,7 @@ def comb(n: np.ndarray, k: np.ndarray) -> np.ndarray:
 
 
 @dataclasses.dataclass(frozen=True)
-class Place:
+class CurvePoint:
     """A place on a curve, with the series of the curve in arc length from there.
 
     Attributes
@@ -55,46 +55,46 @@ class Place:
 
     def at(self, step: float) -> dict[str, np.ndarray]:
         """Return the coordinates that the series gives a step away."""
-        return {name: horner(c, step) for name, c in self.coordinates.items()}
+        return {name: evaluate_series(c, step) for name, c in self.coordinates.items()}
 
-    def recentered(self, step: float, order: int = ORDER) -> "Place":
+    def recentered(self, step: float, order: int = ORDER) -> "CurvePoint":
         """Return the place a step on that the series gives, with its terms up to an order."""
         power = np.arange(order + 1)
         away = power[None] - power[:, None]
         shift = np.where(away >= 0, comb(power[None], power[:, None]) * step ** np.maximum(away, 0), 0.0)
 
-        def moved(c: np.ndarray) -> np.ndarray:
+        def shifted(c: np.ndarray) -> np.ndarray:
             return np.concatenate([np.tensordot(shift, c[: order + 1], 1), np.zeros_like(c[order + 1 :])])
 
-        coordinates = {name: moved(c) for name, c in self.coordinates.items()}
-        known = {"arc_length": self.arc_length + step, "value": moved(self.value)}
+        coordinates = {name: shifted(c) for name, c in self.coordinates.items()}
+        known = {"arc_length": self.arc_length + step, "value": shifted(self.value)}
         return dataclasses.replace(self, coordinates=coordinates, **known)
 
-    def reversed(self) -> "Place":
+    def reversed(self) -> "CurvePoint":
         """Return the place on the same curve, gone along the other way."""
 
-        def turned(c: np.ndarray) -> np.ndarray:
+        def alternated(c: np.ndarray) -> np.ndarray:
             return c * ((-1.0) ** np.arange(len(c))).reshape(-1, *[1] * (c.ndim - 1))
 
-        coordinates = {name: turned(c) for name, c in self.coordinates.items()}
-        known = {"arc_length": -self.arc_length, "value": turned(self.value), "slope": -self.slope}
+        coordinates = {name: alternated(c) for name, c in self.coordinates.items()}
+        known = {"arc_length": -self.arc_length, "value": alternated(self.value), "slope": -self.slope}
         return dataclasses.replace(self, coordinates=coordinates, **known)
 
-    def shifted(self, arc_length: float) -> "Place":
+    def shifted(self, arc_length: float) -> "CurvePoint":
         """Return the place with its arc length counted from somewhere else."""
         return dataclasses.replace(self, arc_length=self.arc_length + arc_length)
 
-    def shortened(self, order: int) -> "Place":
+    def shortened(self, order: int) -> "CurvePoint":
         """Return the place with the coefficients above an order set to zero: rounding spoils those first."""
 
-        def cut(c: np.ndarray) -> np.ndarray:
+        def truncated(c: np.ndarray) -> np.ndarray:
             return np.concatenate([c[: order + 1], np.zeros_like(c[order + 1 :])])
 
-        coordinates = {name: cut(c) for name, c in self.coordinates.items()}
-        return dataclasses.replace(self, coordinates=coordinates, value=cut(self.value))
+        coordinates = {name: truncated(c) for name, c in self.coordinates.items()}
+        return dataclasses.replace(self, coordinates=coordinates, value=truncated(self.value))
 
 
-def horner(coefficients: np.ndarray, step: float) -> np.ndarray:
+def evaluate_series(coefficients: np.ndarray, step: float) -> np.ndarray:
     """Return what a series gives a step away."""
     found = np.zeros_like(coefficients[0])
     for c in coefficients[::-1]:
@@ -103,7 +103,7 @@ def horner(coefficients: np.ndarray, step: float) -> np.ndarray:
 
 
 @dataclasses.dataclass(frozen=True)
-class Walker:
+class PathTracker:
     """A model whose value of time is that of the driver that is free, and what is known of its curves."""
 
     model: Model
@@ -132,7 +132,7 @@ class Walker:
 
     # places
 
-    def placed(self, coordinates: dict[str, Any], value: float) -> Place:
+    def point_without_series(self, coordinates: dict[str, Any], value: float) -> CurvePoint:
         """Return a place without a series, of coordinates of shape (..., bodies, 1)."""
         series = {}
         for name, x in coordinates.items():
@@ -142,29 +142,29 @@ class Walker:
         values[0] = value
         nothing = np.zeros((self.model.system.shape[0], self.unknowns))
         first = np.arange(self.unknowns - 1) % max(1, len(nothing))
-        return self.with_jacobian(Place(0.0, series, values, nothing, nothing, first))
+        return self.with_jacobian(CurvePoint(0.0, series, values, nothing, nothing, first))
 
-    def with_jacobian(self, place: Place) -> Place:
+    def with_jacobian(self, point: CurvePoint) -> CurvePoint:
         """Return a place with the Jacobian of its configuration and rows that are independent."""
-        points = self.points(place, np.zeros(1), np.ones(self.columns), corrected=False)
+        points = self.points(point, np.zeros(1), np.ones(self.columns), corrected=False)
         jacobian = points.jacobian[..., 0]
         rows = self.independent(jacobian)
-        return dataclasses.replace(place, jacobian=jacobian, rows=place.rows if rows is None else rows)
+        return dataclasses.replace(point, jacobian=jacobian, rows=point.rows if rows is None else rows)
 
-    def directed(self, place: Place, direction: Float[np.ndarray, " unknown"]) -> Place:
+    def directed(self, point: CurvePoint, direction: Float[np.ndarray, " unknown"]) -> CurvePoint:
         """Return a place with a straight line in a direction in the place of its series."""
         pose_type = self.model.pose_type
         shift, turn = self.parts(direction)
         first = {"position": shift, "angle": turn[0]} if pose_type is PlanarPose else {"position": shift}
-        if "quaternion" in place.coordinates:
-            first["quaternion"] = spun(place.coordinates["quaternion"][0], turn)
-        series = {name: np.zeros_like(c) for name, c in place.coordinates.items()}
-        for name, c in place.coordinates.items():
+        if "quaternion" in point.coordinates:
+            first["quaternion"] = spun(point.coordinates["quaternion"][0], turn)
+        series = {name: np.zeros_like(c) for name, c in point.coordinates.items()}
+        for name, c in point.coordinates.items():
             series[name][0], series[name][1] = c[0], first[name]
-        value = np.zeros_like(place.value)
-        value[0] = place.value[0]
+        value = np.zeros_like(point.value)
+        value[0] = point.value[0]
         value[1] = direction[-1] * self.value_scale if self.driven else 0.0
-        return dataclasses.replace(place, coordinates=series, value=value)
+        return dataclasses.replace(point, coordinates=series, value=value)
 
     def parts(self, direction: Float[np.ndarray, " unknown"]) -> tuple[np.ndarray, np.ndarray]:
         """Return shifts, (components, bodies) in m, and turns of all bodies in a direction, the ground first."""
@@ -172,41 +172,48 @@ class Walker:
         shift, turn = system.coordinates(direction[: self.columns, None], shifts)
         return np.asarray(shift)[..., 0], np.asarray(turn)[..., 0]
 
-    def begun(self, place: Place, direction: Float[np.ndarray, " unknown"] | None = None) -> Place:
+    def with_series(self, point: CurvePoint, direction: Float[np.ndarray, " unknown"] | None = None) -> CurvePoint:
         """Return a place with its series, in a direction; unless told, that in which the value grows."""
-        rows = place.rows
-        jacobian = self.with_jacobian(place).jacobian
+        rows = point.rows
+        jacobian = self.with_jacobian(point).jacobian
         tangent = self.null_space(jacobian[rows], 0.0)[:, -1] if direction is None else direction
         if direction is None and self.driven:
             tangent = tangent if tangent[-1] >= 0 else -tangent
         tangent = tangent[: self.columns]
         for _ in range(2):  # the second time along the series that the first gave
-            points = self.points(place, np.zeros(1), tangent)
-            place = self.place(points, 0, place.arc_length, rows)
-        return place
+            points = self.points(point, np.zeros(1), tangent)
+            point = self.point_at_lane(points, 0, point.arc_length, rows)
+        return point
 
-    def scaled_at(self, place: Place) -> "Walker":
-        """Return the walker with the value counted in a unit that makes its largest derivative one."""
+    def scaled_at(self, point: CurvePoint) -> "PathTracker":
+        """Return the tracker with the value counted in a unit that makes its largest derivative one."""
         if not self.driven:
             return self
-        largest = float(np.max(np.abs(place.jacobian[:, -1]), initial=0.0))
+        largest = float(np.max(np.abs(point.jacobian[:, -1]), initial=0.0))
         return dataclasses.replace(self, value_scale=self.value_scale / largest if largest > 0 else 1.0)
 
-    def place(self, points: CurvePoints, lane: int, arc_length: float, rows: Int[np.ndarray, " row"]) -> Place:
-        """Return one of some points as a place."""
+    def point_at_lane(
+        self, points: CurvePoints, lane: int, arc_length: float, rows: Int[np.ndarray, " row"]
+    ) -> CurvePoint:
+        """Return one lane of several points."""
         coordinates = {name: np.array(c[..., lane]) for name, c in points.coordinates.items()}
         jacobian = np.array(points.jacobian[..., lane])
         if len(jacobian) > len(rows):
             chosen = self.independent(jacobian)
             rows = rows if chosen is None else chosen
         slope = np.array(points.slope[..., lane])
-        return Place(arc_length, coordinates, np.array(points.value[:, lane]), jacobian, slope, rows)
+        return CurvePoint(arc_length, coordinates, np.array(points.value[:, lane]), jacobian, slope, rows)
 
     def points(
-        self, places: "Place | list[Place]", steps: np.ndarray, tangent: Any = None, *, corrected: bool = True
+        self,
+        centers: "CurvePoint | list[CurvePoint]",
+        steps: np.ndarray,
+        tangent: Any = None,
+        *,
+        corrected: bool = True,
     ) -> CurvePoints:
         """Return points of the curve some steps from one place, or from one place each with the same rows."""
-        several = [places] if isinstance(places, Place) else places
+        several = [centers] if isinstance(centers, CurvePoint) else centers
         rows, count = several[0].rows, len(steps)
 
         def lanes(parts: list[np.ndarray]) -> np.ndarray:
@@ -252,14 +259,14 @@ class Walker:
         column = self.column(coordinates["position"][1], turns)
         return np.concatenate([column, value[1][None] / self.value_scale]) if self.driven else column
 
-    def tangent(self, place: Place) -> Float[np.ndarray, " unknown"]:
+    def tangent(self, point: CurvePoint) -> Float[np.ndarray, " unknown"]:
         """Return the direction of the curve at a place, of length one in the coordinates."""
-        return self.rates(place.coordinates, place.value)
+        return self.rates(point.coordinates, point.value)
 
-    def _turning(self, place: Place) -> Float[np.ndarray, " unknown"]:
+    def _curvature(self, point: CurvePoint) -> Float[np.ndarray, " unknown"]:
         """Return the derivative of the direction of the curve along it."""
-        second = {name: np.stack([c[0], 2 * c[2]]) for name, c in place.coordinates.items()}
-        return self.rates(second, np.stack([place.value[0], 2 * place.value[2]]))
+        second = {name: np.stack([c[0], 2 * c[2]]) for name, c in point.coordinates.items()}
+        return self.rates(second, np.stack([point.value[0], 2 * point.value[2]]))
 
     def difference(self, there: dict[str, np.ndarray], here: dict[str, np.ndarray]) -> Float[np.ndarray, " column"]:
         """Return shifts and turns from one configuration to another, scaled; whole turns do not count."""
@@ -270,17 +277,17 @@ class Walker:
             turns = turns * np.where(np.sum(here["quaternion"] * there["quaternion"], axis=0) < 0, -1.0, 1.0)
         return self.column(there["position"] - here["position"], turns)
 
-    def terms(self, place: Place) -> Float[np.ndarray, " order"]:
+    def terms(self, point: CurvePoint) -> Float[np.ndarray, " order"]:
         """Return the size of each coefficient but the first, rad or sizes of the mechanism."""
-        scaled = place.coordinates["position"][1:] / self._lengths
-        attitude = place.coordinates["angle" if self.is_planar else "quaternion"][1:]
+        scaled = point.coordinates["position"][1:] / self._lengths
+        attitude = point.coordinates["angle" if self.is_planar else "quaternion"][1:]
         sizes = [np.abs(x).reshape(len(x), -1).max(axis=1) for x in (scaled, attitude)]
         found = np.maximum(*sizes)
         return np.where(np.isfinite(found), found, np.inf)
 
-    def radius(self, place: Place, highest: int = ORDER) -> float:
+    def radius(self, point: CurvePoint, highest: int = ORDER) -> float:
         """Return about how far the series converges, by its coefficients from the first to some order; at most one."""
-        terms = np.maximum(self.terms(place)[1:highest], 1.0)
+        terms = np.maximum(self.terms(point)[1:highest], 1.0)
         return float(np.min(terms ** (-1.0 / np.arange(2, highest + 1))))
 
     def bordered(self, jacobian: np.ndarray, rates: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -295,13 +302,13 @@ class Walker:
         whole = self.bordered(np.moveaxis(points.jacobian, -1, 0), rates, rows)
         return np.linalg.slogdet(np.where(np.isfinite(whole), whole, 0.0))[0]
 
-    def nearing(self, place: Place) -> complex:
+    def singularity_distance(self, point: CurvePoint) -> complex:
         """Return the arc length to the nearest place where the bordered Jacobian is singular; it may be complex.
 
         As for motions in time (see `det_rate`): minus the inverse of the eigenvalue of ``B^-1 B'`` of largest size.
         """
-        matrix = self.bordered(place.jacobian, self.tangent(place), place.rows)
-        slope = self.bordered(place.slope, self._turning(place), place.rows)
+        matrix = self.bordered(point.jacobian, self.tangent(point), point.rows)
+        slope = self.bordered(point.slope, self._curvature(point), point.rows)
         try:
             values = np.linalg.eigvals(np.linalg.solve(matrix, slope))
         except np.linalg.LinAlgError:
@@ -337,10 +344,10 @@ class Walker:
         left, sizes, _ = np.linalg.svd(jacobian)
         return left[:, _rank(sizes, tolerance) :]
 
-    def second_order(self, place: Place, directions: Float[np.ndarray, "unknown k"]) -> Float[np.ndarray, "row k"]:
+    def second_order(self, point: CurvePoint, directions: Float[np.ndarray, "unknown k"]) -> Float[np.ndarray, "row k"]:
         """Return half the second derivatives of the residual along directions."""
-        coordinates = {name: c[0][..., None] for name, c in place.coordinates.items()}
-        scale, value = np.asarray(self.value_scale if self.driven else 0.0), np.asarray(place.value[0])
+        coordinates = {name: c[0][..., None] for name, c in point.coordinates.items()}
+        scale, value = np.asarray(self.value_scale if self.driven else 0.0), np.asarray(point.value[0])
         found = []
         for first in range(0, directions.shape[1], LANES):
             some = directions[:, first : first + LANES]

@@ -28,7 +28,7 @@ from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.trajectory import OutputMotion
 
 
-def led_outputs(mechanism: Mechanism) -> dict[str, OutputMotion]:
+def output_laws(mechanism: Mechanism) -> dict[str, OutputMotion]:
     """Return the laws of outputs from which those of drivers follow, by driver."""
     motions = {name: getattr(driver, "motion", None) for name, driver in mechanism.drivers.items()}
     return {name: motion for name, motion in motions.items() if isinstance(motion, OutputMotion)}
@@ -36,19 +36,19 @@ def led_outputs(mechanism: Mechanism) -> dict[str, OutputMotion]:
 
 def with_outputs(mechanism: Mechanism, outputs: Mapping[str, AbstractQuantity]) -> Mechanism:
     """Return the mechanism with other outputs, and with those of its own that drivers follow from."""
-    followed = {motion.output for motion in led_outputs(mechanism).values()}
+    followed = {motion.output for motion in output_laws(mechanism).values()}
     followed |= {name.rpartition("_")[0] for name in followed}
     kept = {name: output for name, output in mechanism.outputs.items() if name in followed}
     return dataclasses.replace(mechanism, outputs={**kept, **outputs})
 
 
-def with_laws_left_out(mechanism: Mechanism) -> Mechanism:
+def without_output_laws(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with laws of zero for the drivers that follow from outputs, to which a law adds only."""
-    led = {name: dataclasses.replace(mechanism.drivers[name], motion=0.0) for name in led_outputs(mechanism)}
+    led = {name: dataclasses.replace(mechanism.drivers[name], motion=0.0) for name in output_laws(mechanism)}
     return dataclasses.replace(mechanism, drivers={**mechanism.drivers, **led}) if led else mechanism
 
 
-def with_outputs_held(mechanism: Mechanism) -> Mechanism:
+def with_output_drivers(mechanism: Mechanism) -> Mechanism:
     """Return the mechanism with drivers that hold outputs to their laws, in the place of those that follow from them.
 
     They have the names of the drivers that they stand for. Outputs that follow from the whole motion, such as forces,
@@ -59,7 +59,7 @@ def with_outputs_held(mechanism: Mechanism) -> Mechanism:
     MechanismError
         If an output does not exist, cannot be held, or is held twice, or its driver says nothing of its coordinate.
     """
-    led = led_outputs(mechanism)
+    led = output_laws(mechanism)
     if not led:
         return mechanism
     held = dict(mechanism.drivers)
@@ -73,12 +73,12 @@ def with_outputs_held(mechanism: Mechanism) -> Mechanism:
             raise MechanismError(
                 f"the driver '{twice[0]}' follows from this output already", name=f"{place}.output", value=motion.output
             )
-        held[name] = holder_of(mechanism, motion, f"{place}.output")
+        held[name] = driver_of_output(mechanism, motion, f"{place}.output")
     outputs = {name: x for name, x in mechanism.outputs.items() if not isinstance(x, AbstractMotionOutput)}
     return dataclasses.replace(mechanism, drivers=held, outputs=outputs)
 
 
-def holder_of(mechanism: Any, motion: OutputMotion, place: str) -> AbstractConstraint:
+def driver_of_output(mechanism: Any, motion: OutputMotion, place: str) -> AbstractConstraint:
     """Return the driver that holds an output to a law; of a mechanism its space and outputs count."""
     output, component = _named(mechanism, motion.output, place)
     law, spatial = motion.law, mechanism.space == "spatial"

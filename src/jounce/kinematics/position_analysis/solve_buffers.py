@@ -1,4 +1,4 @@
-"""Many instants solved in rounds, in the memory of a thread, which stays in the cache; what is wanted is copied out."""
+"""Buffers in which a thread solves many instants in rounds: they stay in its cache, and results are copied out."""
 
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -9,7 +9,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.execution.buffer_pool import acquire, arrays_in, release, room_of
+from jounce.execution.buffer_pool import acquire, arrays_in, bytes_needed, release
 from jounce.kinematics.continuation.solver import Solver
 
 Item = TypeVar("Item")
@@ -17,7 +17,7 @@ Indices = Int[np.ndarray, " lane"]
 Rounds = Int[np.ndarray, "round width"]
 
 
-class Room:
+class SolveBuffer:
     """The memory of a thread, for some instants after others, with the anchors that they start from behind them.
 
     Parameters
@@ -41,7 +41,7 @@ class Room:
         own = solver.own or {}
         shapes = [(*leaf.shape[:-1], size + anchors) for leaf in leaves]
         shapes += [*((*value.shape[:-1], size) for value in own.values()), *[(size,)] * 4]
-        self.block, self.size = acquire(room_of(shapes)), size
+        self.block, self.size = acquire(bytes_needed(shapes)), size
         kinds = [*[float] * (len(shapes) - 2), *[int] * 2]
         arrays = arrays_in(self.block, shapes, kinds)
         state, values = arrays[: len(leaves)], arrays[len(leaves) : -4]
@@ -59,7 +59,7 @@ class Room:
             count = sum(x.shape[-1] for x in columns)
             np.concatenate(columns, axis=-1, out=whole[..., self.size : self.size + count])
 
-    def take_up(
+    def load(
         self,
         time: Float[np.ndarray, " time"],
         sources: tuple[Indices, Float[np.ndarray, " time"]],
@@ -90,48 +90,48 @@ class Room:
         """Solve the instants that were taken up last."""
         self._run(self.rounds)
 
-    def found(self, count: int) -> tuple[Any, Indices]:
+    def results(self, count: int) -> tuple[Any, Indices]:
         """Return the states and the outcome of so many of them."""
         return jax.tree.map(lambda x: x[..., :count], self.state), self.status[:count]
 
 
-def solve_in_rooms(
-    new: Callable[[], Room],
+def solve_in_buffers(
+    new: Callable[[], SolveBuffer],
     items: Sequence[Item],
-    begin: Callable[[Room, Item], int],
+    begin: Callable[[SolveBuffer, Item], int],
     put: Callable[[Item, Any, Indices], None],
     each: Callable[[Callable[[Item], int], Iterable[Item]], Iterator[int]],
 ) -> Iterator[int]:
-    """Solve items, each in a room, and yield how many instants each of them has.
+    """Solve items, each in a buffer, and yield how many instants each of them has.
 
     Parameters
     ----------
     new : callable
-        Makes a room for a thread.
+        Makes a buffer for a thread.
     items : sequence
         What is solved.
     begin : callable
-        Has a room take up an item, and returns how many instants that are.
+        Loads an item into a buffer, and returns its number of instants.
     put : callable
         Takes over the states of the instants of an item, and the outcome of each. It may be called from several threads
         at once; the arrays are used again after it.
     each : callable
         In the manner of `map`; it may call from several threads at once.
     """
-    rooms: list[Room] = []  # those of threads that are between two items
+    idle_buffers: list[SolveBuffer] = []  # those of threads that are between two items
     lock = threading.Lock()  # many short operations go faster one thread after another than in turns for Python's lock
 
     def solve(item: Item) -> int:
         with lock:
-            room = rooms.pop() if rooms else new()
-            count = begin(room, item)
-        room.solve()
-        put(item, *room.found(count))
-        rooms.append(room)
+            buffer = idle_buffers.pop() if idle_buffers else new()
+            count = begin(buffer, item)
+        buffer.solve()
+        put(item, *buffer.results(count))
+        idle_buffers.append(buffer)
         return count
 
     try:
         yield from each(solve, items)
     finally:
-        while rooms:  # one that a thread still uses is not among them
-            release(rooms.pop().block)
+        while idle_buffers:  # one that a thread still uses is not among them
+            release(idle_buffers.pop().block)
