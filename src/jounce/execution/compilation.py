@@ -24,6 +24,7 @@ from jounce.execution.device import on_processor
 from jounce.execution.store import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
 from jounce.execution.structure import UndescribedError, program_key, settings
 from jounce.execution.translated import Translated, shaped
+from jounce.importing import uncollected
 from jounce.jax_internals import description_reader, runs_at_once, without_sources
 from jounce.settings import check_process, under_own_settings
 
@@ -233,8 +234,9 @@ class Compiled:
 
         def compiled_anew() -> Callable[..., Any]:
             with compiling_anew():
-                lowered = self.jitted.lower(*arguments, **keywords, **static)
-                without_sources(lowered.compiler_ir())
+                with uncollected():
+                    lowered = self.jitted.lower(*arguments, **keywords, **static)
+                    without_sources(lowered.compiler_ir())
                 program = lowered.compile(None if level is None else {"xla_backend_optimization_level": level})
             if (content := _packed(program, tree)) is not None:
                 store.put(key, content)

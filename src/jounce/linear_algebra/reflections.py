@@ -77,22 +77,10 @@ class ReflectedFactor(Module):
 
         A correction that is followed by another need not be refined.
         """
-        solution = self._substituted(right)
+        solution = _substituted(self, right)
         if not refined:
             return solution
-        return solution + self._substituted(right - jnp.sum(self.matrix * solution[None], axis=1))
-
-    def _substituted(self, right: Columns) -> Columns:
-        size = len(self.pivots)
-        for k in range(size):
-            column = self.reduced[k:, k]
-            part = jnp.sum(column * right[k:], axis=0) * self.shares[k]
-            right = jnp.concatenate([right[:k], right[k:] - column * part[None]])
-        found = right[:0]
-        for k in reversed(range(size)):
-            rest = right[k] - jnp.sum(self.reduced[k, k + 1 :] * found, axis=0)
-            found = jnp.concatenate([(rest / self.pivots[k])[None], found])
-        return found
+        return solution + _substituted(self, right - jnp.sum(self.matrix * solution[None], axis=1))
 
     def applied_inverse(self, matrix: Float[Numbers, "row column"]) -> Float[Numbers, "row column"]:
         """Return the products of the inverse of the first matrix with the columns of another, shape (rows, columns)."""
@@ -108,3 +96,17 @@ class ReflectedFactor(Module):
         """Return the signs of the determinants, shape (batch,): 0 where singular, NaN where not finite."""
         reflected = jnp.where(self.shares == 0, 1.0, -1.0)
         return jnp.prod(reflected * jnp.sign(self.pivots), axis=0)
+
+
+@jax.jit  # traced once for all orders
+def _substituted(factor: ReflectedFactor, right: Columns) -> Columns:
+    size = len(factor.pivots)
+    for k in range(size):
+        column = factor.reduced[k:, k]
+        part = jnp.sum(column * right[k:], axis=0) * factor.shares[k]
+        right = jnp.concatenate([right[:k], right[k:] - column * part[None]])
+    found = right[:0]
+    for k in reversed(range(size)):
+        rest = right[k] - jnp.sum(factor.reduced[k, k + 1 :] * found, axis=0)
+        found = jnp.concatenate([(rest / factor.pivots[k])[None], found])
+    return found

@@ -204,14 +204,12 @@ class Equations(Module):
 
     def matrix(self, state: State, time: Instants) -> Matrices:
         """Return the matrix of the unknown accelerations and multipliers, scaled; of redundant rows, combinations."""
-        jacobian, rank = self._jacobian(state, time), self.system.rank
-        jacobian = jacobian if rank is None else in_basis(range_basis(jacobian, rank), jacobian)
-        return saddle_point(self.mass_matrix(state), jacobian)
+        return _matrix(self, state, time)
 
     def factored(self, state: State, time: Instants) -> Factor:
         """Return the factors of that matrix, which solve for all rows."""
         if self.system.rank is not None:
-            jacobian = self._jacobian(state, time)
+            jacobian = self.jacobian(state, time)
             return ReducedFactor.of(self.mass_matrix(state), jacobian, range_basis(jacobian, self.system.rank))
         if self.saddle is None:
             return DenseFactor.of(self.matrix(state, time))
@@ -227,7 +225,8 @@ class Equations(Module):
             return DenseFactor.blank((size, size), lanes)
         return self.saddle.blank(lanes)
 
-    def _jacobian(self, state: State, time: Instants) -> Jacobian:
+    def jacobian(self, state: State, time: Instants) -> Jacobian:
+        """Return the scaled Jacobian of the constraints, shape (rows, columns, batch)."""
         return self.system.jacobian(self.pose_at_rest(state.position, state.attitude), Jet([time]))
 
     def mass_matrix(self, state: State) -> MassMatrix:
@@ -264,6 +263,23 @@ class Equations(Module):
         change = by_body(self.least_change(factor, rate), self.system.column_scale)
         shifts = self.pose_type.shifts
         return state._replace(velocity=state.velocity + change[:shifts], spin=state.spin + change[shifts:])
+
+
+# Programs of the start, of steps and of the motion within them have these in common: JAX traces them once for all.
+
+
+@jax.jit
+def _matrix(equations: Equations, state: State, time: Instants) -> Matrices:
+    jacobian, rank = equations.jacobian(state, time), equations.system.rank
+    jacobian = jacobian if rank is None else in_basis(range_basis(jacobian, rank), jacobian)
+    return saddle_point(equations.mass_matrix(state), jacobian)
+
+
+@jax.jit
+def _balance(
+    equations: Equations, state: State, acceleration: ByBody, multipliers: Rows, time: Instants
+) -> tuple[ByBody, Rows, Attitudes]:
+    return equations.balance(state, acceleration, multipliers, time)
 
 
 def with_ground(
@@ -343,7 +359,8 @@ def expand(
 
     def program(*leaves: Any) -> Any:
         position, attitude, velocity, spin, acceleration, multipliers, clock = leaves
-        return equations.balance(State(position, attitude, velocity, spin), acceleration, multipliers, clock)
+        state = State(position, attitude, velocity, spin)
+        return _balance(equations, state, acceleration, multipliers, clock)
 
     trial = jnp.zeros((count, bodies, lanes)), jnp.zeros((rows, lanes))
     forces, second, _ = program(*state, *trial, time)

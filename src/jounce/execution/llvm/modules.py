@@ -16,6 +16,7 @@ from jounce.execution.llvm.text.stored import is_large, put, values_of
 from jounce.execution.llvm.text.values import Region, UnsupportedOperationError, kind_of
 from jounce.execution.llvm.text.views import Array, Stored, contiguous
 from jounce.execution.llvm.translation import translate
+from jounce.importing import uncollected
 from jounce.jax_internals import in_plain_operations, is_tried
 
 MOST_MEMORY = 2**20  # bytes of the stack: threads have little
@@ -67,14 +68,15 @@ def object_file(
         Where there is no code for it, or too much; or a release of JAX that was not tried writes it otherwise.
     """
     count, options = len(jax.tree.leaves(shared)), {"most_lines": most_lines, "large": large, "alone": alone}
-    traced, results = jax.make_jaxpr(function, return_shape=True)(shared, lanes)
-    closed = in_plain_operations(traced)
-    try:
-        text = _text(closed, count, known, vector_width(), rows=rows, **options)
-    except (AttributeError, KeyError, TypeError) as failure:  # of what JAX says of an operation, under another name
-        if is_tried():
-            raise
-        raise UnsupportedOperationError(f"JAX {jax.__version__}, which was not tried: {failure!r}") from failure
+    with uncollected():
+        traced, results = jax.make_jaxpr(function, return_shape=True)(shared, lanes)
+        closed = in_plain_operations(traced)
+        try:
+            text = _text(closed, count, known, vector_width(), rows=rows, **options)
+        except (AttributeError, KeyError, TypeError) as failure:  # of what JAX says of an operation, under another name
+            if is_tried():
+                raise
+            raise UnsupportedOperationError(f"JAX {jax.__version__}, which was not tried: {failure!r}") from failure
     return compiled(text, hasty=hasty), results
 
 

@@ -16,6 +16,7 @@ CLOSE = 4e-15  # so near to where the matrix was inverted, in the same unit, the
 ROUNDING = 1e-15  # a correction this small, in rad or sizes of the mechanism, leaves nothing to correct
 
 
+@jax.jit  # traced once for the steps of a run and for the motion within them
 def projected(equations: Equations, state: State, time: Instants) -> tuple[State, Lanes, Inverse]:
     """Return the nearest state that fulfills the constraints and their rates, and how far positions moved.
 
