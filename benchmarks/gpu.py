@@ -124,10 +124,12 @@ def cases(quick: bool) -> Cases:
             worker = partial(Worker, f"benchmarks.gpu:{task}", *arguments, environment=environment, cores=given)
             return lambda: worker().run
 
+        alone = [Contestant("its program alone, on the device", by(ON_GPU, None, "program"), error, aim=2.0)]
         yield Case(
             title,
             [
                 Contestant(f"jounce on {gpu()}", by(ON_GPU, None), error),
+                *(alone if task == "solve" else ()),
                 Contestant(f"jounce on {cores} cores", by(ON_CPU, None), error),
                 Contestant("jounce on one core", by(ON_CPU, 1), error),
             ],

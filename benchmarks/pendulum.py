@@ -55,6 +55,22 @@ def by_jounce(tolerance: float) -> Run:
     return run
 
 
+def by_robot(tolerance: float) -> Run:
+    """Return the library's run of the same as a robot, whose coordinates are those of its joints."""
+    mass = jn.Inertia(1.0, center_of_mass=[1.0, 0.0, 0.0])
+    links = [jn.Link("base"), jn.Link("upper", mass), jn.Link("lower", mass)]
+    a = jn.Joint("a", "base", "upper", "continuous", axis=[0, 0, 1])
+    b = jn.Joint("b", "upper", "lower", "continuous", axis=[0, 0, 1], position=[1.0, 0.0, 0.0])
+    robot = jn.Robot("double pendulum", links, [a, b], gravity=[0.0, -GRAVITY, 0.0])
+    instants = np.array([0.0, STOP])
+
+    def run() -> np.ndarray:
+        motion = jn.simulate(robot, instants, 1, tolerance=tolerance)
+        return np.cumsum(motion.q[-1, 0]) + math.pi / 2
+
+    return run
+
+
 def by_scipy(tolerance: float, start: tuple[float, ...] = START) -> Run:
     """Return DOP853 on a function of plain floats, its fastest use from Python."""
     from scipy.integrate import solve_ivp
@@ -191,6 +207,20 @@ def cases(quick: bool) -> Cases:
         ]
         return Case(f"double pendulum, 10 s, {name}", contestants, reference=REFERENCE, **more)
 
+    titled = {
+        "jounce Taylor, as a robot in the angles of its joints": by_robot,
+        "jounce Taylor, absolute coordinates": by_jounce,
+    }
+    for (title, make), aim in zip(titled.items(), (4.0, 8.0), strict=True):
+        peer = Contestant(
+            "heyoka Taylor", partial(at_tolerance, 1e-8, *METHODS["heyoka Taylor"][::2]), error, "heyoka", aim=aim
+        )
+        yield Case(
+            f"double pendulum, 10 s, tolerance 1e-08, {title.partition(', ')[2]}",
+            [Contestant(title, partial(make, 1e-8), error), peer],
+            reference=REFERENCE,
+            rounds=5,
+        )
     for tolerance in TOLERANCES[1:3] if quick else TOLERANCES:
         at = {"tolerance": tolerance}
         yield case(f"tolerance {tolerance:g}", partial(at_tolerance, tolerance), rounds=5, at=at)

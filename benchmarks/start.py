@@ -26,6 +26,19 @@ def cases(quick: bool) -> Cases:
             bare,
         ],
     )
+    imported = fresh("-c", "import jax, jax.numpy")()
+
+    def beyond() -> Told:
+        whole = fresh("-c", "import jounce; jounce.Jet; jounce.load")()
+        return Told(whole().value - imported().value)
+
+    yield Case(
+        "first names after `import jounce`, `Jet` and `load`, beyond JAX",
+        [
+            Contestant("jounce", lambda: beyond),
+            Contestant("`import jax, jax.numpy`", lambda: imported, aim=1 / 3),
+        ],
+    )
     yield Case(
         "first name after `import jounce`",
         [

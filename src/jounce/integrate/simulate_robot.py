@@ -7,6 +7,7 @@ import jax
 import numpy as np
 
 from jounce.errors import RobotError, UnsupportedError, check_name, flag
+from jounce.execution.backends import backend_of
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
 from jounce.integrate.marching.marching import Outcome
 from jounce.integrate.marching.robot_marching import Progress, RobotProblem, RobotState, RobotSteps, march_robot
@@ -77,7 +78,8 @@ def simulate_robot(
     run = _Run(problem, tolerance, longest_step, terms - 1, detectors)
     run.go(start, instants, progress)
     pushed = tuple(wrenches)
-    simulation = RobotSimulation(robot, problem, run.steps, instants, order, run.ending, run.events.happened, pushed)
+    outcome = run.ending, run.events.happened, pushed, run.backends
+    simulation = RobotSimulation(robot, problem, run.steps, instants, order, *outcome)
     if strict and run.events.stopped_at is None:
         raise_for_status(simulation)
     return simulation
@@ -151,6 +153,7 @@ class _Run:
         self.events = EventLog(detectors)
         self.parts: list[RobotSteps] = []
         self.ending = (Status.OK, "")
+        self.backends: set[str] = set()
 
     @property
     def steps(self) -> RobotSteps:
@@ -166,6 +169,7 @@ class _Run:
         current, total = Progress(np.array([begun]), start, running, none, none, nothing, nothing), 0
         while int(current.outcome) == Outcome.RUNNING and self.events.stopped_at is None:
             current, steps, taken = self._marched(current, begun, stop)
+            self.backends.add(backend_of(current))
             count = int(taken)
             total += count
             if count:

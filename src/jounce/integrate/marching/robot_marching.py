@@ -231,7 +231,7 @@ def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:
     return jnp.concatenate([jnp.maximum(sizes[:-1], jnp.maximum(moved, turned)), sizes[-1:]])
 
 
-@compiled("order", "count")
+@compiled("order", "count", alone=True)
 def march_robot(
     problem: RobotProblem,
     current: Progress,
@@ -372,6 +372,4 @@ def march_robot(
 
     room = jax.tree.map(lambda x: jnp.zeros((count, order + 2, x.shape[0])), current.state)
     used = RobotSteps(jnp.zeros(count), jnp.zeros(count), room, jnp.zeros(count, bool))
-
-    # one piece of machine code, as of mechanisms, has been seen to abort XLA here, and gains nothing at this size
     return jax.lax.while_loop(unfinished, iterate, (current, used, jnp.zeros((), int)))

@@ -3,7 +3,7 @@
 import dataclasses
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from jounce.display import Displayed
 from jounce.errors import RobotError
-from jounce.execution.backends import xla_backend
+from jounce.execution.backends import joined, xla_backend
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
 from jounce.integrate.marching.robot_marching import RobotProblem, RobotState, RobotSteps, at
@@ -64,7 +64,8 @@ class RobotSimulation(Displayed):
     steps : RobotSteps
         As polynomials.
     backend : str
-        Which arithmetic gave the numbers: "xla", with the device unless that is the processor.
+        Which arithmetic gave the numbers, of steps and of what is found at instants: "llvm", "xla" (with the device
+        unless that is the processor), or both.
     """
 
     def __init__(
@@ -77,8 +78,10 @@ class RobotSimulation(Displayed):
         ending: tuple[Status, str] = (Status.OK, ""),
         events: list[list[float]] | None = None,
         wrenches: tuple[Wrench, ...] = (),
+        steps_backends: Iterable[str] = (),
     ):
-        self.backend = xla_backend()
+        self._steps_backends = tuple(steps_backends)
+        self.backend = joined({xla_backend(), *self._steps_backends})
         self.robot, self.time, self.order, self.steps = robot, instants, order, steps
         self.events = [] if events is None else events
         self._problem, self._ending, self._wrenches = problem, ending, wrenches
@@ -220,9 +223,8 @@ class RobotSimulation(Displayed):
         """
         instants = np.atleast_1d(seconds("time", time, RobotError))
         order = self.order if order is None else order
-        return RobotSimulation(
-            self.robot, self._problem, self.steps, instants, order, self._ending, self.events, self._wrenches
-        )
+        outcome = self._ending, self.events, self._wrenches, self._steps_backends
+        return RobotSimulation(self.robot, self._problem, self.steps, instants, order, *outcome)
 
     @property
     def dataset(self) -> "xarray.Dataset":
