@@ -1,9 +1,13 @@
 """The command that smooths logs."""
 
+import json
+
 import numpy as np
+from jsonschema import Draft202012Validator
 
 import jounce as jn
 from jounce.cli import main
+from jounce.reporting.json.result_schema import result_schema
 
 
 def test_a_log_is_smoothed_written_and_read(tmp_path, capsys):
@@ -24,3 +28,25 @@ def test_a_log_is_smoothed_written_and_read(tmp_path, capsys):
     assert main(["torques", robot, str(log), "--deviation", "6e-5", "--rates", "1"]) == 0
     assert main(["smooth", robot, str(log), "--deviation", "-1", "--out", str(tmp_path / "none.csv")]) == 2
     assert not (tmp_path / "none.csv").exists()
+
+
+def test_a_smoothed_log_is_told_as_json_and_drawn(tmp_path, capsys):
+    times = np.linspace(0, 3, 601)
+    u = np.clip(times - 1, 0, 1)
+    values = u**4 * (35 - 84 * u + 70 * u**2 - 20 * u**3) + 2e-5 * np.random.default_rng(5).normal(size=601)
+    log, figure = tmp_path / "log.csv", tmp_path / "smooth.png"
+    rows = [f"{t:.9g},{q:.12g}" for t, q in zip(times, values, strict=True)]
+    log.write_text("\n".join(["time,elbow_joint", *rows]) + "\n")
+    asked = ["smooth", "examples/robots/ur5.urdf", str(log), "--deviation", "1e-4", "--json", "--figure", str(figure)]
+    assert main(asked) == 0
+    record = json.loads(capsys.readouterr().out)
+    Draft202012Validator(result_schema()).validate(record)
+    (joint,) = record["joints"]
+    assert (record["follows_noise"], record["written"], record["figure"]) == ([], None, str(figure))
+    assert 1.5e-5 < joint["noise"] < 2.5e-5
+    assert joint["farthest"] <= 1e-4
+    first, last = joint["dwells"]
+    assert first[0] == 0.0
+    assert last[1] == 3.0
+    assert 0.8 < first[1] < 1.15
+    assert figure.read_bytes()[:4] == b"\x89PNG"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -20,7 +21,6 @@ def export(
     format: Literal["franka", "ur", "ros"],  # noqa: A002 - the name of the option
     out: Path,
     rate: str | None = None,
-    joints: str | None = None,
     torques: bool = False,
     header_units: bool = False,
     reading: RobotReading = PLAIN_ROBOT,
@@ -43,8 +43,6 @@ def export(
         Write it to this file.
     rate
         Rows a second, as 1kHz; else 1 kHz, 500 Hz or 100 Hz.
-    joints
-        Their order for the controller, as shoulder,elbow; else as in the robot.
     torques
         Write torques, too.
     header_units
@@ -66,11 +64,13 @@ def export(
     from jounce.reporting.text.summaries import wrapped
 
     frequency = None if rate is None else frequency_of(rate)
-    names = None if joints is None else [name.strip() for name in joints.split(",")]
+    names = reading.chosen  # in the sequence that the controller wants, also of joints that rest
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", SampleWarning)
         model = reading.robot(robot)
-        motion = reading.trajectory(trajectory, model)
+        motion = replace(reading, joints=None).trajectory(trajectory, model)
+        if names is not None:
+            motion = motion.part([name for name in motion.names if name in names])
         spare_inputs(out, overwrite=overwrite)
         with errors_about(trajectory, robot):
             times = export_trajectory(

@@ -42,9 +42,11 @@ OPTIONS = {
     "workers",
     "chunk",
     "deviation",
+    "duration",
     "hand_over",
     "as_controller",
     "topic",
+    "joints",
 }
 """Arguments that are options of the same name, but those of another."""
 
@@ -117,6 +119,8 @@ class RobotReading:
         Between points what ros2_control's joint_trajectory_controller does.
     topic
         Of a bag, as /joint_states.
+    joints
+        Those of the trajectory that are read (export: in this order), as a,b.
     model
         Which model of an SDF file that holds several.
     closures
@@ -129,6 +133,7 @@ class RobotReading:
     allow: list[Path] | None = None
     as_controller: bool = False
     topic: str | None = None
+    joints: list[str] | None = None
     model: str | None = None
     closures: Path | None = None
 
@@ -143,8 +148,11 @@ class RobotReading:
             )
         return with_payloads(robot, self.payload or ())
 
-    def trajectory(self, file: Path, robot: Robot) -> JointTrajectory:
-        """Return the trajectory of a file, whose joints are those of a robot where it names none."""
+    def trajectory(self, file: Path, robot: Robot, *, samples: bool = False) -> JointTrajectory:
+        """Return the trajectory of a file, whose joints are those of a robot where it names none.
+
+        With `samples`, of samples their positions alone with straight lines between them, as where they are smoothed.
+        """
         from jounce.io import load_trajectory
 
         with expecting(file, "trajectory"):
@@ -155,7 +163,16 @@ class RobotReading:
                 as_controller=self.as_controller,
                 topic=self.topic,
                 robot=robot,
+                samples=samples,
+                only=self.chosen,
             )
+
+    @property
+    def chosen(self) -> list[str] | None:
+        """Joints of the trajectory that are read; None for all."""
+        if self.joints is None:
+            return None
+        return [name.strip() for text in self.joints for name in text.split(",")]
 
 
 @AMONG_THE_OTHERS

@@ -42,6 +42,9 @@ def retime(
     order: int | None = None,
     cells: int | None = None,
     deviation: str | None = None,
+    duration: str | None = None,
+    running: Path | None = None,
+    at: str | None = None,
     figure: Path | None = None,
     reading: RobotReading = PLAIN_ROBOT,
     output: TableOutput = NO_TABLE,
@@ -76,6 +79,12 @@ def retime(
         Of the path from straight lines between samples, as 0.1deg, 1mm; a
         plain number is in rad or m [0.001, or 0.001 of its size if less];
         between waypoints go splines unless it is given.
+    duration
+        Of the motion, in place of the least, as 2.5s; a plain number is in s.
+    running
+        Trajectory on which the robot is already: begin as it is at --at.
+    at
+        Instant of it, as 0.8s; a plain number is in s.
     figure
         Draw which limits bind where: .png, .svg or .pdf.
 
@@ -98,9 +107,15 @@ def retime(
     frequency = frequency_of(rate)
     asked: dict[str, Any] = {"order": order} | ({} if cells is None else {"cells": cells})
     asked |= {} if deviation is None else {"deviation": deviation_of(deviation)}
+    asked |= {} if duration is None else {"duration": duration_of(duration)}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)
+        if (running is None) != (at is None):
+            name, other = ("--at", "--running") if running is None else ("--running", "--at")
+            raise JounceError(f"says nothing without {other}; give both", name=name)
         if file.suffix.lower() in DATA_FILES:
+            if running is not None:
+                raise JounceError("is for robots; a mechanism starts at rest or with rates", name="--running")
             if path is not None or repair or deviation is not None:
                 name = "--repair" if repair else "path" if path is not None else "--deviation"
                 raise JounceError("the path of a mechanism is that of its drivers, which is not repaired", name=name)
@@ -109,7 +124,14 @@ def retime(
             if path is None:
                 raise JounceError("a robot needs a path; give its file", name="path")
             result = _of_robot(
-                file, path, limits, frequency, asked | {"repair": repair, "hand_over": hand_over}, reading, output
+                file,
+                path,
+                limits,
+                frequency,
+                asked | {"repair": repair, "hand_over": hand_over},
+                reading,
+                output,
+                None if running is None or at is None else (running, instant_of(at)),
             )
     _write_result(result, (file, path), figure, output)
     return 0 if result.retimed.report.kept else 1
@@ -120,6 +142,38 @@ def deviation_of(text: str) -> float:
     from jounce.units.dimensions import ANGLE, LENGTH
 
     return positive_quantity("--deviation", text, (ANGLE, LENGTH), "an angle or a length, such as 0.1deg or 1mm")
+
+
+def duration_of(text: str) -> float:
+    """Return a time, s."""
+    from jounce.units.dimensions import TIME
+
+    return positive_quantity("--duration", text, (TIME,), "a time, such as 2.5s")
+
+
+def instant_of(text: str) -> float:
+    """Return an instant, s, that may be zero."""
+    from jounce.units.dimensions import TIME
+
+    return (
+        0.0 if text.strip() in ("0", "0s", "0 s") else positive_quantity("--at", text, (TIME,), "an instant, as 0.8s")
+    )
+
+
+def _state(model: Any, names: Any, running: tuple[Path, float], reading: RobotReading) -> Any:
+    """Return positions, velocities and accelerations of the joints of a path on a running trajectory."""
+    import numpy as np
+
+    file, instant = running
+    motion = reading.trajectory(file, model)
+    for name in names:
+        if name not in motion.names:
+            raise JounceError("the running trajectory does not name this joint of the path", path=file, name=name)
+    if not motion.start <= instant <= motion.stop:
+        message = f"the running trajectory goes from {motion.start:g} s to {motion.stop:g} s"
+        raise JounceError(message, path=file, name="--at", value=instant)
+    values = motion.derivatives(np.array([instant]), 2)[0]
+    return values[:, [motion.names.index(name) for name in names]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -148,7 +202,14 @@ def _of_mechanism(file: Path, limits: Path | None, rate: float, asked: Any, read
 
 
 def _of_robot(
-    file: Path, path: Path, limits: Path | None, rate: float, asked: Any, reading: RobotReading, output: TableOutput
+    file: Path,
+    path: Path,
+    limits: Path | None,
+    rate: float,
+    asked: Any,
+    reading: RobotReading,
+    output: TableOutput,
+    running: tuple[Path, float] | None,
 ) -> _Result:
     from jounce.io import load_motion_limits, load_path
     from jounce.planning import retime as find
@@ -161,13 +222,17 @@ def _of_robot(
         with expecting(limits, "limits"):
             bounds = load_motion_limits(limits, model)
     with expecting(path, "trajectory"):
-        given = load_path(path, reading.degree, allowed(reading.allow), topic=reading.topic, robot=model)
+        given = load_path(
+            path, reading.degree, allowed(reading.allow), topic=reading.topic, robot=model, only=reading.chosen
+        )
+    if running is not None:
+        asked = asked | {"state": _state(model, given.names, running, reading)}
     spare_inputs(output.out, overwrite=output.overwrite)
     with errors_about(path, file):
         retimed = find(model, given, bounds, **asked)
         free, read = retimed.stop, None
         if output.out is not None:
-            retimed, read = _at_rate(model, retimed, bounds, rate, reading.degree)
+            retimed, read = _at_rate(model, retimed, bounds, rate, reading.degree, "duration" in asked)
     return _Result(retimed, free, given.stop - given.start if isinstance(given, JointTrajectory) else None, read)
 
 
@@ -193,12 +258,14 @@ def _write_result(result: _Result, files: tuple[Path, Path | None], figure: Path
     output.tell("retime", lambda: retiming_result(retimed, result.before, result.free, files, written_files))
 
 
-def _at_rate(model: Any, retimed: RetimedTrajectory, bounds: Any, rate: float, degree: int) -> tuple[Any, Any]:
+def _at_rate(
+    model: Any, retimed: RetimedTrajectory, bounds: Any, rate: float, degree: int, lasting: bool
+) -> tuple[Any, Any]:
     """Return the trajectory that rows at a rate describe, its limits kept by splines through them."""
     from jounce.planning.retiming.sampling import fit_to_samples
 
     try:
-        return fit_to_samples(model, retimed, bounds, rate, degree=degree)
+        return fit_to_samples(model, retimed, bounds, rate, degree=degree, lasting=lasting)
     except JounceError as error:
         raise error.located(name="--rate") from None
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.errors import TrajectoryError
 from jounce.jet import Jet
 from jounce.plot.style import GRAY, LINE_COLORS, blank_figure, set_ticks, shown_name, style
 
@@ -38,16 +37,13 @@ def draw_retiming(retimed: RetimedTrajectory, title: str = "") -> Figure:
         Bars where nothing is left of a limit, one row for each; on the right by how many ms the duration would fall
         were it one percent higher.
 
-    Raises
-    ------
-    TrajectoryError
-        If no limit binds.
+        Where none does, as of a motion that was given more time, the rate alone.
     """
     active = retimed.active
     binds, price = active["binds"].values, active["price"].values.sum(axis=0)
     bound = np.flatnonzero(binds.any(axis=0))
     if not bound.size:
-        raise TrajectoryError("no limit binds this trajectory; there is nothing to draw", name="active")
+        return _rate_alone(retimed, title or retimed.report.robot)
     chosen = sorted(bound[np.argsort(-price[bound])][:MOST].tolist())
     names = [str(x) for x in active["limit"].values]
     words = list(dict.fromkeys(_quantity(name) for name in names))
@@ -70,6 +66,17 @@ def draw_retiming(retimed: RetimedTrajectory, title: str = "") -> Figure:
         bars.set_title("limits that bind; right: saved if 1 % higher", loc="left", fontsize=7.5, color=GRAY, pad=4)
         set_ticks(bars.xaxis, 6)
         bars.set_xlim(0, retimed.stop)
+    return figure
+
+
+def _rate_alone(retimed: RetimedTrajectory, title: str) -> Figure:
+    with style():
+        figure = blank_figure(WIDTH, RATE + 1.0, title, h_pad=0.06)
+        axes = figure.subplots(1, 1)
+        _draw_rate(retimed, axes)
+        axes.set_xlabel("time  $t$  (s)")
+        axes.set_title("no limit binds", loc="left", fontsize=7.5, color=GRAY, pad=4)
+        axes.set_xlim(0, retimed.stop)
     return figure
 
 

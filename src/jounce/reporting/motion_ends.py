@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
-from jounce.planning.retiming.sampled_paths import lines_of, samples_of
+from jounce.planning.retiming.sampled_paths import lines_of
 from jounce.planning.retiming.straight_lines import polynomials_at
+from jounce.planning.smoothing.smooth import sampled
 from jounce.trajectory import HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
 
 WITH_VELOCITIES = 5  # degree of splines through positions and velocities
@@ -78,7 +79,7 @@ def between_facts(trajectory: JointTrajectory) -> Mapping[str, Any] | None:
     if not by_words:
         return None
     away, joint, at = 0.0, None, None
-    if all(samples_of(law) is not None for law in trajectory.laws.values()):
+    if all(sampled(law) is not None for law in trajectory.laws.values()):
         away, joint, at = _farthest(trajectory)
     return {"words": "; ".join(by_words), "deviation": away, "joint": joint, "at": at}
 
@@ -90,7 +91,7 @@ def _words(law: object) -> str | None:
     if isinstance(law, HermiteSplineMotion):
         given = "positions and velocities" if law.degree == WITH_VELOCITIES else "positions, velocities, accelerations"
         return f"{given}: splines of degree {law.degree} through {len(law.samples.value[0])} samples"
-    if isinstance(law, SplineMotion) and samples_of(law) is not None:
+    if isinstance(law, SplineMotion) and sampled(law) is not None:
         return f"positions alone: splines of degree {law.degree} through {len(law.samples.value[0])} samples"
     return None
 

@@ -12,7 +12,7 @@ from jounce.trajectory.composed import FollowingMotion
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion, SplineMotion
 from jounce.trajectory.profiles import AbstractProfile
 from jounce.trajectory.seen_jumps import seen_jumps
-from jounce.trajectory.smoothness import HIGHEST, known_jumps
+from jounce.trajectory.smoothness import HIGHEST, SeenLeaders, known_jumps
 from jounce.trajectory.stacking import law_derivatives
 
 BENDING = frozenset({"abs", "sign", "sqrt", "asin", "acos", "atan2"})  # functions that may have kinks or jumps
@@ -49,11 +49,11 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
     >>> law_breaks([ramp, bent], 0.0, 1.0, 4).round(9).tolist()
     [0.1, 0.25, 0.75]
     """
-    found = [np.zeros(0)]
+    found, seen = [np.zeros(0)], SeenLeaders()
     every = {id(law): law for law in _with_leaders(laws)}.values()  # several laws may have one leader
     for law in every if last > first else ():
         level = min(order + 1, HIGHEST)
-        instants, jumps, _ = known_jumps(law, first, last, level)
+        instants, jumps, _ = known_jumps(law, first, last, level, seen)
         jump, bend = np.any(jumps[:-1] != 0, axis=0), jumps[-1] != 0
         found.append(instants[jump | bend if np.sum(jump | bend) <= MOST else jump])
         if _may_bend(law):

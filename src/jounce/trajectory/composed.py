@@ -112,7 +112,8 @@ class FollowingMotion(MadeOfOthers):
         try:
             law.check_instants(-np.inf, np.inf)
         except JounceError:
-            pass
+            if not np.isfinite([first, last]).all():
+                raise  # asked whether there are ends, as of a law that follows this one
         else:  # it has no ends
             return leader.check_instants(first, last)
         leader.check_instants(first, last)

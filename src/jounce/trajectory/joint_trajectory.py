@@ -80,6 +80,24 @@ class JointTrajectory(Displayed):
         self.times = self._inside(instants)
         self.measures = MappingProxyType(dict(measures or {}))
 
+    def part(self, names: Sequence[str]) -> "JointTrajectory":
+        """Return the trajectory of some of the joints alone.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Of its joints.
+
+        Examples
+        --------
+        >>> import jounce as jn
+        >>> jn.JointTrajectory({"a": "t", "b": "t**2"}, 0.0, 1.0).part(["b"]).names
+        ('b',)
+        """
+        laws = {name: self.laws[name] for name in names}
+        measures = {name: measure for name, measure in self.measures.items() if name in laws}
+        return JointTrajectory(laws, self.start, self.stop, self.times, measures)
+
     @classmethod
     def from_samples(
         cls, times: ArrayLike, positions: ArrayLike, names: Sequence[str], degree: int = 5

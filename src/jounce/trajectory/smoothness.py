@@ -20,7 +20,7 @@ from jounce.trajectory.user_laws import ReadMotion
 HIGHEST = 10  # derivative that is looked at
 MOST_CROSSINGS = 10_000
 INTERVALS = 4000  # at a leader, for where it passes a knot of the law that follows it
-STEPS = 60  # of bisection
+STEPS = 44  # of bisection between two of these: to rounding
 SLACK = 1e-6  # of the time between two looks, by which a crossing at an end may be beyond it
 BROKEN = {"abs": "kinks", "sign": "jumps"}  # what functions of expressions have where their argument is zero
 ROUNDING = 1e-9  # of the way of a profile by its duration to the power of the order: a smaller jump is none
@@ -145,8 +145,23 @@ def knots(law: AbstractMotion, first: float, last: float) -> Float[np.ndarray, "
     return np.unique(instants[np.any(jumps != 0, axis=0)])
 
 
+class SeenLeaders:
+    """Values of leaders that several laws follow, so that each is evaluated but once: while one thing is found."""
+
+    def __init__(self) -> None:
+        self._values: dict[tuple[int, int, bytes], tuple[AbstractMotion, list[np.ndarray]]] = {}
+
+    def coefficients(self, leader: AbstractMotion, instants: np.ndarray, order: int = 0) -> list[np.ndarray]:
+        """Return the Taylor coefficients of a leader at instants."""
+        key = id(leader), order, instants.tobytes()
+        if key not in self._values:
+            jet = leader(Jet.variable(instants, order) if order else Jet([instants])).dense()
+            self._values[key] = leader, [np.asarray(c) for c in jet.coefficients]
+        return self._values[key][1]
+
+
 def known_jumps(
-    law: AbstractMotion, first: float, last: float, order: int
+    law: AbstractMotion, first: float, last: float, order: int, seen: SeenLeaders | None = None
 ) -> tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "levels knots"], bool]:
     """Return the instants at which derivatives up to an order are known to jump, by how much, and if these are all.
 
@@ -158,6 +173,8 @@ def known_jumps(
         s.
     order : int
         Highest derivative.
+    seen : SeenLeaders, optional
+        What is known of leaders, where several laws are asked about.
 
     Examples
     --------
@@ -166,7 +183,7 @@ def known_jumps(
     >>> instants.tolist(), sizes[:, 0].tolist(), all_of_them  # expressions may have kinks of their own
     ([1.0], [0.0, 1.0, 0.0], False)
     """
-    instants, sizes, _ = _jumps(law, first, last, order)
+    instants, sizes, _ = _jumps(law, first, last, order, seen)
     return instants, sizes, _is_of_polynomials(law)
 
 
@@ -178,18 +195,18 @@ def _is_of_polynomials(law: AbstractMotion) -> bool:
 
 
 def _jumps(
-    law: AbstractMotion, first: float, last: float, order: int = HIGHEST
+    law: AbstractMotion, first: float, last: float, order: int = HIGHEST, seen: SeenLeaders | None = None
 ) -> tuple[np.ndarray, Float[np.ndarray, "levels knots"], str]:
     """Return the instants in a time at which derivatives jump, by how much, and what is not known."""
-    none = np.zeros(0), np.zeros((order + 1, 0))
+    none, seen = (np.zeros(0), np.zeros((order + 1, 0))), seen or SeenLeaders()
     match law:
         case OutputMotion() if law.parts:
-            return _jumps(law.parts[0], first, last, order)
+            return _jumps(law.parts[0], first, last, order, seen)
         case FollowingMotion() if law.parts:
             following, leader = law.parts
-            return _followed(following, leader, first, last, order)
+            return _followed(following, leader, first, last, order, seen)
         case IntegratedMotion() if law.parts:
-            instants, sizes, unknown = _jumps(law.parts[0], first, last, max(order - 1, 0))
+            instants, sizes, unknown = _jumps(law.parts[0], first, last, max(order - 1, 0), seen)
             return instants, np.concatenate([np.zeros((1, len(instants))), sizes])[: order + 1], unknown
         case PiecewiseMotion() if law.parts:
             return _of_pieces(law, first, last, order)
@@ -260,7 +277,7 @@ def _of_pieces(law: PiecewiseMotion, first: float, last: float, order: int) -> t
 
 
 def _followed(
-    law: AbstractMotion, leader: AbstractMotion, first: float, last: float, order: int
+    law: AbstractMotion, leader: AbstractMotion, first: float, last: float, order: int, seen: SeenLeaders
 ) -> tuple[np.ndarray, np.ndarray, str]:
     """Return the jumps of a law of what a leader prescribes, where the leader passes its knots.
 
@@ -268,34 +285,33 @@ def _followed(
     of the leader there.
     """
     none = np.zeros(0), np.zeros((order + 1, 0))
-    own, _, unknown = _jumps(leader, first, last, order)
+    own, _, unknown = _jumps(leader, first, last, order, seen)
     if len(own):
         unknown = "its leader has jumps of its own"
     if isinstance(law, SplineMotion) and not knot_jumps(law, order)[1].any():
         return *none, unknown
     looks = np.linspace(first, last, INTERVALS + 1)
-    values = np.asarray(leader(Jet([looks])).coefficients[0])
-    knots, jumps, less = _jumps(law, float(values.min()), float(values.max()), order)
+    values = seen.coefficients(leader, looks)[0]
+    knots, jumps, less = _jumps(law, float(values.min()), float(values.max()), order, seen)
     if not jumps.any():
         return *none, unknown or less
-    peaks = Jet(np.max(np.abs(c)) for c in leader(Jet.variable(looks, order)).dense().coefficients)
-    peaks = Jet((0.0, *peaks.coefficients[1:]))
+    peaks = [np.max(np.abs(c)) for c in seen.coefficients(leader, looks, order)]
     step = (last - first) / INTERVALS
     # a knot at which the leader begins or ends is passed on the way there, or from there
     looks = np.concatenate([[first - step], looks, [last + step]])
-    values = np.asarray(leader(Jet([looks])).coefficients[0])
+    values = seen.coefficients(leader, looks)[0]
     jumping = jumps.any(axis=0)
     knots, jumps = knots[jumping], jumps[:, jumping]
     which, crossing = _passed(values, knots)
     if not len(which):
         return *none, unknown or less
-    times = _crossings(leader, knots[which], looks[crossing], looks[crossing + 1])
+    times = _crossings(leader, knots[which], looks[crossing], looks[crossing + 1], seen)
     inside = (times > first - SLACK * step) & (times < last + SLACK * step)
     sequence = np.flatnonzero(inside)[np.argsort(times[inside])]
     which, crossing, times = which[sequence], crossing[sequence], np.clip(times[sequence], first, last)
-    passing = leader(Jet.variable(times, order)).dense().coefficients
-    change = _composed(jumps[:, which], Jet((np.zeros_like(times), *passing[1:])))  # at the knot, not near it
-    bound = _composed(np.abs(jumps), peaks)[:, which]
+    passing = seen.coefficients(leader, times, order)
+    change = _composed(jumps[:, which], np.stack([0 * times, *passing[1:]]))  # at the knot, not near it
+    bound = _composed(np.abs(jumps), np.stack([0.0, *peaks[1:]])[:, None])[:, which]
     forward = np.where(values[crossing] < knots[which], 1.0, -1.0)
     return times, np.where(np.abs(change) <= 1e-9 * bound, 0.0, forward * change), unknown or less
 
@@ -313,19 +329,25 @@ def _passed(
     return sequence[first[crossing] + place], crossing
 
 
-def _composed(jump: Float[np.ndarray, "levels crossing"], away: Jet) -> Float[np.ndarray, "levels crossing"]:
+def _composed(
+    jump: Float[np.ndarray, "levels crossing"], away: Float[np.ndarray, "levels #crossing"]
+) -> Float[np.ndarray, "levels crossing"]:
     """Return the derivatives by time of polynomials, given by their derivatives at zero, of how far a leader is."""
-    change = Jet.constant(np.zeros(jump.shape[1]), len(jump) - 1)
-    for level in range(len(jump) - 1, -1, -1):
-        change = change * away + jump[level] / math.factorial(level)
-    return np.asarray(change.derivatives())
+    levels = len(jump)
+    change = np.zeros(jump.shape)
+    for level in range(levels - 1, -1, -1):
+        change = np.stack([sum(away[k - j] * change[j] for j in range(k + 1)) for k in range(levels)])
+        change[0] += jump[level] / math.factorial(level)
+    return change * np.array([math.factorial(k) for k in range(levels)], float)[:, None]
 
 
-def _crossings(leader: AbstractMotion, knots: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+def _crossings(
+    leader: AbstractMotion, knots: np.ndarray, low: np.ndarray, high: np.ndarray, seen: SeenLeaders
+) -> np.ndarray:
     """Return when a leader passes values, each between an instant before and one after, by bisection."""
 
     def away(instants: np.ndarray) -> np.ndarray:
-        return np.asarray(leader(Jet([instants])).coefficients[0]) - knots
+        return seen.coefficients(leader, instants)[0] - knots
 
     below = away(low) < 0
     for _ in range(STEPS):

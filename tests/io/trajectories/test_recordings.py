@@ -386,3 +386,42 @@ def test_joints_of_a_robot_for_a_table_that_names_none(tmp_path):
     path = table(tmp_path, "time,q_0,q_1", [TIMES, *Q])
     with pytest.raises(TrajectoryError, match="2 joints without names, and the robot 6 that move"):
         jn.load_trajectory(path, robot=robot)
+
+
+def controller_states(part, count=51, rate=True):
+    states = []
+    for k in range(count):
+        measured = {"positions": Q[:, k].tolist(), "velocities": V[:, k].tolist() if rate else []}
+        ordered = {"positions": (Q[:, k] + 0.1).tolist(), "velocities": []}
+        stamp = {"sec": 1732686000 + k // 50, "nanosec": k % 50 * 20_000_000}
+        names = {"feedback": "reference", "actual": "desired"}
+        states.append(
+            {"header": {"stamp": stamp}, "joint_names": list(JOINTS), names[part]: ordered, part: measured, "error": {}}
+        )
+    return states
+
+
+@pytest.mark.parametrize("part", ["feedback", "actual"])
+def test_states_of_a_controller_are_what_was_measured(tmp_path, part):
+    path = tmp_path / "state.yaml"
+    path.write_text(yaml.safe_dump_all(controller_states(part), explicit_start=True))
+    with pytest.warns(jn.errors.RecordingWarning, match=rf"what was measured is read \({part}\)"):
+        found = jn.load_trajectory(path)
+    check(found)
+    short = tmp_path / "short.yaml"
+    states = controller_states(part, 3)
+    states[1][part]["positions"] = [0.0]
+    short.write_text(yaml.safe_dump_all(states, explicit_start=True))
+    with pytest.raises(TrajectoryError, match="must be 2 finite numbers, one for each joint: positions"):
+        jn.load_trajectory(short)
+
+
+def test_joints_are_selected_where_a_file_has_more(tmp_path):
+    path = table(tmp_path, "time,gripper,shoulder,elbow", [TIMES, TIMES, *Q])
+    check(jn.load_trajectory(path, only=JOINTS))
+    assert jn.load_trajectory(path, only=["elbow"]).names == ("elbow",)
+    with pytest.raises(TrajectoryError, match=r"log\.csv, joints: .*did you mean 'elbow'"):
+        jn.load_trajectory(path, only=["elbo"])
+    laws = tmp_path / "laws.yaml"
+    laws.write_text("joints: {shoulder: sin(t), gripper: t}\ntime: {start: 0, stop: 1, count: 11}\n")
+    assert jn.load_trajectory(laws, only=["shoulder"]).names == ("shoulder",)

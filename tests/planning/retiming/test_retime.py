@@ -152,6 +152,79 @@ def test_rates_at_the_ends_are_kept():
     assert duration * (1 - 1e-9) < found.stop < duration * 1.003
 
 
+def test_a_duration_is_kept_and_one_that_is_too_short_is_told_with_the_least():
+    robot = cart(velocity=SPEED, acceleration=ACCELERATION)
+    slow = jn.retime(robot, LINE, duration=4.0)
+    assert slow.stop == pytest.approx(4.0, rel=1e-12)
+    assert slow.report.kept
+    times = np.linspace(0.0, 4.0, 4001)
+    q, v, a = slow.derivatives(times, 2)[:, :, 0].T
+    np.testing.assert_allclose(q[[0, -1]], [0.0, LENGTH], atol=1e-9)
+    assert np.abs(v).max() == pytest.approx(SPEED * TRAPEZOID / 4, rel=3e-3)  # the trapezoid, slowed evenly
+    assert np.abs(a).max() == pytest.approx(ACCELERATION * (TRAPEZOID / 4) ** 2, rel=1e-2)
+    with pytest.raises(TrajectoryError, match=r"duration: the least time .* is 2\.50\d* s.*2\.4"):
+        jn.retime(robot, LINE, duration=2.4)
+    for wrong in (0.0, -1.0, np.nan):
+        with pytest.raises(TrajectoryError, match="duration: must be"):
+            jn.retime(robot, LINE, duration=wrong)
+    given = jn.JointTrajectory.point_to_point(["slide"], [0.0], [1.0], duration=2.0)
+    with pytest.raises(TrajectoryError, match="duration: a repaired trajectory"):
+        jn.retime(robot, given, repair=True, duration=3.0)
+
+
+def test_a_duration_holds_also_with_speeds_at_the_ends_and_with_damping():
+    robot = cart(velocity=SPEED, acceleration=ACCELERATION)
+    found = jn.retime(robot, LINE, rates=(0.25, 0.1), duration=6.0)
+    assert found.stop == pytest.approx(6.0, rel=1e-9)
+    q, v, a = found.derivatives(np.linspace(0.0, found.stop, 8001), 2)[:, :, 0].T
+    np.testing.assert_allclose(v[[0, -1]], [0.5, 0.2], rtol=1e-6)
+    np.testing.assert_allclose(q[[0, -1]], [0.0, LENGTH], atol=1e-9)
+    assert np.abs(a).max() <= ACCELERATION * (1 + 1e-6)
+    assert np.all(v <= 0.5 * (1 + 1e-6))
+
+
+def test_limits_that_differ_by_direction():
+    limits = {"slide": jn.Limits(velocity=2.0, acceleration=8.0)}
+    directed = jn.planning.MotionLimits(limits, backward={"slide": jn.Limits(velocity=0.5, acceleration=2.0)})
+    robot = cart()
+    there, back = jn.retime(robot, LINE, directed), jn.retime(robot, LINE[::-1], directed)
+    # speeds up by 8 and slows down by 2, or the other way round
+    forward = LENGTH / 2 + 2 / 2 * (1 / 8 + 1 / 2)
+    backward = LENGTH / 0.5 + 0.5 / 2 * (1 / 8 + 1 / 2)
+    for found, expected in ((there, forward), (back, backward)):
+        assert expected * (1 - 1e-9) < found.stop < expected * 1.003
+        v, a = found.derivatives(np.linspace(0.0, found.stop, 8001), 2)[:, 1:, 0].T
+        assert -0.5 * (1 + 1e-6) <= v.min() <= v.max() <= 2 * (1 + 1e-6)
+        assert -2 * (1 + 1e-6) <= a.min() <= a.max() <= 8 * (1 + 1e-6)
+        assert found.report.kept
+    report = check_motion(
+        robot, there, jn.planning.MotionLimits(limits, backward={"slide": jn.Limits(acceleration=1.9)})
+    )
+    (broken,) = report.broken
+    assert (broken.quantity, broken.limit) == ("acceleration", -1.9)
+    assert broken.ratio == pytest.approx(2 / 1.9, rel=2e-3)
+
+
+def test_a_pull_that_is_weaker_than_the_push():
+    limits = jn.planning.MotionLimits(
+        {"slide": jn.Limits(velocity=9.0, effort=4.0, effort_rate=80.0)},
+        backward={"slide": jn.Limits(effort=1.0, effort_rate=20.0)},
+    )
+    found = jn.retime(cart(), LINE, limits)
+    force, rate = found.derivatives(np.linspace(0.0, found.stop, 8001), 3)[:, 2:, 0].T  # of a mass of 1 kg
+    assert -1 * (1 + 1e-6) <= force.min() < -0.99
+    assert 3.9 < force.max() <= 4 * (1 + 1e-6)
+    assert -20 * (1 + 1e-6) <= rate.min() < -19
+    assert rate.max() <= 80 * (1 + 1e-6)
+
+
+def test_bad_limits_by_direction_are_named():
+    with pytest.raises(RobotError, match=r"backward\.slide: a range has no direction"):
+        jn.planning.MotionLimits(backward={"slide": jn.Limits(upper=1.0)})
+    with pytest.raises(RobotError, match="did you mean 'slide'"):
+        jn.retime(cart(velocity=1.0), LINE, jn.planning.MotionLimits(backward={"slid": jn.Limits(velocity=1.0)}))
+
+
 @pytest.mark.slow
 def test_scaling_reversal_and_looser_limits():
     path = [[-1.0], [0.3], [1.2]]

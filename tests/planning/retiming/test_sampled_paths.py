@@ -1,4 +1,4 @@
-"""Paths of samples: within a deviation of the straight lines between them, whatever noise, rounding and dwells do."""
+"""Paths of samples: within a deviation of each of them, whatever noise, rounding and dwells do."""
 
 import itertools
 
@@ -61,17 +61,19 @@ KINDS = "rounded", "exact dwells", "few", "noise", "encoder", "there and back", 
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("deviation", [None, 1e-2])
-def test_a_path_of_samples_is_near_the_straight_lines_between_them(kind, deviation):
+def test_a_path_of_samples_is_near_them(kind, deviation):
     times, points = samples(kind)
     names = [f"j{k}" for k in range(points.shape[1])]
     path = path_of(jn.JointTrajectory.from_samples(times, points, names), None, 2, Between(deviation))
     stated = min(1e-3, 1e-3 * np.linalg.norm(np.ptp(points, axis=0))) if deviation is None else deviation
     assert path.allowed == pytest.approx(stated)
     places = path.derivatives(np.linspace(path.start, path.stop, 4001), 0)[:, 0]
-    assert distances(places, points).max() <= path.deviation + 1e-9 <= stated + 2e-9
-    assert distances(points, places).max() <= 1.2 * stated  # and it leaves none of them out
-    np.testing.assert_allclose(places[[0, -1]], points[[0, -1]], atol=1e-12)
-    inside = np.ptp(points, axis=0) * 1e-7 + 1e-12  # of what was sampled it leaves nothing
+    apart = stated * np.sqrt(points.shape[1])  # of joints that are each within it
+    assert path.deviation <= stated + 2e-9
+    assert distances(places, points).max() <= 1.2 * apart
+    assert distances(points, places).max() <= 1.2 * apart  # and it leaves none of them out
+    np.testing.assert_allclose(places[[0, -1]], points[[0, -1]], atol=stated)
+    inside = stated if len(points) >= 12 else np.ptp(points, axis=0) * 1e-7 + 1e-12
     if kind not in ("noise", "uneven"):
         assert (places.min(axis=0) >= points.min(axis=0) - inside).all()
         assert (places.max(axis=0) <= points.max(axis=0) + inside).all()
@@ -107,7 +109,11 @@ def test_where_times_count_dwells_stay_still_and_each_instant_is_near(kind):
     at = np.linspace(times[0], times[-1], 3001)
     lines = np.stack([np.interp(at, times, column) for column in points.T], axis=1)
     values = path.derivatives(at, 1)
-    assert np.linalg.norm(values[:, 0] - lines, axis=1).max() <= 2e-3 * (1 + 1e-9)
+    own = np.abs(path.derivatives(times, 0)[:, 0] - points)
+    if len(times) >= 12:
+        assert own.max() <= 2e-3 * (1 + 1e-9)
+    else:
+        assert np.linalg.norm(values[:, 0] - lines, axis=1).max() <= 2e-3 * (1 + 1e-9)
     if kind in ("rounded", "few"):
         dwell = at < (0.8 if kind == "rounded" else 1.5)
         assert np.abs(values[dwell, 1]).max() == 0.0
@@ -146,9 +152,9 @@ def test_what_would_bend_too_sharply_is_refused_by_joint_and_instant():
     rng = np.random.default_rng(0)
     points = np.stack([0.1 * t, rng.normal(scale=0.05, size=t.size)], axis=1)
     given = jn.JointTrajectory.from_samples(t, points, ["even", "noisy"])
-    with pytest.raises(TrajectoryError, match=r"noisy: .*at t = \d.* s; choose a larger deviation"):
+    with pytest.raises(TrajectoryError, match=r"noisy: .*about t = \d.* s, .* choose a larger one"):
         path_of(given, None, 2, Between(1e-6))
-    with pytest.raises(TrajectoryError, match=r"(even|noisy): .*t = .* s of the samples.*larger deviation"):
+    with pytest.raises(TrajectoryError, match=r"(even|noisy): .*(choose|allow) a larger"):
         cells_needed(path_of(given, None, 2, Between(0.02)), 2)
     with pytest.raises(TrajectoryError, match="does not move"):
         path_of(jn.JointTrajectory.from_samples(t, np.ones((t.size, 1)), ["j"]), None, 2)

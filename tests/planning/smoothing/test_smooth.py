@@ -4,9 +4,11 @@ import pickle
 
 import numpy as np
 import pytest
+from scipy.interpolate import PPoly
 
 import jounce as jn
 from jounce.errors import TrajectoryError
+from jounce.planning.smoothing import bases
 
 
 def minimum_jerk(times, start, duration, size):
@@ -91,6 +93,31 @@ def test_uneven_stamps_and_all_derivatives_are_continuous():
     again = pickle.loads(pickle.dumps(motion))
     assert again.deviation == motion.deviation
     assert again.joints == motion.joints
+
+
+@pytest.mark.parametrize("seed, noise", [(77, 2e-5), (78, 1e-4)])
+def test_moves_that_begin_slowly_are_no_dwells(seed, noise):
+    generator, times = np.random.default_rng(seed), np.arange(0.0, 30.0005, 1e-3)
+    clean, jerk, start, sign = np.zeros_like(times), np.zeros_like(times), 0.5, 1
+    while start < 27.0:
+        duration, size = generator.uniform(0.6, 2.5), sign * generator.uniform(0.2, 1.0)
+        clean += minimum_snap(times, start, duration, size)
+        u = np.clip((times - start) / duration, 0, 1)
+        jerk += size * (840 * u - 5040 * u**2 + 8400 * u**3 - 4200 * u**4) / duration**3
+        start, sign = start + duration + generator.uniform(0.0, 1.5), -sign
+    _, law, _ = law_of(times, clean + noise * generator.normal(size=len(times)), 6 * noise)
+    found = np.abs(PPoly(np.asarray(law.coefficients)[::-1], np.append(law.breakpoints, law.stop))(times, 3))
+    assert 0.75 < found.max() / np.abs(jerk).max() < 1.25
+
+
+def test_long_logs_are_smoothed_part_by_part_as_they_are_whole(monkeypatch):
+    times = np.arange(0.0, 8.0, 2e-3)
+    values = np.sin(times) + 1e-5 * np.random.default_rng(6).normal(size=len(times))
+    _, whole, _ = law_of(times, values, 3.5e-5)
+    monkeypatch.setattr(bases, "PART", 7)
+    _, parts, own = law_of(times, values, 3.5e-5)
+    assert own.away <= 3.5e-5
+    np.testing.assert_allclose(derivative(parts, times, 2), derivative(whole, times, 2), rtol=0, atol=1e-7)
 
 
 def test_what_is_refused_is_named():

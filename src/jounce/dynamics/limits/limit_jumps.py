@@ -9,7 +9,7 @@ from jaxtyping import Float
 from jounce.dynamics.limits.trajectories import BLOCK, FollowedTrajectory
 from jounce.execution.chunks import in_chunks
 from jounce.trajectory.seen_jumps import level_sizes, seen_jumps
-from jounce.trajectory.smoothness import known_jumps
+from jounce.trajectory.smoothness import SeenLeaders, known_jumps
 from jounce.trajectory.stacking import law_derivatives
 
 SMALL = 1e-9  # of the largest value of a derivative: a smaller jump is rounding
@@ -83,8 +83,9 @@ def jumps_of(
         nothing = np.zeros((0, order + 1, joints))
         return Jumps(np.zeros(0), nothing, nothing)
     instants, sizes, unknown = [np.zeros(0)], [np.zeros((0, order, joints))], []
+    leaders = SeenLeaders()
     for column, law in zip(followed.columns, trajectory.laws.values(), strict=True):
-        own, jumps, everything = known_jumps(law, first, last, order - 1)
+        own, jumps, everything = known_jumps(law, first, last, order - 1, leaders)
         spread = np.zeros((len(own), order, joints))
         spread[:, :, column] = jumps.T
         instants.append(own)

@@ -73,8 +73,11 @@ def load_limits(path: str | PathLike[str], robot: Robot) -> dict[str, Limits]:
     """
     limits_file = _LimitsFile(read_source(path, kind="limits", error_type=RobotError), robot)
     limits = limits_file.limits()
-    if limits_file.jounce or limits_file.varying or limits_file.points():
-        message = "has limits of jounce, of points, or that depend on the position; read it with load_motion_limits"
+    if limits_file.jounce or limits_file.varying or limits_file.backward or limits_file.points():
+        message = (
+            "has limits of jounce, of points, or that depend on the position or the direction; read it with "
+            "load_motion_limits"
+        )
         raise limits_file.source.error(message)
     return limits
 
@@ -84,7 +87,8 @@ def load_motion_limits(path: str | PathLike[str], robot: Robot) -> MotionLimits:
     """Read limits of all kinds that `retime` and ``jounce check`` keep from a file.
 
     Besides what `load_limits` reads, entries have the key ``jounce``; a limit of a joint may depend on its position
-    ``q``, as an expression or as a table, ``{q: [0, 1 rad], value: [2, 1 rad/s]}``, which is interpolated linearly;
+    ``q``, as an expression or as a table, ``{q: [0, 1 rad], value: [2, 1 rad/s]}``, which is interpolated linearly, or
+    on the direction, ``[-1 rad/s, 2 rad/s]``: the lowest and the highest value;
     and ``points`` gives links, with the keys ``point`` (in the frame of the link), ``speed`` and ``acceleration``.
 
     Parameters
@@ -115,7 +119,8 @@ def load_motion_limits(path: str | PathLike[str], robot: Robot) -> MotionLimits:
     """
     limits_file = _LimitsFile(read_source(path, kind="limits", error_type=RobotError), robot)
     joints = limits_file.limits()
-    return MotionLimits(joints, limits_file.jounce, limits_file.varying, limits_file.points())
+    backward = {name: Limits(**own) for name, own in limits_file.backward.items()}
+    return MotionLimits(joints, limits_file.jounce, limits_file.varying, limits_file.points(), backward)
 
 
 class _LimitsFile:
@@ -125,6 +130,7 @@ class _LimitsFile:
         self.source, self.robot = source, robot
         self.jounce: dict[str, float] = {}
         self.varying: dict[str, dict[str, PositionLaw]] = {}
+        self.backward: dict[str, dict[str, float]] = {}
 
     def limits(self) -> dict[str, Limits]:
         """Return the limits of every joint."""
@@ -156,6 +162,10 @@ class _LimitsFile:
                 values[key] = self._value(raw, key, locations[key], joint)
         for key, raw in own.items():
             locations[key] = ("joints", name, key)
+            if isinstance(raw, list) and key in VARYING and key != "jounce":
+                below, values[key] = self._range(raw, key, locations[key], joint)
+                self.backward.setdefault(name, {})[key] = below
+                continue
             if key in VARYING and (law := self._law(raw, key, locations[key], joint)):
                 self.varying.setdefault(name, {})[key] = law
                 continue
@@ -168,6 +178,16 @@ class _LimitsFile:
         if (jounce := values.pop("jounce")) is not None:
             self.jounce[name] = jounce
         return Limits(**values)
+
+    def _range(self, raw: list[Any], key: str, at: Location, joint: Joint) -> tuple[float, float]:
+        """Return the magnitudes of the lowest and the highest value of a limit that depends on the direction."""
+        if len(raw) != 2:
+            raise self.source.error("must be one value, or the lowest and the highest", at, value=raw)
+        low, high = (self._number(x, key, (*at, k), joint) for k, x in enumerate(raw))
+        if not (math.isfinite(low) and math.isfinite(high) and low < 0 < high):
+            message = "must be the lowest value, below zero, and the highest, above it, both finite"
+            raise self.source.error(message, at, value=raw)
+        return -low, high
 
     def _law(self, raw: Any, key: str, at: Location, joint: Joint) -> PositionLaw | None:
         """Return a limit that depends on the position of its joint, from an expression of q or a table."""
@@ -228,13 +248,17 @@ class _LimitsFile:
         """Return a limit in SI units; None where there is none."""
         if raw is None:
             return None
+        number = self._number(raw, key, at, joint)
+        self._check_size(number, raw, key, at)
+        return number
+
+    def _number(self, raw: Any, key: str, at: Location, joint: Joint) -> float:
         number, dimension = self._parsed(raw, at)
         if dimension and dimension not in _dimensions(key, joint.turning):
             unit = EXAMPLES[joint.turning][KEYS.index(key)]
             kind = "turns" if joint.turning else "slides"
             message = f"{_wrong_unit(dimension)}; a joint that {kind} has {key} in {unit}"
             raise self.source.error(message, at, value=raw)
-        self._check_size(number, raw, key, at)
         return number
 
     def _parsed(self, raw: Any, at: Location) -> tuple[float, Dimension | None]:

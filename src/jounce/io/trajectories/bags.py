@@ -12,6 +12,7 @@ import numpy as np
 
 from jounce.errors import TrajectoryError
 from jounce.io.trajectories.joint_states import State, recorded_states
+from jounce.io.trajectories.messages import MEASURED
 from jounce.io.trajectories.recordings import LEVELS, Recording
 from jounce.io.trajectories.stamps import in_sequence
 
@@ -19,6 +20,8 @@ SUFFIXES = (".bag", ".db3", ".mcap")
 METADATA = "metadata.yaml"
 NANO = 1_000_000_000
 STATE, TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
+CONTROLLER = "control_msgs/msg/JointTrajectoryControllerState"
+STATES = (STATE, CONTROLLER)
 MOST = 20_000_000
 """Messages."""
 
@@ -33,7 +36,7 @@ def is_bag(path: str) -> bool:
 
 
 def read_bag(path: str, joints: Sequence[str] | None = None, topic: str | None = None) -> Recording:
-    """Read the recording of a topic of a bag: JointState, or one JointTrajectory.
+    """Read the recording of a topic of a bag: JointState, JointTrajectoryControllerState, or one JointTrajectory.
 
     Raises
     ------
@@ -54,7 +57,7 @@ def read_bag(path: str, joints: Sequence[str] | None = None, topic: str | None =
     try:
         with highlevel.AnyReader([place], default_typestore=stores.get_typestore(stores.Stores.LATEST)) as reader:
             connections = _chosen(reader, topic, path)
-            if connections[0].msgtype == STATE:
+            if connections[0].msgtype in STATES:
                 recording = _states(reader, connections, path)
             else:
                 recording = _trajectory(reader, connections, path)
@@ -69,7 +72,7 @@ def read_bag(path: str, joints: Sequence[str] | None = None, topic: str | None =
 
 def _chosen(reader: Any, topic: str | None, path: str) -> list[Any]:
     """Return the connections of one topic of a type that is read."""
-    fit = [x for x in reader.connections if x.msgtype in (STATE, TRAJECTORY)]
+    fit = [x for x in reader.connections if x.msgtype in (*STATES, TRAJECTORY)]
     topics = list(dict.fromkeys(x.topic for x in fit))
     if topic is not None:
         if topic not in topics:
@@ -79,9 +82,9 @@ def _chosen(reader: Any, topic: str | None, path: str) -> list[Any]:
         topics = [topic]
     if not topics:
         types = ", ".join(sorted({str(x.msgtype) for x in reader.connections})) or "nothing"
-        message = f"the bag has no topic of {STATE} or {TRAJECTORY}"
+        message = f"the bag has no topic of {', '.join(STATES)} or {TRAJECTORY}"
         raise TrajectoryError(message, path=path, value=types)
-    states = [x for x in topics if any(c.topic == x and c.msgtype == STATE for c in fit)]
+    states = [x for x in topics if any(c.topic == x and c.msgtype in STATES for c in fit)]
     topics = topics if len(topics) == 1 or len(states) != 1 else states
     if len(topics) > 1:
         message = "the bag has several topics of joint states or trajectories; choose one: " + ", ".join(topics)
@@ -95,8 +98,7 @@ def _states(reader: Any, connections: list[Any], path: str) -> Recording:
         message = reader.deserialize(raw, connection.msgtype)
         if len(states) >= MOST:
             raise TrajectoryError(f"has more than {MOST} messages; cut the bag", path=path)
-        own, names = message.header.stamp, list(message.name)
-        levels = [np.asarray(message.position, float), np.asarray(message.velocity, float)]
+        own, (names, *levels) = message.header.stamp, _measured(message)
         number = len(states) + 1
         if not names or len(levels[0]) != len(names) or not np.isfinite(levels[0]).all():
             fault = f"message {number} of {connection.topic} must have one finite position for each joint"
@@ -109,6 +111,14 @@ def _states(reader: Any, connections: list[Any], path: str) -> Recording:
     if not any(state.stamp for state in states):  # no stamps of their own: when they were received
         states = [State(stamp, x.names, x.levels) for stamp, x in zip(received, states, strict=True)]
     return recorded_states(path, states)
+
+
+def _measured(message: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Return names, positions and velocities of a joint state, or of what a controller's state says was measured."""
+    if hasattr(message, "joint_names"):
+        part = next(getattr(message, key) for key in MEASURED if hasattr(message, key))
+        return list(message.joint_names), np.asarray(part.positions, float), np.asarray(part.velocities, float)
+    return list(message.name), np.asarray(message.position, float), np.asarray(message.velocity, float)
 
 
 def _trajectory(reader: Any, connections: list[Any], path: str) -> Recording:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from typing import Any
@@ -15,6 +16,8 @@ from jounce.io.trajectories.stamps import in_sequence
 
 NANO = 1_000_000_000
 STATES = ("position", "velocity")
+MEASURED = ("feedback", "actual")
+"""What a controller's state has of what was measured, in ROS 2 and before."""
 CUT = "..."
 """What ``ros2 topic echo`` prints in the place of what it leaves out."""
 START = 1e-6  # rad or m: so far may the robot be from where a trajectory starts
@@ -29,7 +32,12 @@ def is_message(data: Any) -> bool:
     if not isinstance(first, dict):
         return False
     displayed = isinstance(first.get("trajectory"), list) and "model_id" in first
-    return displayed or _is_state(first) or any(_is_trajectory(_inside(first, keys)) for keys in _INSIDE)
+    return (
+        displayed
+        or _is_state(first)
+        or measured_part(first) is not None
+        or any(_is_trajectory(_inside(first, keys)) for keys in _INSIDE)
+    )
 
 
 def _inside(data: Any, keys: Sequence[str]) -> Any:
@@ -46,10 +54,18 @@ def _is_state(data: Any) -> bool:
     return isinstance(data, dict) and "name" in data and "position" in data
 
 
+def measured_part(data: Any) -> str | None:
+    """Return under which key the state of a controller holds what was measured; None of anything else."""
+    if not isinstance(data, dict) or "joint_names" not in data or "points" in data:
+        return None
+    return next((key for key in MEASURED if isinstance(data.get(key), dict)), None)
+
+
 def read_messages(source: Source, joints: Sequence[str] | None = None) -> Recording:
     """Return the recording of a message of ROS, or of a list of joint states; names given take the place of its own.
 
-    JointTrajectory, FollowJointTrajectory goals, RobotTrajectory and DisplayTrajectory of MoveIt, and JointState.
+    JointTrajectory, FollowJointTrajectory goals, RobotTrajectory and DisplayTrajectory of MoveIt, JointState, and
+    JointTrajectoryControllerState, of which what was measured is read.
 
     Raises
     ------
@@ -59,10 +75,12 @@ def read_messages(source: Source, joints: Sequence[str] | None = None) -> Record
     data = source.data
     if isinstance(data, list) and all(map(_is_state, data)):
         recording = _states(source)
+    elif isinstance(data, list) and all(measured_part(x) is not None for x in data):
+        recording = _controller_states(source)
     elif isinstance(data, list):
         message = f"the file has {len(data)} messages, each a trajectory of its own; keep one"
         raise source.error(message, (1,))
-    elif _is_state(data):
+    elif _is_state(data) or measured_part(data) is not None:
         raise source.error("a single state is no trajectory; echo more than one")
     else:
         recording = _trajectories(source)
@@ -174,6 +192,24 @@ def _states(source: Source) -> Recording:
         stamp = _stamp(source, (k, "header", "stamp"), header.get("stamp") if isinstance(header, dict) else None)
         states.append(State(stamp, names, levels, source.line((k,)) or 0))
     return recorded_states(source.path, states)
+
+
+def _controller_states(source: Source) -> Recording:
+    """Return the recording of what the states of a controller say was measured."""
+    states, keys = [], set()
+    for k, state in enumerate(source.data):
+        key = str(measured_part(state))
+        names, part = _names(source, (k, "joint_names"), state["joint_names"]), state[key]
+        if not part.get("positions"):
+            raise source.error("positions are missing", (k, key))
+        levels = [_row(source, (k, key, x), part[x], len(names)) for x in LEVELS[:2] if part.get(x)]
+        header = state.get("header")
+        stamp = _stamp(source, (k, "header", "stamp"), header.get("stamp") if isinstance(header, dict) else None)
+        states.append(State(stamp, names, levels, source.line((k,)) or 0))
+        keys.add(key)
+    recording = recorded_states(source.path, states)
+    note = f"of the states of a controller what was measured is read ({', '.join(sorted(keys))})"
+    return dataclasses.replace(recording, notes=(*recording.notes, note))
 
 
 def _names(source: Source, at: Location, own: Any) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ def load_path(
     *,
     topic: str | None = None,
     robot: Robot | None = None,
+    only: Iterable[str] | None = None,
 ) -> Path | JointTrajectory:
     """Read the path of a robot: a trajectory, of which only the geometry counts, or a path that knows of no time.
 
@@ -42,7 +43,7 @@ def load_path(
         Degree of the splines through samples of a trajectory.
     allow
         Folders besides its own that files named in it may be below.
-    topic, robot
+    topic, robot, only
         As for `load_trajectory`.
 
     Returns
@@ -73,7 +74,7 @@ def load_path(
                     given[joint] = raw if isinstance(raw, str) else str(_number(source, raw, at))
             del data
             return _path_in_file(name, given)
-    return load_trajectory(path, degree, allow, topic=topic, robot=robot)
+    return load_trajectory(path, degree, allow, topic=topic, robot=robot, only=only)
 
 
 def _number(source: Any, raw: Any, at: tuple[Any, ...]) -> float:

@@ -20,7 +20,9 @@ from jounce.trajectory import (
 from jounce.trajectory.joint_trajectory import check_odd
 
 
-def trajectory_of(recording: Recording, degree: int = 5, *, as_controller: bool = False) -> JointTrajectory:
+def trajectory_of(
+    recording: Recording, degree: int = 5, *, as_controller: bool = False, samples: bool = False
+) -> JointTrajectory:
     """Return the trajectory of a recording.
 
     Parameters
@@ -32,6 +34,8 @@ def trajectory_of(recording: Recording, degree: int = 5, *, as_controller: bool 
     as_controller : bool, default False
         Between the rows what joint_trajectory_controller of ros2_control does: straight lines between positions alone,
         cubics with velocities, quintics with accelerations.
+    samples : bool, default False
+        Straight lines between the positions of samples, in the place of splines through them.
 
     Raises
     ------
@@ -57,7 +61,7 @@ def trajectory_of(recording: Recording, degree: int = 5, *, as_controller: bool 
     pointed = as_controller or recording.points
     try:
         laws = {
-            name: _as_points(recording, k) if pointed else _as_samples(recording, k, degree)
+            name: _as_points(recording, k) if pointed else _as_samples(recording, k, 1 if samples else degree)
             for k, name in enumerate(recording.names)
         }
         bounds = [(float(np.asarray(law.breakpoints)[0]), float(law.stop)) for law in laws.values()]
@@ -91,6 +95,8 @@ def _as_samples(recording: Recording, joint: int, degree: int) -> AbstractMotion
     table = recording.values[:, :, joint]
     rows = ~np.isnan(table[:, 0])
     times, table = recording.times[rows], table[rows]
+    if degree == 1:
+        return HermiteMotion(times, table[:, :1])
     levels = complete_levels(~np.isnan(table))
     if levels == 1:
         return SplineMotion(times, table[:, 0], degree)

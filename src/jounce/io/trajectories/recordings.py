@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.errors import TrajectoryError
+from jounce.errors import TrajectoryError, check_name
 
 LEVELS = ("positions", "velocities", "accelerations")
 
@@ -62,3 +62,14 @@ class Recording:
             message = f"the file has {len(self.names)} joints; give as many different names, in its order"
             raise TrajectoryError(message, path=self.path, name="joints", value=list(names))
         return dataclasses.replace(self, names=names, unnamed=False)
+
+    def selected(self, joints: Sequence[str]) -> Recording:
+        """Return the recording of some of its joints alone, and without rows that say nothing of them."""
+        for name in joints:
+            check_name("joint", name, self.names, TrajectoryError, name="joints")
+        columns = [self.names.index(name) for name in dict.fromkeys(joints)]
+        values = self.values[:, :, columns]
+        rows = ~np.isnan(values[:, 0]).all(axis=1)
+        lines = np.asarray(self.lines)[rows] if len(self.lines) else ()
+        names = tuple(self.names[k] for k in columns)
+        return dataclasses.replace(self, names=names, times=self.times[rows], values=values[rows], lines=lines)

@@ -35,8 +35,10 @@ SPARE = 2e-8  # of a limit, left to rounding
 SLOWINGS = 12
 HOPELESS = 0.1  # of a limit: no slowing as a whole is meant to mend so much
 MOST = 1e16
+EVENED, SAME = 20, 1e-12  # steps to a duration, and share of it that is none
+GIVEN = 4  # cells in which what is left of limits grows from nothing, after a state that is given
 FLOOR = 1e-7  # of the mean of z: its least value
-COARSE_ROUNDS = 4
+COARSE_ROUNDS = 2
 
 _Points = Float[np.ndarray, " _"]  # of any length
 
@@ -77,6 +79,7 @@ class Search:
             conditions,
         )
         self.limit_level, self.margin = level, 0.0
+        self.duration: float | None = None  # that a law is to have, where the fastest is not wanted
         self.points, self.enforced = np.zeros(0), np.zeros(0, bool)
         self.prices = np.zeros((0, len(labels.every)))
         grid = ((np.arange(basis.cells)[:, None] + OFFSETS) / basis.cells).reshape(-1)
@@ -93,11 +96,16 @@ class Search:
         self.enforced = np.concatenate([self.enforced, enforced])[first]
         self.shape = self.parameter.derivatives(self.points, 4)
         quantities = self.source(self.shape[0])
-        left_out = {"rates": 3, "fourth_bounds": 4}
-        free = {x: np.full_like(getattr(quantities, x), np.inf) for x, k in left_out.items() if k > self.limit_level}
+        left_out = {"rate_lower": (3, -np.inf), "rate_upper": (3, np.inf), "fourth_bounds": (4, np.inf)}
+        free = {
+            field: np.full_like(getattr(quantities, field), none)
+            for field, (level, none) in left_out.items()
+            if level > self.limit_level
+        }
         quantities = dataclasses.replace(quantities, **free)
         self.curves = Curves(quantities, self.shape)
         self.matrices = self.basis.matrices(self.points)
+        self.compact = self.basis.compact(self.points, self.matrices)
         known, self.prices = self.prices, np.zeros((len(self.points), len(self.labels.every)))
         self.prices[np.searchsorted(self.points, before)] = known
 
@@ -137,7 +145,7 @@ class Search:
         SolveError
             If no program has a solution: the message says which limit, and where.
         """
-        x, duration = start, self._duration(start) if settled else np.inf
+        x, cost = start, self._cost(start) if settled else np.inf
         ratios = self.curves.ratios(self.at(x))
         chosen = self.enforced[:, None] & (
             ratios > (0 if len(self.nodes) == 2 * COARSE else SETTLED_NEAR if settled else NEAR)
@@ -145,27 +153,31 @@ class Search:
         chosen |= _peaks(ratios) & (ratios > 1)
         for self.rounds in range(1, rounds + 1):
             try:
-                x = self._improved(x, chosen)
+                x = self._improved(x, chosen, near=settled or self.rounds > 1)
             except SolveError:
-                if not np.isfinite(duration):
+                if not np.isfinite(cost):
                     raise
                 break  # the solver came to the end of its accuracy: the law that it has is kept
             ratios = self.curves.ratios(self.at(x))
-            new = self._duration(x)
+            new = self._cost(x)
             over = float(ratios.max()) - 1
-            change, duration = abs(duration - new) / new, new
+            change, cost = abs(cost - new) / new, new
             if over < EXCEEDED and change < SETTLED:
                 break
             chosen |= _peaks(ratios) & (ratios > 1 + EXCEEDED / 10)
         return self.law_of(x)
 
-    def _duration(self, x: _Points) -> float:
-        return float(self.weights @ (1 / np.sqrt(self.node_matrix @ x)))
+    def _cost(self, x: _Points) -> float:
+        """Return what is to be least: the duration, or where that is given the mean of z."""
+        z = self.node_matrix @ x
+        return float(self.weights @ (1 / np.sqrt(z) if self.duration is None else z))
 
-    def _improved(self, x: _Points, chosen: np.ndarray) -> _Points:
-        """Return the solution of the program about a law."""
+    def _improved(self, x: _Points, chosen: np.ndarray, *, near: bool) -> _Points:
+        """Return the solution of the program about a law, which may be near the fastest."""
         program, labels, at = self._program(x, chosen)
         scale = float(np.mean(x))
+        if near:
+            program = dataclasses.replace(program, about=self.node_matrix @ x / scale)
         solution = solve_program(program)
         if solution.coefficients is None:
             raise self._why_none(program, labels, at)
@@ -250,10 +262,32 @@ class Search:
 
     def tightened(self, law: RateLaw, over: float) -> RateLaw:
         """Return a law that uses less of its limits by a share: slower as a whole, where no rate is given at an end."""
-        if not any(self.conditions.rates):
+        if self.duration is None and not any(self.conditions.rates):
             return law.slowed(1 + over)
         self.margin += 1.1 * over
-        return self.run(law.coefficients, settled=True)
+        return self.lasting(self.run(law.coefficients, settled=True), self.duration)
+
+    def lasting(self, law: RateLaw, duration: float | None) -> RateLaw:
+        """Return a law of a duration that is no shorter: as slow as it may be everywhere, from a faster one.
+
+        That is the same law slowed evenly, unless rates are given at the ends, or a limit is in the way, as of torques
+        with damping.
+        """
+        if duration is None:
+            return law
+        self.prices[:], self.duration = 0.0, duration
+        slowed = law.slowed(duration / law.duration)
+        if not any(self.conditions.rates) and self.peaks(slowed)[1].max() <= 1:
+            return slowed
+        law = self.run(law.coefficients, settled=True)
+        inside = np.zeros(self.basis.count)
+        inside[self.basis.degree + 1 : -self.basis.degree - 1] = 1.0  # what is given at the ends stays as it is
+        for _ in range(EVENED):
+            by = law.duration / duration
+            law = dataclasses.replace(law, coefficients=law.coefficients * by ** (2 * inside))
+            if abs(by - 1) < SAME:
+                break
+        return law
 
     def _program(self, x: _Points, chosen: np.ndarray) -> tuple[Program, np.ndarray, np.ndarray]:
         from scipy import sparse
@@ -263,11 +297,19 @@ class Search:
         eased = max(float(self.curves.fourth_ratio(law)) / EASE, 1.0)
         slopes, right, curve = self.curves.rows(law, eased)
         at, row = np.nonzero(chosen[:, curve] & np.isfinite(right))
-        rows = sum(sparse.diags(slopes[k, at, row] * scale) @ matrix[at] for k, matrix in enumerate(self.matrices))
+        first, dense = self.compact
+        data = np.einsum("kr,krj->rj", slopes[:, at, row] * scale, dense[:, at])
+        columns = first[at][:, None] + np.arange(data.shape[1])
         # coefficients that are positive make a spline that is, also between its knots
-        rows = sparse.vstack([rows, -sparse.identity(self.basis.count)])
+        count = self.basis.count
+        begins = np.append(np.arange(len(at)) * data.shape[1], data.size + np.arange(count + 1))
+        entries = np.append(data.reshape(-1), np.full(count, -1.0)), np.append(columns.reshape(-1), np.arange(count))
+        rows = sparse.csr_matrix((*entries, begins), shape=(len(at) + count, count))
         squared = np.where(curve[row] < len(self.labels.first), 2.0, 1.0)
-        right = np.append(right[at, row] - self.margin * squared, np.full(self.basis.count, -FLOOR))
+        margin = self.margin
+        if self.conditions.further:  # a state that is given may touch its limits
+            margin = margin * np.minimum(self.points[at] * self.basis.cells / GIVEN, 1.0) ** 2
+        right = np.append(right[at, row] - margin * squared, np.full(self.basis.count, -FLOOR))
         if self.labels.fourth and self.limit_level == 4:  # their programs are near the truth only about the last law
             rows = sparse.vstack([rows, sparse.identity(self.basis.count), -sparse.identity(self.basis.count)])
             right = np.concatenate([right, TRUST * np.abs(x) / scale, -x / TRUST / scale])
@@ -288,12 +330,13 @@ class Search:
         program = Program(
             self.weights,
             self.node_matrix,
-            rows.tocsc(),
+            rows,
             right,
             sparse.csr_matrix(cones),
             np.full(len(size), 1 - self.margin),
             equal,
             equal_right,
+            None if self.duration is None else self.duration * np.sqrt(scale),
         )
         return program, curve[row], at
 
@@ -307,7 +350,16 @@ class Search:
         values = [(rate / slopes[k]) ** 2 / scale for k, rate in given]
         if not given:
             return sparse.csr_matrix((0, self.basis.count)), np.zeros(0)
-        return sparse.csr_matrix(self.basis.matrices(ends[[k for k, _ in given]], 0)[0]), np.array(values)
+        rows = [self.basis.matrices(ends[[k for k, _ in given]], 0)[0]]
+        if further := self.conditions.further:
+            # the second derivative of s is s_u z_u / 2 + s_uu z; the third, by the rate of u, the next but one line
+            s1, s2, s3 = self.parameter.derivatives(ends[:1], 3)[1:, 0]
+            z, z1, z2, _ = self.basis.matrices(ends[:1])
+            sums = [s1 / 2 * z1 + s2 * z, s1 / 2 * z2 + 1.5 * s2 * z1 + s3 * z]
+            divisors = [1.0, float(self.conditions.rates[0] or 0.0) / s1]
+            rows += sums[: len(further)]
+            values += [x / divisor / scale for x, divisor in zip(further, divisors, strict=False)]
+        return sparse.vstack(rows, format="csr"), np.array(values)
 
 
 def _peaks(ratios: np.ndarray) -> np.ndarray:

@@ -52,7 +52,8 @@ def bounded_everywhere(source: Source, start: float, stop: float) -> bool:
 
 def _moving(quantities: PathQuantities, *, rates: bool) -> Float[np.ndarray, " point"]:
     """Return how much moves of what has a limit, as a share of its largest value."""
-    limited = np.isfinite(quantities.upper) | np.isfinite(quantities.lower) | (rates & np.isfinite(quantities.rates))
+    limited = np.isfinite(quantities.upper) | np.isfinite(quantities.lower)
+    limited |= rates & (np.isfinite(quantities.rate_upper) | np.isfinite(quantities.rate_lower))
     parts = [
         np.abs(quantities.first) * np.isfinite(quantities.first_bounds),
         np.abs(quantities.second[:, :, :G]).max(axis=-1, initial=0.0) * limited,

@@ -15,6 +15,8 @@ from jounce.robot.robot import Robot
 
 VARYING = ("velocity", "acceleration", "deceleration", "jerk", "jounce", "effort", "effort_rate")
 
+PAIR = ("acceleration", "deceleration")
+
 PositionLaw = Callable[[Float[np.ndarray, " point"]], Any]
 """Gives a limit for positions of its joint, rad or m."""
 
@@ -60,11 +62,14 @@ class MotionLimits:
         follows.
     points : tuple of PointLimits, optional
         Limits of points of links, such as the tool.
+    backward : dict of str to Limits, optional
+        Of a joint: the limits of what is below zero, as of the velocity backward or of the torque that pulls, where
+        they differ from those above it: velocity, acceleration, deceleration, jerk, effort or effort_rate.
 
     Raises
     ------
     RobotError
-        If a limit is not greater than zero.
+        If a limit is not greater than zero, or one backward is a range.
 
     Examples
     --------
@@ -77,6 +82,7 @@ class MotionLimits:
     jounce: Mapping[str, float] = dataclasses.field(default_factory=dict)
     varying: Mapping[str, Mapping[str, PositionLaw]] = dataclasses.field(default_factory=dict)
     points: tuple[PointLimits, ...] = ()
+    backward: Mapping[str, Limits] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name, value in self.jounce.items():
@@ -86,9 +92,24 @@ class MotionLimits:
                 check_name("limit", field, VARYING, RobotError, name=f"varying.{name}")
                 if not callable(law):
                     raise RobotError("must be a function of the position", name=f"varying.{name}.{field}", value=law)
-        for field in ("joints", "jounce", "varying"):
+        for name, entry in self.backward.items():
+            if not isinstance(entry, Limits):
+                raise RobotError("must be Limits", name=f"backward.{name}", value=entry)
+            if entry.lower is not None or entry.upper is not None:
+                raise RobotError("a range has no direction; give it in joints", name=f"backward.{name}", value=entry)
+        for field in ("joints", "jounce", "varying", "backward"):
             object.__setattr__(self, field, MappingProxyType(dict(getattr(self, field))))
         object.__setattr__(self, "points", tuple(self.points))
+
+    def own(self, name: str) -> frozenset[str]:
+        """Return the fields of `Limits` that a joint has by position or direction, with what is judged together."""
+        fields = set(self.varying.get(name, {})) | directed(self.backward.get(name, Limits()))
+        return frozenset(fields | (set(PAIR) if fields & set(PAIR) else set()))
+
+
+def directed(limits: Limits) -> set[str]:
+    """Return the names of the limits that there are."""
+    return {name for name, value in dataclasses.asdict(limits).items() if value is not None}
 
 
 GivenLimits = Mapping[str, Limits] | MotionLimits
@@ -110,7 +131,7 @@ def limits_of(robot: Robot, limits: GivenLimits | None) -> MotionLimits:
         raise RobotError(
             "must be MotionLimits, or Limits of joints by name", name="limits", value=type(limits).__name__
         )
-    for field in ("joints", "jounce", "varying"):
+    for field in ("joints", "jounce", "varying", "backward"):
         for name, entry in getattr(given, field).items():
             check_name("moving joint", name, robot.joint_names, RobotError, name="limits")
             if field == "joints" and not isinstance(entry, Limits):
@@ -121,7 +142,19 @@ def limits_of(robot: Robot, limits: GivenLimits | None) -> MotionLimits:
     constant = {name: dataclasses.replace(x, **_nothing(given.varying.get(name, {}))) for name, x in own.items()}
     joints = robot.limits_with(constant)  # in whose place there is a law: then those of the joints that follow
     varying = {name: _with_followers(laws, constant[name], joints[name]) for name, laws in given.varying.items()}
-    return dataclasses.replace(given, joints=joints, varying=varying)
+    reverse = robot.limits_with(
+        {name: dataclasses.replace(x, **_given(given.backward, name)) for name, x in own.items()}
+    )
+    backward = {  # with those of the joints that follow
+        name: Limits(**{field: getattr(reverse[name], field) for field in directed(entry)})
+        for name, entry in given.backward.items()
+    }
+    return dataclasses.replace(given, joints=joints, varying=varying, backward=backward)
+
+
+def _given(backward: Mapping[str, Limits], name: str) -> dict[str, float]:
+    entry = backward.get(name, Limits())
+    return {field: getattr(entry, field) for field in directed(entry)}
 
 
 def _nothing(laws: Mapping[str, PositionLaw]) -> dict[str, None]:

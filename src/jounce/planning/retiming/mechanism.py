@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
-from jounce.errors import MechanismError, SolveError
+from jounce.errors import MechanismError, SolveError, TrajectoryError
 from jounce.mechanism import Mechanism
 from jounce.planning.retiming.fastest import fastest
 from jounce.planning.retiming.mechanism_quantities import MechanismQuantities, rate_motion
@@ -22,10 +22,16 @@ STEADY = 3e-4  # of the duration: a change that ends them
 INSTANTS = 1501
 AROUND, SPREAD = 33, 2  # instants about the worst of each quantity, and over how many steps to each side
 SLOWINGS = 8
+SHORTER = 1e-9  # of a duration
 
 
 def retime_mechanism(
-    mechanism: Mechanism, limits: Mapping[str, Limits], rates: tuple[float, float], order: int | None, cells: int
+    mechanism: Mechanism,
+    limits: Mapping[str, Limits],
+    rates: tuple[float, float],
+    order: int | None,
+    cells: int,
+    duration: float | None = None,
 ) -> RetimedTrajectory:
     """Return the fastest motion of the drivers of a mechanism along the path of their laws.
 
@@ -47,11 +53,16 @@ def retime_mechanism(
         law, search = fastest(source, source.labels, source.path.start, source.path.stop, conditions, cells)
         if abs(law.duration - duration) < STEADY * duration:
             break
+    if duration is not None and duration >= law.duration:
+        law = search.lasting(law, duration)
     note = ""
     for _ in range(SLOWINGS):
         laws, report = _checked(source, mechanism, law)
         over = 0.0 if report.worst is None else (report.worst.ratio or 0.0) - 1
         if over <= 1e-9:
+            if duration is not None and duration < laws.stop * (1 - SHORTER):
+                message = f"the least time of this path within these limits is {laws.stop:.9g} s, which is longer"
+                raise TrajectoryError(message, name="duration", value=duration)
             return RetimedTrajectory(
                 laws.laws,
                 laws.stop,

@@ -146,9 +146,8 @@ class MechanismQuantities:
         speeds = self._bounds([*names, *self.vector], "velocity", s)
         accelerations = self._bounds(self.vector, "acceleration", s)
         none = np.zeros((len(s), 0))
-        return PathQuantities(
-            first, speeds, second, -upper, upper, rates, vector, accelerations, np.zeros((len(s), 0, 4)), none
-        )
+        fourth = np.zeros((len(s), 0, 4))
+        return PathQuantities(first, speeds, second, -upper, upper, -rates, rates, vector, accelerations, fourth, none)
 
     def location(self, s: float) -> str:
         """Say where on the path a value of s is."""
@@ -180,7 +179,7 @@ class MechanismQuantities:
         )
         quantities = self(s)
         bounds = np.concatenate(
-            [quantities.first_bounds, quantities.upper, quantities.rates, quantities.vector_bounds], axis=1
+            [quantities.first_bounds, quantities.upper, quantities.rate_upper, quantities.vector_bounds], axis=1
         )
         return values, bounds, np.abs(values) / bounds
 

@@ -3,7 +3,6 @@
 import dataclasses
 import warnings
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -56,16 +55,15 @@ def check_motion(
         The rows of limits that depend on the position stand in the place of those without a limit.
     """
     given = limits_of(robot, limits)
-    constant = {name: _without(entry, given.varying.get(name, {})) for name, entry in given.joints.items()}
+    constant = {name: _without(entry, given.own(name)) for name, entry in given.joints.items()}
     report = check_limits(robot, trajectory, constant, drives=drives, hand_over=hand_over)
     infinite = {(row.joint, row.quantity): row.time for row in report.rows if row.infinite}
-    unlimited = {name: Limits() for name in robot.joint_names}
-    partner = {  # an acceleration and its deceleration are judged together
-        name: dataclasses.replace(unlimited[name], **_partners(given.joints[name], laws))
-        for name, laws in given.varying.items()
+    joints = {  # what is judged by the constant limits is not judged here
+        name: Limits(**{field: getattr(given.joints[name], field, None) for field in given.own(name) - {"jounce"}})
+        for name in robot.joint_names
     }
-    others = dataclasses.replace(given, joints=unlimited | partner)
-    if not (others.jounce or others.varying or others.points):
+    others = dataclasses.replace(given, joints=joints)
+    if not (others.jounce or others.varying or others.points or others.backward):
         return report
     source = RobotQuantities(
         robot, Path(dict(trajectory.laws), trajectory.start, trajectory.stop), others, drives=drives
@@ -92,7 +90,7 @@ def _ends(
             (name, word_of(robot, quantity, joint)[0])
             for joint, name in enumerate(robot.joint_names)
             for quantity, field in enumerate(FIELDS)
-            if signs[k, quantity, joint] and {field, _PARTNERS.get(field, field)} & set(limits.varying.get(name, {}))
+            if signs[k, quantity, joint] and {field, _PARTNERS.get(field, field)} & limits.own(name)
         ]
         fourth = [(robot.joint_names[j], "jounce") for j in source.with_jounce if jumps.above(4)[k, j]]
         state = (jumps.after if end.end == "start" else jumps.before)[[k]]
@@ -105,17 +103,9 @@ def _ends(
     return tuple(selected)
 
 
-def _without(limits: Limits, varying: Any) -> Limits:
-    """Return limits without those that depend on the position."""
-    fields = set(varying) & {field.name for field in dataclasses.fields(Limits)}
-    if fields & {"acceleration", "deceleration"}:
-        fields |= {"acceleration", "deceleration"}
-    return dataclasses.replace(limits, **dict.fromkeys(fields))
-
-
-def _partners(limits: Limits, varying: Any) -> dict[str, float | None]:
-    pair = ("acceleration", "deceleration")
-    return {field: getattr(limits, field) for field in pair if set(varying) & set(pair) and field not in varying}
+def _without(limits: Limits, varying: frozenset[str]) -> Limits:
+    """Return limits without those that depend on the position or the direction."""
+    return dataclasses.replace(limits, **dict.fromkeys(varying - {"jounce"}))
 
 
 def _rows(source: RobotQuantities, trajectory: JointTrajectory, infinite: _Infinite) -> list[LimitRow]:
@@ -201,11 +191,11 @@ def _curves(source: RobotQuantities, times: np.ndarray) -> Curves:
 
 def _at_peaks(source: RobotQuantities, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the value of each curve at its own instant, and the bound there with the sign of the value."""
-    curves, q = _curves(source, times), None
-    values = np.concatenate(curves.values(np.tile(EVEN[:, None], len(times))), axis=1)
-    q = curves.quantities
-    second = curves.values(np.tile(EVEN[:, None], len(times)))[1]
+    curves = _curves(source, times)
+    parts = curves.values(np.tile(EVEN[:, None], len(times)))
+    values, (_, second, rates, *_), q = np.concatenate(parts, axis=1), parts, curves.quantities
     side = np.where(second / q.upper >= second / q.lower, q.upper, -q.lower)
-    bounds = np.concatenate([q.first_bounds, side, q.rates, q.vector_bounds, q.fourth_bounds], axis=1)
+    rates = np.where(rates >= 0, q.rate_upper, -q.rate_lower)
+    bounds = np.concatenate([q.first_bounds, side, rates, q.vector_bounds, q.fourth_bounds], axis=1)
     value, bound = np.diagonal(values), np.diagonal(bounds)
     return value, np.where(value < 0, -bound, bound)

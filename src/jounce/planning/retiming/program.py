@@ -2,24 +2,14 @@
 
 import dataclasses
 import importlib
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from jounce.errors import UnsupportedError
-
 TOLERANCE = 1e-7
 
 _Points = Float[np.ndarray, " _"]  # of any length
-
-
-def require_solver() -> None:
-    """Raise UnsupportedError where the solver of cone programs is not installed."""
-    if find_spec("clarabel") is None:
-        message = "retiming needs Clarabel, which is not installed; install it with: pip install 'jounce[planning]'"
-        raise UnsupportedError(message, name="clarabel")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -38,6 +28,11 @@ class Program:
         Vectors, whose length is at most a radius.
     equal : sparse matrix, and equal_right : ndarray
         ``equal x == equal_right``.
+    duration : float, optional
+        What the sum may be at most: then ``sum weights z`` is to be least in its place.
+    about : ndarray of shape (node,), optional
+        z of a law near the fastest: the sum is then that of its second order about it, as in Newton's method, which
+        takes a third of the time.
     """
 
     weights: _Points
@@ -48,6 +43,8 @@ class Program:
     radii: _Points
     equal: Any
     equal_right: _Points
+    duration: float | None = None
+    about: _Points | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -75,23 +72,42 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
 
     clarabel: Any = importlib.import_module("clarabel")  # its names are those of a compiled module
 
-    count, nodes = program.nodes.shape[1], 0 if elastic else len(program.weights)
-    extra = 1 if elastic else 2 * nodes
     wide = sparse.csc_matrix
-    objective = np.concatenate([np.zeros(count), *([np.ones(1)] if elastic else [program.weights, np.zeros(nodes)])])
-    blocks: list[Any] = [sparse.hstack([program.equal, wide((program.equal.shape[0], extra))])]
+    about = program.about if program.duration is None and not elastic else None
+    count, nodes = program.nodes.shape[1], 0 if elastic or about is not None else len(program.weights)
+    extra = 1 if elastic else 2 * nodes
+    slowest, sums = program.duration is not None, np.zeros(count)
+    if slowest:
+        sums = program.nodes.T @ program.weights
+    times = np.zeros(nodes) if slowest else program.weights
+    objective = np.concatenate([0 * sums, np.ones(1)] if elastic else [sums, times[:nodes], np.zeros(nodes)])
+    quadratic = wide((count + extra, count + extra))
+    if about is not None:
+        curved = program.weights * about**-2.5
+        quadratic = wide(sparse.triu(program.nodes.T @ sparse.diags(0.75 * curved) @ program.nodes))
+        objective = program.nodes.T @ (-1.25 * curved * about)
+
+    def widened(matrix: Any, beside: Any = None) -> Any:
+        """Return a matrix over the coefficients, and what is beside it over the other unknowns."""
+        if not extra:
+            return matrix
+        return sparse.hstack([matrix, wide((matrix.shape[0], extra)) if beside is None else beside])
+
+    blocks: list[Any] = [widened(program.equal)]
     sides: list[Any] = [program.equal_right]
     kinds: list[Any] = [clarabel.ZeroConeT(len(program.equal_right))] if len(program.equal_right) else []
-    free = -np.ones((len(program.right), 1)) if elastic else wide((len(program.right), extra))
-    least = sparse.hstack([-program.nodes, wide((program.nodes.shape[0], extra))])
     floor = np.full(program.nodes.shape[0], -1e-6)
-    blocks += [sparse.hstack([program.rows, free])]
+    blocks += [widened(program.rows, -np.ones((len(program.right), 1)) if elastic else None)]
     sides += [program.right]
     kinds += [clarabel.NonnegativeConeT(len(program.right))]
     if elastic:
-        blocks += [least]
+        blocks += [widened(-program.nodes)]
         sides += [floor]
         kinds += [clarabel.NonnegativeConeT(len(floor))]
+    if slowest and not elastic:
+        blocks.append(sparse.csr_matrix(np.concatenate([np.zeros(count), program.weights, np.zeros(nodes)])))
+        sides.append(np.array([program.duration]))
+        kinds.append(clarabel.NonnegativeConeT(1))
     if len(program.radii):
         cone = program.cones.tocoo()
         row = cone.row + cone.row // 3 + 1  # of four rows each, the first is the radius
@@ -99,7 +115,7 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
         blocks.append(sparse.coo_matrix((-cone.data, (row, cone.col)), shape=shape))
         sides.append(np.column_stack([program.radii, np.zeros((len(program.radii), 3))]).reshape(-1))
         kinds += [clarabel.SecondOrderConeT(4)] * len(program.radii)
-    if not elastic:
+    if nodes:
         # y^2 <= z and 1 <= r y, so that r >= 1 / sqrt(z), as the cones
         # ((z + 1) / 2, (z - 1) / 2, y) and ((r + y) / 2, (r - y) / 2, 1)
         z, one = program.nodes.tocoo(), np.arange(nodes)
@@ -118,8 +134,7 @@ def solve_program(program: Program, *, elastic: bool = False) -> Solution:
     settings.verbose, settings.max_threads = False, 1
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
     matrix = wide(sparse.vstack(blocks, format="csc"))
-    size = count + extra
-    solver = clarabel.DefaultSolver(wide((size, size)), objective, matrix, np.concatenate(sides), kinds, settings)
+    solver = clarabel.DefaultSolver(quadratic, objective, matrix, np.concatenate(sides), kinds, settings)
     solution = solver.solve()
     begin = len(program.equal_right)
     prices = np.array(solution.z)[begin : begin + len(program.right)]

@@ -46,8 +46,8 @@ class PathQuantities:
         Its largest magnitude.
     second : array of shape (point, k2, 8)
         m, c, d, g and their derivatives along the path.
-    lower, upper, rates : array of shape (point, k2)
-        Range of the values, and the largest magnitude of their rates.
+    lower, upper, rate_lower, rate_upper : array of shape (point, k2)
+        Ranges of the values, and of their rates.
     vectors : array of shape (point, k3, 3, 2)
         m and c of vectors, whose magnitude is limited.
     vector_bounds : array of shape (point, k3)
@@ -63,7 +63,8 @@ class PathQuantities:
     second: Array
     lower: Array
     upper: Array
-    rates: Array
+    rate_lower: Array
+    rate_upper: Array
     vectors: Array
     vector_bounds: Array
     fourth: Array
@@ -151,11 +152,12 @@ class Curves:
         q = self.quantities
         first, second, rates, vectors, fourth = self.values(law)
         sides = np.maximum(_over(second, q.upper), _over(-second, -q.lower))
+        rate_sides = np.maximum(rates / q.rate_upper, rates / q.rate_lower)
         return np.concatenate(
             [
                 first / q.first_bounds,
                 sides,
-                np.abs(rates) / q.rates,
+                rate_sides,
                 vectors / q.vector_bounds,
                 np.abs(fourth) / q.fourth_bounds,
             ],
@@ -205,8 +207,8 @@ class Curves:
         # (single_half z' / 2 + single z) / sqrt(z), expanded
         mixed = (single_half * -z1 / (4 * w**3) + single / (2 * w), single_half / (2 * w))
         rest = single_half * z1 / (4 * w) + single * w / 2
-        for sign in (1, -1):
-            size = q.rates / w
+        for sign, bound in ((1, q.rate_upper), (-1, -q.rate_lower)):
+            size = bound / w
             slopes = (sign * (square + mixed[0]) / size + 1 / (2 * z), sign * (slope / 2 + mixed[1]) / size)
             made.append((*slopes, sign * top / 2 / size, none, 1.5 - sign * (constant + rest) / size))
         # outer + z' inner / (2 z) <= bound / z, whose last part on the left is expanded
@@ -221,7 +223,7 @@ class Curves:
             made.append((*slopes, 2 - sign * rest / size))
         slopes = np.stack([np.concatenate([part[k] for part in made], axis=1) for k in range(4)])
         right = np.concatenate([part[4] for part in made], axis=1)
-        limits = (q.first_bounds, q.upper, q.lower, q.rates, q.rates, q.fourth_bounds, q.fourth_bounds)
+        limits = (q.first_bounds, q.upper, q.lower, q.rate_upper, q.rate_lower, q.fourth_bounds, q.fourth_bounds)
         limited = np.isfinite(np.concatenate(limits, axis=1))
         slopes, right = np.where(limited, slopes, 0.0), np.where(limited, right, np.inf)
         counts = [x.shape[1] for x in (zero, half, top, q.vector_bounds, a)]

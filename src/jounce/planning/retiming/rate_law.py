@@ -55,11 +55,14 @@ class Conditions:
         Rates of s at the ends, 1/s; zero is rest, and None is free.
     max_rate : float or None
         Rate of s that is not to be exceeded, 1/s; for a parametrization by s itself.
+    further : tuple of float
+        Second and third derivative of s at the start, where these are given beside the rate.
     """
 
     order: int
     rates: tuple[float | None, float | None] = (0.0, 0.0)
     max_rate: float | None = None
+    further: tuple[float, ...] = ()
 
     @property
     def rests(self) -> tuple[int, int]:

@@ -64,6 +64,10 @@ class RateMotion(AbstractMotion):
         """Time from the beginning of u to its end, s."""
         return float(np.asarray(self.instants)[-1])
 
+    def slower(self, factor: float) -> "RateMotion":
+        """Return the same motion, slower by a factor."""
+        return RateMotion(self.begins, np.asarray(self.pieces) / factor**2)
+
     def check_instants(self, first: float, last: float) -> None:
         """Raise TrajectoryError if some instants are before the beginning or after the end."""
         stop = self.duration

@@ -115,6 +115,20 @@ class RateBasis:
                 change = step @ change
         return matrices
 
+    def compact(self, u: _Points, matrices: list[Any]) -> tuple[Any, Any]:
+        """Return of matrices at points the first spline that is not zero at each, and the entries from it on.
+
+        Returns
+        -------
+        first : array of shape (point,)
+        entries : array of shape (matrix, point, degree + 1)
+        """
+        inner = self.knots[self.degree : self.degree + self.cells + 1]
+        first = np.clip(np.searchsorted(inner, np.clip(u, 0.0, 1.0), side="right") - 1, 0, self.cells - 1)
+        columns = first[:, None] + np.arange(self.degree + 1)
+        entries = [np.take_along_axis(matrix.toarray(), columns, axis=1) for matrix in matrices]
+        return first, np.stack(entries)
+
     def pieces(self, coefficients: _Points) -> Float[np.ndarray, "powers cell"]:
         """Return the polynomials on the cells, as coefficients of powers of u less the beginning, lowest first."""
         from scipy.interpolate import BSpline

@@ -1,36 +1,40 @@
 """The fastest time law along a path within limits of velocity to jounce, torque and torque rate."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+import functools
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from jounce.dynamics.limits.trajectories import FollowedTrajectory, warn_of_degrees
-from jounce.errors import SolveError, TrajectoryError, flag, whole_number
+from jounce.errors import JounceError, SolveError, TrajectoryError, flag, whole_number
 from jounce.mechanism import Mechanism
 from jounce.planning.retiming.fastest import Search, fastest, slowed_only
+from jounce.planning.retiming.joining import SHARES, clean_state, joined, rates_along
 from jounce.planning.retiming.limits import GivenLimits, MotionLimits, limits_of
 from jounce.planning.retiming.mechanism import retime_mechanism
 from jounce.planning.retiming.motion_limits_check import check_motion
 from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.paths import Between, GivenPath, cells_needed, checked, path_of
-from jounce.planning.retiming.program import require_solver
 from jounce.planning.retiming.quantities import Curves
 from jounce.planning.retiming.rate_law import Conditions, RateLaw
 from jounce.planning.retiming.rate_motion import RateMotion
 from jounce.planning.retiming.retimed import RetimedTrajectory, active_limits
 from jounce.planning.retiming.robot_quantities import RobotQuantities
 from jounce.planning.retiming.sampled_paths import path_of_samples
+from jounce.planning.solver import require_solver
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike
 from jounce.trajectory import FollowingMotion, JointTrajectory
+from jounce.trajectory.checks import positive
 
 CELLS = 160
 ATTEMPTS = 4  # to keep limits as the derivatives in time tell them
 LIMIT_TOLERANCE = 1e-9  # of a limit, which rounding may take
 MAX_ORDER = 6
+NEAR_LEAST = 1.01  # times the least time: a duration below it is compared with that exactly
 SPEEDS = 1e-9  # of the largest: what is slower at an end of a trajectory is at rest
 
 
@@ -49,6 +53,8 @@ def retime(
     parameter: ArrayLike | None = None,
     degree: int | None = None,
     hand_over: bool = False,
+    duration: float | None = None,
+    state: ArrayLike | None = None,
 ) -> RetimedTrajectory:
     """Return the fastest motion along a path that keeps limits.
 
@@ -98,6 +104,14 @@ def retime(
         is that of TOPP-RA's ``SplineInterpolator``.
     hand_over : bool, default False
         Whether a trajectory that is repaired may start and stop in motion, as of a robot that moves already.
+    duration : float, optional
+        How long the motion is to take, s, in place of as little as it can: the fastest motion slowed evenly, or where
+        rates are given at the ends one that is as slow as it may be everywhere.
+    state : array_like of shape (derivatives, joints), optional
+        Of a robot that runs already: positions and velocities, and if known accelerations and jerks, with which the
+        motion begins, of the joints of the path in its order. If it is not on the path, a polynomial leads onto it, and
+        joins it where a motion is found that keeps the limits, the sooner the better. What exceeds a limit by less than
+        a millionth is taken for rounding.
 
     Returns
     -------
@@ -109,7 +123,7 @@ def retime(
     ------
     TrajectoryError
         If the path has a kink or a repeated point, leaves the range of a joint, or needs more than a limit at rest: the
-        message says where, and which joint.
+        message says where, and which joint. If the duration is shorter than the least time, which is told.
     RobotError
         If names or limits do not fit the robot.
     SolveError
@@ -130,14 +144,13 @@ def retime(
     require_solver()
     if cells is not None:
         cells = whole_number("cells", cells, 20, 5000, error=TrajectoryError)
+    if duration is not None:
+        duration = positive("duration", duration)
     between = Between(deviation, parameter, degree)
     if isinstance(robot, Mechanism):
         given = {"repair": repair, "path": path is not None, "deviation": deviation is not None}
-        if any(given.values()):
-            message = "the path of a mechanism is that of its drivers, which is not repaired; leave this out"
-            raise TrajectoryError(message, name=next(name for name, x in given.items() if x))
-        between.check_without_points()
-        return retime_mechanism(robot, _of_mechanism(limits), _rates(rates), order, cells or CELLS)
+        _check_of_robots(given | {"state": state is not None}, between)
+        return retime_mechanism(robot, _of_mechanism(limits), _rates(rates), order, cells or CELLS, duration)
     if not isinstance(robot, Robot):
         raise TrajectoryError("must be a Robot or a Mechanism", name="robot", value=type(robot).__name__)
     hand_over = flag("hand_over", hand_over, error=TrajectoryError)
@@ -145,18 +158,100 @@ def retime(
     if isinstance(path, JointTrajectory):
         FollowedTrajectory(robot, path)  # checks its joints and units
     if repair:
+        _check_not_repaired(duration=duration, state=state)
         return _repaired(robot, path, limits, order, cells, drives, between, hand_over=hand_over)
     chosen = _order(order, limits_of(robot, limits), robot)
     chosen_path = path_of(path, names if names is not None else robot.joint_names, chosen, between)
     if not isinstance(path, JointTrajectory):
         warn_of_degrees(robot, JointTrajectory(dict(chosen_path.laws), chosen_path.start, chosen_path.stop))
-    source = RobotQuantities(robot, chosen_path, limits, drives=drives)
-    checked(chosen_path, chosen)
-    source.check_range()
-    cells = cells or cells_needed(chosen_path, chosen)
     conditions = Conditions(chosen, _rates(rates))
-    law, search = fastest(source, source.labels, chosen_path.start, chosen_path.stop, conditions, cells)
-    return _certified(robot, chosen_path, law, search, source, drives, hand_over=any(conditions.rates))
+
+    def found(along: Path, conditions: Conditions) -> _Found:
+        source = RobotQuantities(robot, along, limits, drives=drives)
+        checked(along, chosen)
+        source.check_range()
+        own_cells = cells or cells_needed(along, chosen)
+        return source, *fastest(source, source.labels, along.start, along.stop, conditions, own_cells)
+
+    if state is None:
+        source, law, search = found(chosen_path, conditions)
+    else:
+        chosen_path, (source, law, search) = _from_state(robot, chosen_path, state, limits, conditions, found)
+        conditions = search.conditions
+    certified = functools.partial(
+        _certified, robot, chosen_path, search=search, source=source, drives=drives, hand_over=any(conditions.rates)
+    )
+    if duration is None:
+        return certified(law)
+    if duration < NEAR_LEAST * law.duration:
+        check_duration(duration, certified(law).stop)
+    return certified(search.lasting(law, duration))
+
+
+def _check_of_robots(given: Mapping[str, bool], between: Between) -> None:
+    """Raise TrajectoryError if something was given that a mechanism does not have."""
+    if any(given.values()):
+        message = "the path of a mechanism is that of its drivers, which is not repaired; leave this out"
+        raise TrajectoryError(message, name=next(name for name, x in given.items() if x))
+    between.check_without_points()
+
+
+def _check_not_repaired(**given: Any) -> None:
+    """Raise TrajectoryError if something was given that a trajectory that is repaired has itself."""
+    for name, value in given.items():
+        if value is not None:
+            message = (
+                "a repaired trajectory has its own times and its own beginning; leave this out, or do not repair it"
+            )
+            raise TrajectoryError(message, name=name, value=value)
+
+
+_Found = tuple[RobotQuantities, RateLaw, Search]
+
+
+def _from_state(
+    robot: Robot,
+    path: Path,
+    given: ArrayLike,
+    limits: GivenLimits | None,
+    conditions: Conditions,
+    found: Callable[[Path, Conditions], _Found],
+) -> tuple[Path, _Found]:
+    """Return the path that begins with a running state, and the fastest law along it.
+
+    Raises
+    ------
+    TrajectoryError, SolveError
+        If no path is found that begins so and keeps the limits: what stood against the last one.
+    """
+    if any(conditions.rates[:1]):
+        message = "a state says the rate at the beginning itself; leave that one 0"
+        raise TrajectoryError(message, name="rates", value=list(conditions.rates))
+    state = clean_state(given, path.names, dict(limits_of(robot, limits).joints))
+    if along := rates_along(path, state):
+        own = dataclasses.replace(conditions, rates=(along[0], conditions.rates[1]), further=along[1:])
+        return path, found(path, own)
+    own = conditions
+    if state[1].any():
+        further = tuple(0.0 for _ in state[2:])
+        own = dataclasses.replace(conditions, rates=(1.0, conditions.rates[1]), further=further)
+    reason: JounceError | None = None
+    for share in SHARES:
+        onto = joined(path, state, share)
+        try:
+            return onto, found(onto, own)
+        except (SolveError, TrajectoryError) as error:
+            reason = error
+    assert reason is not None
+    message = f"no way from this state onto the path keeps the limits; of the last one tried: {reason}"
+    raise SolveError(message, name="state")
+
+
+def check_duration(duration: float, least: float) -> None:
+    """Raise TrajectoryError if a duration is shorter than the least time."""
+    if duration < least * (1 - LIMIT_TOLERANCE):
+        message = f"the least time of this path within these limits is {least:.9g} s, which is longer; allow that much"
+        raise TrajectoryError(message, name="duration", value=duration)
 
 
 def _repaired(
@@ -185,7 +280,7 @@ def _repaired(
     first, last = (1.0 if as_it_was else None for as_it_was in within.tolist())
     conditions = Conditions(chosen, (first, last), max_rate=1.0)
     law, search = slowed_only(source, source.labels, path.start, path.stop, conditions, cells)
-    retimed = _certified(robot, path, law, search, source, drives, hand_over=True)
+    retimed = _certified(robot, path, law, search=search, source=source, drives=drives, hand_over=True)
     # what samples make of rest is known of the given laws only, not of those that follow the slowed time
     known_ends = ends if all(end.at_rest for end in ends) else retimed.report.ends
     retimed.report = dataclasses.replace(retimed.report, ends=known_ends, hand_over=hand_over)
@@ -224,15 +319,17 @@ def _certified(
     robot: Robot,
     path: Path,
     law: RateLaw,
+    *,
     search: Search,
     source: RobotQuantities,
     drives: bool,
-    *,
     hand_over: bool,
 ) -> RetimedTrajectory:
     """Return the trajectory of a law, once it keeps the limits as its own derivatives in time tell them."""
     for attempt in range(ATTEMPTS):
         motion = RateMotion(np.linspace(0.0, 1.0, law.basis.cells + 1), law.basis.pieces(law.coefficients))
+        if search.duration is not None and not any(search.conditions.rates):
+            motion = motion.slower(search.duration / motion.duration)  # exactly
         progress = FollowingMotion(law.parameter, motion)
         laws = {name: FollowingMotion(own, progress) for name, own in path.laws.items()}
         bare = JointTrajectory(laws, 0.0, motion.duration, np.linspace(0.0, motion.duration, law.basis.cells + 1))

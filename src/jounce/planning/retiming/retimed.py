@@ -52,7 +52,7 @@ class RetimedTrajectory(JointTrajectory):
         """Return the same motion, slower by a factor; its report is that of this one."""
         parameter, motion = self.progress.parts
         assert isinstance(motion, RateMotion)
-        slow = RateMotion(motion.begins, np.asarray(motion.pieces) / factor**2)
+        slow = motion.slower(factor)
         progress = FollowingMotion(parameter, slow)
         laws = {name: FollowingMotion(own, progress) for name, own in self.path.laws.items()}
         return RetimedTrajectory(laws, slow.duration, self.path, progress, self.report, self.active)

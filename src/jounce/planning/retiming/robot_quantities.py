@@ -63,12 +63,12 @@ class RobotQuantities:
         """Return the quantities at values of s."""
         q = self.coordinates(s)
         first, bounds = self._first(q)
-        second, lower, upper, rates = self._second(q, s == self.path.stop)
+        second, bounds_of_second = self._second(q, s == self.path.stop)
         vectors, vector_bounds = self._vectors(q)
         chosen = self.with_jounce
         fourth = np.moveaxis(q[:, 1:, chosen], 1, 2)
         fourth_bounds = self._bounds("jounce", chosen, q)
-        return PathQuantities(first, bounds, second, lower, upper, rates, vectors, vector_bounds, fourth, fourth_bounds)
+        return PathQuantities(first, bounds, second, *bounds_of_second, vectors, vector_bounds, fourth, fourth_bounds)
 
     def coordinates(self, s: _Points) -> Float[np.ndarray, "point 5 joint"]:
         """Return the positions of all joints and their derivatives by s."""
@@ -84,33 +84,36 @@ class RobotQuantities:
         return f"s = {s:.6g} (q = {', '.join(f'{x:.4g}' for x in q)})"
 
     def _first(self, q: np.ndarray) -> tuple[_Table, _Table]:
-        values, bounds = [q[:, 1, self.with_velocity]], [self._bounds("velocity", self.with_velocity, q)]
+        values = [q[:, 1, self.with_velocity]]
+        forward, backward = self._both("velocity", self.with_velocity, q)
+        bounds = [np.where(values[0] < 0, backward, forward)]
         for point in self.limits.points:
             if point.speed is not None:
                 values.append(np.linalg.norm(self.point(q, point)[:, 1], axis=-1)[:, None])
                 bounds.append(np.full((len(q), 1), point.speed))
         return np.concatenate(values, axis=1), np.concatenate(bounds, axis=1)
 
-    def _second(self, q: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, _Table, _Table, _Table]:
+    def _second(self, q: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, tuple[_Table, ...]]:
+        """Return the coefficients of accelerations and torques; lowest and highest of them, and of their rates."""
         chosen = self.with_acceleration
         motion = q[:, :, chosen]
         nothing = np.zeros_like(motion[:, 0])
         parts = (motion[:, 1], motion[:, 2], nothing, nothing, motion[:, 2], motion[:, 3], nothing, nothing)
-        faster, slower = self._bounds("acceleration", chosen, q), self._bounds("deceleration", chosen, q)
-        given = np.isfinite(slower)
-        slower = np.where(given, slower, faster)
         at_rest = np.abs(motion[:, 1]) <= REST * np.abs(motion[:, 1]).max(axis=0, initial=0.0)
-        faster = np.where(at_rest & ends[:, None], slower, faster)  # what arrives has slowed down
-        ahead = motion[:, 1] > 0
-        upper = np.where(at_rest | ahead, faster, slower)
-        lower = -np.where(at_rest | ~ahead, faster, slower)
-        tables = [(np.stack(parts, axis=-1), lower, upper, self._bounds("jerk", chosen, q))]
+        ahead, sides = motion[:, 1] > 0, []
+        pairs = zip(self._both("acceleration", chosen, q), self._both("deceleration", chosen, q), strict=True)
+        for (faster, slower), along in zip(pairs, (ahead, ~ahead), strict=True):
+            slowing = np.where(np.isfinite(slower), slower, faster)
+            speeding = np.where(at_rest & ends[:, None], slowing, faster)  # what arrives has slowed down
+            sides.append(np.where(at_rest | along, speeding, slowing))
+        jerk, jerk_back = self._both("jerk", chosen, q)
+        tables = [(np.stack(parts, axis=-1), -sides[1], sides[0], -jerk_back, jerk)]
         if self.with_effort:
-            efforts = self._bounds("effort", self.with_effort, q)
-            rates = self._bounds("effort_rate", self.with_effort, q)
-            tables.append((self._torques(q)[:, self.with_effort], -efforts, efforts, rates))
-        second, lower, upper, rates = (np.concatenate(x, axis=1) for x in zip(*tables, strict=True))
-        return second, lower, upper, rates
+            effort, effort_back = self._both("effort", self.with_effort, q)
+            rate, rate_back = self._both("effort_rate", self.with_effort, q)
+            tables.append((self._torques(q)[:, self.with_effort], -effort_back, effort, -rate_back, rate))
+        second, *bounds = (np.concatenate(x, axis=1) for x in zip(*tables, strict=True))
+        return second, tuple(bounds)
 
     def _torques(self, q: np.ndarray) -> Float[np.ndarray, "point joint 8"]:
         """Return the coefficients of the torques: exact values for a few rates of s, and the polynomials they are."""
@@ -141,11 +144,26 @@ class RobotQuantities:
     def _has(self, name: str, *fields: str) -> bool:
         """Whether a joint has one of some limits."""
         constant, varying = self.limits.joints[name], self.limits.varying.get(name, {})
-        others = {"jounce": self.limits.jounce.get(name)}
-        return any(f in varying or others.get(f, getattr(constant, f, None)) is not None for f in fields)
+        others, backward = {"jounce": self.limits.jounce.get(name)}, self.limits.backward.get(name, Limits())
+        return any(
+            f in varying
+            or others.get(f, getattr(constant, f, None)) is not None
+            or getattr(backward, f, None) is not None
+            for f in fields
+        )
 
     def _limited(self, *fields: str) -> list[int]:
         return [k for k in self.moved if self._has(self.robot.joint_names[k], *fields)]
+
+    def _both(self, field: str, chosen: list[int], q: np.ndarray) -> tuple[_Table, _Table]:
+        """Return the limits of some joints at points, above zero and below it."""
+        forward = self._bounds(field, chosen, q)
+        backward = forward.copy()
+        for column, k in enumerate(chosen):
+            entry = self.limits.backward.get(self.robot.joint_names[k])
+            if entry is not None and getattr(entry, field) is not None:
+                backward[:, column] = getattr(entry, field)
+        return forward, backward
 
     def _bounds(self, field: str, chosen: list[int], q: np.ndarray) -> _Table:
         """Return the limits of some joints at points, infinite where there is none."""

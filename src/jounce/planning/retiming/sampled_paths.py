@@ -1,43 +1,32 @@
-"""Paths of what was sampled: splines through the samples where these support them, else near straight lines.
+"""Paths of what was sampled: splines through the samples where these support them, else a smooth motion near them.
 
-Splines through samples with noise, rounding or dwells swing, and so do those through few samples. Such a path keeps
-within a deviation of the straight lines between the samples instead, which is told.
+Splines through samples with noise, rounding or dwells swing. Such a path is that of the smooth motion within a
+deviation of the samples. Few samples are points, as waypoints are: their path keeps near straight lines between them.
 """
 
 import dataclasses
 import warnings
 
 import numpy as np
-from jaxtyping import Float
 
 from jounce.errors import SampleWarning
 from jounce.planning.retiming.path import Path
 from jounce.planning.retiming.straight_lines import Lines, rounded
-from jounce.planning.retiming.trajectory_paths import path_of_trajectory
-from jounce.trajectory import AbstractMotion, HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
+from jounce.planning.retiming.trajectory_paths import path_of_trajectory, turns_back_within
+from jounce.planning.smoothing.smooth import FEWEST, sampled, smooth
+from jounce.trajectory import JointTrajectory, SplineMotion
 
-DEVIATION = 1e-3  # rad or m, from the straight lines between samples, unless given
+DEVIATION = 1e-3  # rad or m, from samples, unless given
+OF_SMOOTHING = 0.75  # of the deviation, where corners of what smoothing makes are rounded as well
 SHARE = 1e-3  # of the size of the path, if that is less
 LOOKS, MANY = 8, 100_000  # between two samples, and at once
 REST_DISTANCE = 1e-7  # of the size of the path: how far a joint may move while its samples do not
 SAMPLES = 4000  # at which a path is looked at that does not come from samples
 
 
-def samples_of(law: AbstractMotion) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, " sample"]] | None:
-    """Return the times and the values that a law was made of; None where it was made of something else.
-
-    Positions alone, as polynomials of degree 1 go through, are samples as well.
-    """
-    if type(law) in (SplineMotion, HermiteSplineMotion) and law.samples.value is not None and law.beyond == "refuse":
-        return law.samples.value
-    if isinstance(law, HermiteMotion) and law.degree == 1 and law.beyond == "refuse":
-        return np.asarray(law.breakpoints, float), np.asarray(law.coefficients, float)[0]
-    return None
-
-
 def lines_of(trajectory: JointTrajectory) -> Lines | None:
     """Return the straight lines between the samples of a trajectory; None if no joint of it has any."""
-    samples = {name: samples_of(law) for name, law in trajectory.laws.items()}
+    samples = {name: sampled(law) for name, law in trajectory.laws.items()}
     times = [own[0] for own in samples.values() if own is not None]
     if not times:
         return None
@@ -70,14 +59,14 @@ def lines_along(path: Path) -> Lines:
 
 
 def deviation_of(lines: Lines, given: float | None) -> float:
-    """Return how far from straight lines a path may be."""
+    """Return how far from samples a path may be."""
     return min(DEVIATION, SHARE * lines.size) if given is None else given
 
 
 def path_of_samples(
     trajectory: JointTrajectory, order: int, deviation: float | None = None, *, timed: bool = False
 ) -> Path:
-    """Return where a trajectory leads, within a deviation of the straight lines between its samples if it has any.
+    """Return where a trajectory leads, within a deviation of its samples if it has any.
 
     Parameters
     ----------
@@ -100,20 +89,44 @@ def path_of_samples(
         if deviation is not None:
             return rounded(lines_along(own), deviation, timed=timed)
         return own if timed else path_of_trajectory(trajectory, order)
-    allowed = deviation_of(lines, deviation)
-    away = _swing(trajectory, own, lines, order)
+    allowed, few = deviation_of(lines, deviation), _are_few(trajectory)
+    away = _swing(trajectory, own, lines, order) if few or deviation is None else np.inf
     if away <= allowed:
         path = own if timed else path_of_trajectory(trajectory, order)
         if path.deviation + away <= allowed:
             degrees = sorted({law.degree for law in trajectory.laws.values() if type(law) is SplineMotion})
             words = f"splines of degree {' and '.join(map(str, degrees))} through {len(lines.at)} samples"
             return dataclasses.replace(path, deviation=path.deviation + away, allowed=allowed, words=words)
-    return rounded(lines, allowed, timed=timed)
+    return rounded(lines, allowed, timed=timed) if few else _smoothed(trajectory, order, allowed, timed=timed)
+
+
+def _are_few(trajectory: JointTrajectory) -> bool:
+    """Tell whether samples are points to be led by rather than a log of a motion."""
+    counts = [len(own[0]) for law in trajectory.laws.values() if (own := sampled(law)) is not None]
+    return min(counts) < FEWEST
+
+
+def _smoothed(trajectory: JointTrajectory, order: int, allowed: float, *, timed: bool) -> Path:
+    """Return the path of the smooth motion within a deviation of each sample."""
+    motion = smooth(trajectory, allowed)
+    path = Path(dict(motion.laws), motion.start, motion.stop)
+    ends = np.array([motion.start, motion.stop])
+    if timed:
+        path = dataclasses.replace(path, instants=(ends, ends))
+    elif turns_back_within(motion, allowed):  # which is no part of the path, but noise that is left of slow motions
+        motion = smooth(trajectory, OF_SMOOTHING * allowed)
+        lines = dataclasses.replace(lines_along(Path(dict(motion.laws), *ends.tolist())), kind="samples")
+        path = rounded(lines, (1 - OF_SMOOTHING) * allowed)
+    else:
+        path = path_of_trajectory(motion, order)
+    away = path.deviation + max(own.away for own in motion.joints.values())
+    words = f"within {allowed:.3g} rad or m of each of {len(motion.times)} samples"
+    return dataclasses.replace(path, deviation=away, allowed=allowed, words=words)
 
 
 def _swing(trajectory: JointTrajectory, own: Path, lines: Lines, order: int) -> float:
     """Return how far splines are from straight lines between their samples; infinite if these do not support them."""
-    laws = [law for law in trajectory.laws.values() if samples_of(law) is not None]
+    laws = [law for law in trajectory.laws.values() if sampled(law) is not None]
     if min(law.degree for law in laws if isinstance(law, SplineMotion)) <= order:
         return np.inf
     if trajectory.supported_order() < order:

@@ -26,6 +26,7 @@ def fit_to_samples(
     *,
     degree: int = 5,
     drives: bool = True,
+    lasting: bool = False,
 ) -> tuple[RetimedTrajectory, LimitReport]:
     """Return a trajectory slowed until it lasts whole periods, and splines through its samples keep the limits too.
 
@@ -45,6 +46,8 @@ def fit_to_samples(
         Of the splines that a reader puts through the samples.
     drives : bool, default True
         Whether torques contain armature inertia, damping and friction of the drives.
+    lasting : bool, default False
+        Whether its duration is to stay as it is.
 
     Returns
     -------
@@ -56,15 +59,20 @@ def fit_to_samples(
     Raises
     ------
     TrajectoryError
-        If the rate gives too few samples, or the splines cannot be made to keep the limits.
+        If the rate gives too few samples, the splines cannot be made to keep the limits, or a duration that is to stay
+        is not a number of whole periods.
     """
     period, hand_over = 1 / rate, trajectory.report.hand_over
     if trajectory.stop < LEAST * period:
         raise TrajectoryError(f"gives fewer than {LEAST} samples in {trajectory.stop:g} s; choose more", value=rate)
+    whole = abs(trajectory.stop / period - round(trajectory.stop / period)) <= WHOLE * trajectory.stop / period
+    if lasting and not whole:
+        message = f"{trajectory.stop:.9g} s are not a number of whole periods; choose another rate, or duration"
+        raise TrajectoryError(message, value=rate)
     slowed = 1.0
     note = ""
-    for _ in range(ATTEMPTS):
-        periods = np.ceil(slowed * trajectory.stop / period - WHOLE)
+    for _ in range(1 if lasting else ATTEMPTS):
+        periods = round(trajectory.stop / period) if lasting else np.ceil(slowed * trajectory.stop / period - WHOLE)
         slower = trajectory.slower(periods * period / trajectory.stop)
         times = np.linspace(0.0, slower.stop, int(periods) + 1)
         slower.times = times
@@ -83,6 +91,6 @@ def fit_to_samples(
         slowed = max(slowed, float(periods) * period / trajectory.stop) * (1 + min(over / 2, 0.05)) + period / 10
     message = (
         f"splines of degree {degree} through samples at this rate break the limit{note}; "
-        f"choose a higher rate, or a smoother motion (order)"
+        f"choose a higher rate, or a smoother motion (order){', or a longer duration' if lasting else ''}"
     )
     raise TrajectoryError(message, value=rate)

@@ -15,7 +15,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.errors import SampleWarning, TrajectoryError
-from jounce.planning.retiming.path import JoinedPieces, Path
+from jounce.planning.pieces import JoinedPieces
+from jounce.planning.retiming.path import Path
 from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory, SplineMotion
 
 REST_SPEED = 1e-3  # of the largest speed: a trajectory that is slower than this at its ends stands still there
@@ -135,6 +136,20 @@ def path_of_trajectory(trajectory: JointTrajectory, order: int) -> Path:
                 break
     assert best is not None
     return best
+
+
+def turns_back_within(trajectory: JointTrajectory, size: float) -> bool:
+    """Tell whether a trajectory turns back, or stops at a corner, twice within a way that is shorter than a size."""
+    path = Path(dict(trajectory.laws), trajectory.start, trajectory.stop)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SampleWarning)
+        times = _instants(path, trajectory.times)
+        speeds = _speeds(path, times)
+        rests = _rests(path, times, speeds, RESTING * float(np.nanmax(speeds)))
+        times = np.union1d(times, rests)
+        lengths = np.append(0.0, np.cumsum(_between(path, times[:-1], times[1:])))
+        edges = [0.0, *_stops(path, times, lengths, rests).lengths, lengths[-1]]
+    return len(edges) > 2 and bool(np.diff(edges).min() < size)
 
 
 def _instants(path: Path, own: np.ndarray) -> Float[np.ndarray, " time"]:

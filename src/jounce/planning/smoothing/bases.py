@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ from jaxtyping import Float
 
 DEGREE, PENALIZED = 7, 4
 """Of the splines, and which derivative of them is to be small: jounce; natural splines for it have this degree."""
+PART = 50_000
+"""Samples or cells whose splines are evaluated at once."""
 _Knots = Float[np.ndarray, " knot"]
 
 
@@ -24,20 +27,20 @@ def values_at(times: Float[np.ndarray, " sample"], knots: _Knots) -> Any:
     return BSpline.design_matrix(times, whole(knots), DEGREE)
 
 
-def penalty_root(knots: _Knots, weights: Float[np.ndarray, " cell"]) -> Any:
+def penalty_root(repeated: _Knots, weights: Float[np.ndarray, " cell"]) -> Any:
     """Return a sparse matrix, (node, spline), whose square is the weighted integral of the square of the jounce.
 
     Parameters
     ----------
-    knots : array of shape (cell + 1,)
-        Increasing.
+    repeated : array of shape (cell + 1 + 2 * degree,)
+        Not decreasing: the ends of the cells, and as many knots before and after them as splines there ask for.
     weights : array of shape (cell,)
-        Of each cell between them.
+        Of each cell.
     """
     from scipy import sparse
     from scipy.interpolate import BSpline
 
-    repeated, degree = whole(knots), DEGREE
+    knots, degree = repeated[DEGREE : len(repeated) - DEGREE], DEGREE
     derivative: Any = sparse.identity(len(knots) + DEGREE - 1, format="csr")
     for _ in range(PENALIZED):
         count = derivative.shape[0]
@@ -50,6 +53,47 @@ def penalty_root(knots: _Knots, weights: Float[np.ndarray, " cell"]) -> Any:
     at = knots[:-1, None] + lengths[:, None] * (nodes + 1) / 2
     root = np.sqrt(weights[:, None] * lengths[:, None] / 2 * shares)
     return sparse.diags(root.reshape(-1)) @ BSpline.design_matrix(at.reshape(-1), repeated, degree) @ derivative
+
+
+def parts_of(count: int) -> Iterator[slice]:
+    """Yield parts of many samples or cells, so that what is made of each needs little memory."""
+    for first in range(0, count, PART):
+        yield slice(first, min(first + PART, count))
+
+
+def cost(
+    times: Float[np.ndarray, " sample"],
+    values: Float[np.ndarray, " sample"],
+    knots: _Knots,
+    weights: Float[np.ndarray, " cell"],
+) -> tuple[Any, Float[np.ndarray, " spline"]]:
+    """Return the symmetric sparse matrix, and the vector, of the sum of squares of distances and of jounce.
+
+    Parameters
+    ----------
+    times, values : array of shape (sample,)
+        As of the knots; rad or m.
+    knots : array of shape (cell + 1,)
+        Increasing.
+    weights : array of shape (cell,)
+        Of the square of the jounce in each cell.
+    """
+    from scipy import sparse
+
+    count = len(knots) + DEGREE - 1
+    bands, right = np.zeros((DEGREE + 1, count)), np.zeros(count)
+    for some in parts_of(len(times)):
+        matrix = values_at(times[some], knots)
+        own = slice(int(matrix.indices.min()), int(matrix.indices.max()) + 1)
+        matrix = matrix[:, own]
+        bands[:, own] += banded(matrix.T @ matrix)
+        right[own] += matrix.T @ values[some]
+    repeated = whole(knots)
+    for some in parts_of(len(weights)):
+        root = penalty_root(repeated[some.start : some.stop + 2 * DEGREE + 1], weights[some])
+        bands[:, some.start : some.stop + DEGREE] += banded(root.T @ root)
+    upper: Any = sparse.dia_array((bands[::-1], np.arange(DEGREE + 1)), shape=(count, count)).tocsr()
+    return upper + sparse.triu(upper, 1).T.tocsr(), right
 
 
 def banded(matrix: Any) -> Float[np.ndarray, "diagonal spline"]:

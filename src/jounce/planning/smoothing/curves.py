@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from jounce.errors import SolveError
-from jounce.planning.smoothing.bases import DEGREE, banded, penalty_root, values_at
+from jounce.planning.smoothing.bases import DEGREE, banded, cost, parts_of, values_at, whole
 from jounce.planning.smoothing.dwells import Dwell
 from jounce.planning.smoothing.weights import Stretch
 
@@ -21,6 +21,7 @@ GRADED = 1.6  # ratio of the lengths of cells beside each other
 FEWEST = 8  # cells of a time between dwells
 INSIDE = 1 - 1e-6  # of the deviation: what a solver leaves
 ROUNDS, HALVINGS = 12, 12
+LOOKS = 8  # at the density of knots in a stretch
 HALVED = 3  # cells on each side of one that is halved
 PADDING = 24  # splines beside those at samples that are too far, which move with them
 TOGETHER = 400  # splines that are moved at once, about
@@ -88,13 +89,14 @@ def laid_knots(
     at = np.array([(s.start + s.stop) / 2 for s in stretches])
     logarithms = np.log(CELL / np.array([s.cutoff for s in stretches]))
     shortest = float(np.median(np.diff(times)))
+    least = min(s.stop - s.start for s in stretches) / LOOKS
     still = {(float(times[d.first]), float(times[d.last])) for d in dwells}
     parts = []
     for a, b in itertools.pairwise(ends):
         if (float(a), float(b)) in still:
             parts.append(np.array([a]))
             continue
-        grid = np.linspace(a, b, 2 + int((b - a) / max(shortest, (b - a) / 20_000)))
+        grid = np.linspace(a, b, 2 + int((b - a) / max(shortest, least)))
         length = np.maximum(np.exp(np.interp(grid, at, logarithms)), shortest)
         count = np.append(0.0, np.cumsum(np.diff(grid) * 2 / (length[1:] + length[:-1])))
         samples = int(np.searchsorted(times, b) - np.searchsorted(times, a))
@@ -125,15 +127,13 @@ def _on_knots(
 ) -> Curve:
     scale = float(np.median(np.diff(knots)))
     local = (knots - knots[0]) / scale
-    matrix = values_at(np.clip((times - knots[0]) / scale, 0.0, local[-1]), local)
+    instants = np.clip((times - knots[0]) / scale, 0.0, local[-1])
     middles = (knots[:-1] + knots[1:]) / 2
     at = np.array([(s.start + s.stop) / 2 for s in stretches])
     weights = np.exp(np.interp(middles, at, np.log([s.weight for s in stretches]))) / scale**DEGREE
-    root = penalty_root(local, weights)
-    system = (matrix.T @ matrix + root.T @ root).tocsr()
     middle = float(values.mean())
-    right = matrix.T @ (values - middle)
-    found, free = np.zeros(matrix.shape[1]), np.ones(matrix.shape[1], bool)
+    system, right = cost(instants, values - middle, local, weights)
+    found, free = np.zeros(len(right)), np.ones(len(right), bool)
     for dwell in dwells:
         first = int(np.searchsorted(knots, times[dwell.first]))
         last = int(np.searchsorted(knots, times[dwell.last]))
@@ -141,7 +141,7 @@ def _on_knots(
         found[own], free[own] = dwell.position - middle, False
     for run in _runs(free):
         found[run] = _solved(system, right, found, run)
-    problem = _Problem(matrix, system, right, values - middle, deviation, times)
+    problem = _Problem(instants, values - middle, local, system, right, deviation)
     return Curve(knots, problem.within(found, free) + middle, problem.away)
 
 
@@ -167,42 +167,57 @@ def _solved(system: Any, right: np.ndarray, found: np.ndarray, run: slice) -> Fl
 class _Problem:
     """The least cost within a deviation of the samples: only where that is not kept already."""
 
-    matrix: Any
+    times: np.ndarray
+    values: np.ndarray
+    knots: np.ndarray
     system: Any
     right: np.ndarray
-    values: np.ndarray
     deviation: float
-    times: np.ndarray
     away: float = 0.0
 
     def within(self, found: np.ndarray, free: np.ndarray) -> Float[np.ndarray, " spline"]:
         """Return coefficients within the deviation."""
-        columns = self.matrix.indices.reshape(len(self.values), DEGREE + 1)
         for _ in range(ROUNDS):
-            apart = np.abs(self.matrix @ found - self.values)
-            self.away = float(apart.max())
-            far = np.flatnonzero(apart > self.deviation)
+            far = self._far(found)
             if not len(far):
                 return found
             moved = np.zeros(len(found), bool)
-            for sample in _spread(columns, far):
-                moved[max(sample - PADDING, 0) : sample + DEGREE + 1 + PADDING] = True
+            for cell in np.unique(self._cells(far)):
+                moved[max(cell - PADDING, 0) : cell + DEGREE + 1 + PADDING] = True
             moved &= free
             if not moved.any():
                 raise TooFarError(far)
             for run in _runs(moved):
                 for part in _parts(run):
-                    self._move(found, part, columns)
-        raise TooFarError(np.flatnonzero(np.abs(self.matrix @ found - self.values) > self.deviation))
+                    self._move(found, part)
+        raise TooFarError(self._far(found))
 
-    def _move(self, found: np.ndarray, run: slice, columns: np.ndarray) -> None:
+    def _cells(self, samples: Int[np.ndarray, " some"]) -> Int[np.ndarray, " some"]:
+        """Return the cells of samples: the first of the splines that reach each."""
+        return np.clip(np.searchsorted(self.knots, self.times[samples], side="right") - 1, 0, len(self.knots) - 2)
+
+    def _far(self, found: np.ndarray) -> Int[np.ndarray, " far"]:
+        """Return the samples that are farther away than the deviation, and note how far the farthest is."""
+        from scipy.interpolate import BSpline
+
+        spline, far, self.away = BSpline(whole(self.knots), found, DEGREE), [np.zeros(0, int)], 0.0
+        for some in parts_of(len(self.times)):
+            apart = np.abs(spline(self.times[some]) - self.values[some])
+            self.away = max(self.away, float(apart.max()))
+            far.append(some.start + np.flatnonzero(apart > self.deviation))
+        return np.concatenate(far)
+
+    def _move(self, found: np.ndarray, run: slice) -> None:
         """Solve for a run of coefficients, all samples that they reach being within the deviation."""
         clarabel, sparse = _solver()
-        rows = np.flatnonzero((columns[:, -1] >= run.start) & (columns[:, 0] < run.stop))
+        ends = self.knots[[max(run.start - DEGREE, 0), min(run.stop, len(self.knots) - 1)]]
+        last = "right" if run.stop >= len(self.knots) - 1 else "left"
+        rows = np.arange(np.searchsorted(self.times, ends[0]), np.searchsorted(self.times, ends[1], side=last))
+        matrix = values_at(self.times[rows], self.knots)
         fixed = found.copy()
         fixed[run] = 0.0
-        own = self.matrix[rows][:, run]
-        rest = self.values[rows] - self.matrix[rows] @ fixed
+        own = matrix[:, run]
+        rest = self.values[rows] - matrix @ fixed
         target = self.right[run] - self.system[run] @ fixed
         size = self.deviation
         bound = np.concatenate([rest / size + INSIDE, INSIDE - rest / size])
@@ -225,10 +240,6 @@ class _Problem:
         found[run] = np.array(solution.x) * size
 
 
-def _spread(columns: Int[np.ndarray, "sample own"], far: Int[np.ndarray, " far"]) -> Int[np.ndarray, " first"]:
-    return np.unique(columns[far, 0])
-
-
 def _parts(run: slice) -> list[slice]:
     """Return parts of a long run that overlap."""
     count = run.stop - run.start
@@ -241,7 +252,7 @@ def _parts(run: slice) -> list[slice]:
 def _solver() -> tuple[Any, Any]:
     from scipy import sparse
 
-    from jounce.planning.retiming.program import require_solver
+    from jounce.planning.solver import require_solver
 
     require_solver()
     return importlib.import_module("clarabel"), sparse

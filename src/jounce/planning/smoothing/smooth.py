@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import SolveError, TrajectoryError
-from jounce.planning.retiming.path import SmoothPieces
+from jounce.planning.pieces import SmoothPieces
 from jounce.planning.smoothing.bases import DEGREE, whole
 from jounce.planning.smoothing.curves import smoothed_curve
 from jounce.planning.smoothing.dwells import Dwell, dwells, noise_of, without_margins
@@ -159,9 +159,7 @@ def smoothed_samples(
         still = [Dwell(0, len(times) - 1, float(values[0]))]
         found = [Stretch(float(times[0]), float(times[-1]), 1.0, 1.0, 0.0)]
     else:
-        still = dwells(times, values, sigma)
-        found = _moving(times, values, still)
-        still = without_margins(still, times, [_scales(times, dwell, found) for dwell in still])
+        still, found = _dwells_and_stretches(times, values, sigma)
         still = [_fitting(times, values, dwell, deviation) for dwell in still]
     curve = smoothed_curve(times, values, deviation, found, still)
     from scipy.interpolate import BSpline  # here, since importing SciPy takes half a second
@@ -176,6 +174,21 @@ def smoothed_samples(
     rates = [stretch.cutoff / (2 * np.pi) for stretch in found]
     noise = max(sigma, float(np.median([stretch.noise for stretch in found])))
     return law, SmoothedJoint(noise, curve.away, spans, (min(rates), max(rates)))
+
+
+def _dwells_and_stretches(times: np.ndarray, values: np.ndarray, sigma: float) -> tuple[list[Dwell], list[Stretch]]:
+    """Return dwells without their margins, and what the samples between them say.
+
+    A dwell of which nothing is left was a slow part of a motion: what is beside it is one motion then.
+    """
+    whole_dwells = dwells(times, values, sigma)
+    while True:
+        found = _moving(times, values, whole_dwells)
+        scales = [_scales(times, dwell, found) for dwell in whole_dwells]
+        inner = [without_margins([d], times, [scale]) for d, scale in zip(whole_dwells, scales, strict=True)]
+        if all(inner):
+            return [dwell for (dwell,) in inner], found
+        whole_dwells = [dwell for dwell, rest in zip(whole_dwells, inner, strict=True) if rest]
 
 
 def _fitting(times: np.ndarray, values: np.ndarray, dwell: Dwell, deviation: float) -> Dwell:

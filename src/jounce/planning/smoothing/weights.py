@@ -13,7 +13,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from jounce.planning.smoothing.bases import DEGREE, PENALIZED, banded, penalty_root, values_at
+from jounce.planning.smoothing.bases import DEGREE, PENALIZED, banded, penalty_root, values_at, whole
 
 CELLS = (8, 16, 32, 64)  # of a stretch: as few as resolve what is followed, or rounding counts
 MOST, LEAST = 3000, 64  # samples in a stretch
@@ -85,7 +85,7 @@ def _stretch(times: np.ndarray, values: np.ndarray, cells: int) -> Stretch:
     since = (times - times.mean()) * (2 / span)
     offset = values - np.polynomial.Polynomial.fit(since, values, PENALIZED - 1, domain=[-1, 1], window=[-1, 1])(since)
     floor = max(float(np.abs(values).max()) * np.finfo(float).eps, FLOOR * float(np.ptp(values)))
-    root = penalty_root(knots, np.ones(cells))
+    root = penalty_root(whole(knots), np.ones(cells))
     gram, jounce, right = banded(matrix.T @ matrix), banded(root.T @ root), matrix.T @ offset
     free = cells + DEGREE - PENALIZED
 

@@ -234,6 +234,30 @@ class RetimeResult(Result):
     figure: str | None
 
 
+class SmoothedJointFacts(TypedDict):
+    """What smoothing made of the samples of a joint, SI; followed are frequencies, Hz, from which on nothing is."""
+
+    joint: str
+    noise: float
+    farthest: float
+    followed: list[float]
+    dwells: list[list[float]]
+
+
+class SmoothResult(Result):
+    """jounce smooth --json."""
+
+    command: Literal["smooth"]
+    file: str
+    trajectory: str
+    time: Grid
+    deviation: float
+    joints: list[SmoothedJointFacts]
+    follows_noise: list[str]
+    written: str | None
+    figure: str | None
+
+
 class SweptPeak(TypedDict):
     """The least and the largest peak that a derivative of an output has among designs, and the designs."""
 
@@ -367,6 +391,7 @@ RESULTS: dict[str, Any] = {
     "torques": TorquesResult,
     "feedforward": FeedforwardResult,
     "retime": RetimeResult,
+    "smooth": SmoothResult,
     "servo": ServoResult,
     "cam": CamResult,
     "modes": ModesResult,

@@ -1,0 +1,12 @@
+"""The solver of cone programs, which is an extra."""
+
+from importlib.util import find_spec
+
+from jounce.errors import UnsupportedError
+
+
+def require_solver() -> None:
+    """Raise UnsupportedError where the solver of cone programs is not installed."""
+    if find_spec("clarabel") is None:
+        message = "retiming needs Clarabel, which is not installed; install it with: pip install 'jounce[planning]'"
+        raise UnsupportedError(message, name="clarabel")

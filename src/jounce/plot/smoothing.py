@@ -1,0 +1,84 @@
+"""What smoothing made of samples: their distance from the motion, and its jerk, with the times of rest."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jounce.planning.smoothing.smooth import SmoothedTrajectory, sampled
+from jounce.plot.instants import evenly_chosen
+from jounce.plot.style import GRAY, LINE_COLORS, PALE_GRAY, blank_figure, set_ticks, shown_name, style
+from jounce.trajectory import JointTrajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_smoothing"]
+
+WIDTH, PANEL = 7.0, 2.0  # inches
+DRAWN = 4000  # samples at most
+NAMED = 14  # joints with a name in the legend
+DASHES = ("-", (0, (4, 1.5)), (0, (1, 1.2)))
+
+
+def draw_smoothing(given: JointTrajectory, motion: SmoothedTrajectory, title: str = "") -> Figure:
+    """Draw how far samples are from a motion within a deviation of them, and the jerk of the motion.
+
+    Parameters
+    ----------
+    given : JointTrajectory
+        Through the samples.
+    motion : SmoothedTrajectory
+        As `smooth` returns it.
+    title : str, optional
+        The names of the joints unless given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Above the distances, as shares of the deviation; below the jerk. Of more samples than can be seen some are
+        drawn. Where all joints stand still the ground is gray.
+    """
+    names = list(motion.joints)
+    with style():
+        figure = blank_figure(WIDTH, 2 * PANEL + 0.9, title or ", ".join(names), h_pad=0.06)
+        apart, jerk = figure.subplots(2, 1, sharex=True)
+        times = np.linspace(motion.start, motion.stop, DRAWN)
+        jerks = motion.derivatives(times, 3)[:, 3]
+        for k, name in enumerate(names):
+            rounds, index = divmod(k, len(LINE_COLORS))
+            own: dict[str, Any] = {"color": LINE_COLORS[index], "linestyle": DASHES[rounds % len(DASHES)]}
+            at, values = _samples(given, name)
+            positions = motion.derivatives(at, 0)[:, 0, motion.names.index(name)]
+            apart.plot(at, (values - positions) / motion.deviation, ".", markersize=1.2, color=own["color"])
+            label = shown_name(name) if k < NAMED else None
+            jerk.plot(times, jerks[:, motion.names.index(name)], label=label, linewidth=0.9, **own)
+        for side in (-1, 1):
+            apart.axhline(side, color=GRAY, linewidth=1.0)
+        for axes in (apart, jerk):
+            for first, last in _common_dwells(motion):
+                axes.axvspan(first, last, color=PALE_GRAY, linewidth=0, zorder=0)
+            set_ticks(axes.yaxis, 5)
+        apart.set_ylabel(f"from the samples\n(share of {motion.deviation:.3g} rad or m)")
+        jerk.set_ylabel("jerk  (rad/s$^3$ or m/s$^3$)")
+        jerk.set_xlabel("time  $t$  (s)")
+        jerk.set_xlim(motion.start, motion.stop)
+        jerk.legend(fontsize=6.5, ncols=2, loc="upper right")
+    return figure
+
+
+def _samples(given: JointTrajectory, name: str) -> tuple[np.ndarray, np.ndarray]:
+    own = sampled(given.laws[name])
+    assert own is not None
+    chosen = evenly_chosen(np.arange(len(own[0])), DRAWN)
+    return own[0][chosen], own[1][chosen]
+
+
+def _common_dwells(motion: SmoothedTrajectory) -> list[tuple[float, float]]:
+    """Return the times at which all joints stand still."""
+    common = [(motion.start, motion.stop)]
+    for own in motion.joints.values():
+        both = [(max(a, c), min(b, d)) for a, b in common for c, d in own.dwells]
+        common = [(first, last) for first, last in both if first < last]
+    return common

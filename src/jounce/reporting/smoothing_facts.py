@@ -1,0 +1,71 @@
+"""What is told of a log that was smoothed: noise, distances, what was followed, and where it stands still."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from jounce.planning.smoothing.smooth import SmoothedTrajectory
+from jounce.reporting.text.tables import Table
+
+FOLLOWED = 3.0  # times the noise: within less, the motion follows noise
+SHOWN = 3  # dwells in the table
+
+
+def loud_joints(motion: SmoothedTrajectory) -> list[str]:
+    """Return the joints whose noise is so large beside the deviation that the motion follows it."""
+    return [name for name, own in motion.joints.items() if motion.deviation < FOLLOWED * own.noise]
+
+
+def smoothing_table(motion: SmoothedTrajectory) -> Table:
+    """Return what was made of the samples of each joint as a table."""
+    rows = [
+        [
+            name,
+            f"{own.noise:.3g}",
+            f"{own.away:.3g}",
+            f"{own.cutoff[0]:.3g} to {own.cutoff[1]:.3g}",
+            _dwells(own.dwells),
+        ]
+        for name, own in motion.joints.items()
+    ]
+    heading = ("joint", "noise", "farthest", "followed below, Hz", "stands still, s")
+    return Table("", heading, rows, numbers=(1, 2))
+
+
+def smoothing_words(motion: SmoothedTrajectory) -> str:
+    """Word that the motion follows noise, where it does."""
+    loud = loud_joints(motion)
+    if not loud:
+        return ""
+    return f"\nThe deviation is below three times the noise of {', '.join(loud)}: the motion follows noise there."
+
+
+def smoothing_result(
+    motion: SmoothedTrajectory, files: tuple[Path, Path], rows: int, written: tuple[Path | None, Path | None]
+) -> dict[str, Any]:
+    """Return what `jounce smooth` tells."""
+    return {
+        "file": files[0],
+        "trajectory": files[1],
+        "time": {"start": motion.start, "stop": motion.stop, "count": rows},
+        "deviation": motion.deviation,
+        "joints": [
+            {
+                "joint": name,
+                "noise": own.noise,
+                "farthest": own.away,
+                "followed": list(own.cutoff),
+                "dwells": [list(span) for span in own.dwells],
+            }
+            for name, own in motion.joints.items()
+        ],
+        "follows_noise": loud_joints(motion),
+        "written": written[0],
+        "figure": written[1],
+    }
+
+
+def _dwells(spans: tuple[tuple[float, float], ...]) -> str:
+    shown = [f"{first:.4g} to {last:.4g}" for first, last in spans[:SHOWN]]
+    return ", ".join([*shown, f"and {len(spans) - SHOWN} more"] if len(spans) > SHOWN else shown)
