@@ -70,7 +70,7 @@ def export(
         model = reading.robot(robot)
         motion = replace(reading, joints=None).trajectory(trajectory, model)
         if names is not None:
-            motion = motion.part([name for name in motion.names if name in names])
+            motion = motion.part([name for name in motion.names if name in (*names, *model.joint_names)])
         spare_inputs(out, overwrite=overwrite)
         with errors_about(trajectory, robot):
             times = export_trajectory(

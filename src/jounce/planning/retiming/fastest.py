@@ -306,9 +306,7 @@ class Search:
         entries = np.append(data.reshape(-1), np.full(count, -1.0)), np.append(columns.reshape(-1), np.arange(count))
         rows = sparse.csr_matrix((*entries, begins), shape=(len(at) + count, count))
         squared = np.where(curve[row] < len(self.labels.first), 2.0, 1.0)
-        margin = self.margin
-        if self.conditions.further:  # a state that is given may touch its limits
-            margin = margin * np.minimum(self.points[at] * self.basis.cells / GIVEN, 1.0) ** 2
+        margin = self.margin * self._kept(at, curve[row])
         right = np.append(right[at, row] - margin * squared, np.full(self.basis.count, -FLOOR))
         if self.labels.fourth and self.limit_level == 4:  # their programs are near the truth only about the last law
             rows = sparse.vstack([rows, sparse.identity(self.basis.count), -sparse.identity(self.basis.count)])
@@ -339,6 +337,14 @@ class Search:
             None if self.duration is None else self.duration * np.sqrt(scale),
         )
         return program, curve[row], at
+
+    def _kept(self, at: np.ndarray, curve: np.ndarray) -> _Points:
+        """Return which share of the margin rows keep: a state that is given may touch its limits."""
+        if not self.conditions.further:
+            return np.ones(len(at))
+        counts = [len(self.labels.first), len(self.labels.second), len(self.labels.rates)]
+        given = curve < sum(counts[: 1 + len(self.conditions.further)])
+        return np.where(given, np.minimum(self.points[at] * self.basis.cells / GIVEN, 1.0) ** 2, 1.0)
 
     def _end_equations(self, scale: float) -> tuple[object, _Points]:
         """Return the equations for rates that are given at the ends."""
