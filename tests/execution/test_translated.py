@@ -105,3 +105,14 @@ def test_what_is_kept_is_loaded_or_made_again(damage, monkeypatch):
             shelf |= dict.fromkeys(shelf, damage)
     assert len(traced) == (1 if damage is None else 2)
     assert len(shelf.dropped) == (damage is not None)
+
+
+@pytest.mark.parametrize("count", [10, translated.LITTLE + 1])
+def test_what_is_given_much_is_compiled_well_however_seldom_it_is_called(count, monkeypatch):
+    asked, made = [], translated.object_file
+    monkeypatch.setattr(
+        translated, "object_file", lambda *given, **how: asked.append(how["brief"]) or made(*given, **how)
+    )
+    x = np.linspace(0, 1, count)
+    np.testing.assert_array_equal(Compiled(lambda x: 2.0 * x, (), brief=True, alone=True)(x), 2 * x)
+    assert asked == [count == 10]

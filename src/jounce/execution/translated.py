@@ -24,6 +24,7 @@ from jounce.execution.store import current_store, made_or_kept
 from jounce.execution.structure import UndescribedError, program_key, settings
 
 Group = tuple[Sequence[np.ndarray | jax.ShapeDtypeStruct], Any]  # leaves of a tree, or their forms, and its structure
+LITTLE = 20_000  # numbers that a program is given: of more, even one call takes long
 _thread = threading.local()
 
 
@@ -53,6 +54,8 @@ class Translated:
         Whether arrays of many instants, those given and the results, have the instants along their first axis.
     most_lines : int, optional
         Of LLVM's text: what is longer takes too long to compile for what it gains.
+    brief : bool, default False
+        Whether it is called so seldom that it is better compiled soon than well, where it is given little.
     """
 
     def __init__(
@@ -63,9 +66,10 @@ class Translated:
         alone: bool = False,
         rows: bool = False,
         most_lines: int = MOST_LINES,
+        brief: bool = False,
     ):
         self.function, self.made_of = function, made_of
-        self._alone, self._rows, self._most_lines = alone, rows, most_lines
+        self._alone, self._rows, self._most_lines, self._brief = alone, rows, most_lines, brief
         self._programs = ByKey()
 
     def __len__(self) -> int:
@@ -130,6 +134,7 @@ class Translated:
         """Return a program from the store of programs, or one that is made; or the operation that has no code."""
         function = partial(self._traced, **static)
         options: Any = how | {"most_lines": self._most_lines, "rows": self._rows, "alone": self._alone}
+        options["brief"] = self._brief and sum(leaf.size for leaf in jax.tree.leaves(given)) <= LITTLE
 
         def make() -> tuple[Any, ...]:
             try:

@@ -31,10 +31,10 @@ def whole(*shape, seed=0, low=-9, high=10, dtype: type = np.int64):
     return np.random.default_rng(seed).integers(low, high, (*shape, COUNT), dtype=dtype)
 
 
-def verified(text, *, hasty=False):
+def verified(text, **how):
     """Return the machine code of a module, if LLVM finds that each name in it is found before it is used."""
     llvm.parse_assembly(text).verify()
-    return machine.compiled(text, hasty=hasty)
+    return machine.compiled(text, **how)
 
 
 def compiled(function, lanes, shared=(), known=(), width=8, most_lines=MOST_LINES, large=None):

@@ -37,6 +37,12 @@ def test_haste_changes_no_digit(monkeypatch):
     np.testing.assert_allclose(found, np.cos(x) * x[::-1] / (2 + x @ x), rtol=1e-14)
 
 
+def test_what_is_called_once_is_compiled_without_optimizing():
+    (binary, found), (usual, wanted) = run(brief=True), run()
+    assert binary != usual
+    np.testing.assert_allclose(found, wanted, rtol=1e-14)
+
+
 @pytest.mark.parametrize("trouble", ["no process", "it fails", "an application"])
 def test_where_there_is_no_other_process_this_one_compiles(trouble, monkeypatch):
     def refused(words, **_):

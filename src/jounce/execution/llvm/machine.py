@@ -40,13 +40,13 @@ def vector_width() -> int:
     return 8 if "+avx512f" in can else 4 if "+avx" in can else 2
 
 
-def _target() -> Any:
+def _target(level: int = 1) -> Any:
     binding = _binding()
     _, name, features = processor()
-    return binding.Target.from_default_triple().create_target_machine(cpu=name, features=features, opt=1, jit=True)
+    return binding.Target.from_default_triple().create_target_machine(cpu=name, features=features, opt=level, jit=True)
 
 
-def compiled(text: str, *, hasty: bool = False) -> bytes:
+def compiled(text: str, *, hasty: bool = False, brief: bool = False) -> bytes:
     """Return the machine code of a module, as an object file.
 
     Parameters
@@ -55,7 +55,11 @@ def compiled(text: str, *, hasty: bool = False) -> bytes:
         Of the module.
     hasty : bool, default False
         Whether a third of the time is worth more than code that is twice as fast. Its results are the same.
+    brief : bool, default False
+        Whether it is called so seldom that a seventh of the time is worth more than that: LLVM optimizes nothing.
     """
+    if brief:
+        return _compiled_here(text, 0)
     elsewhere = hasty or (text.count("\n") > LONG and _cores() > 1)
     found = _compiled_elsewhere(text, hasty) if elsewhere else None
     return _compiled_here(text) if found is None else found
@@ -65,11 +69,11 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _compiled_here(text: str) -> bytes:
+def _compiled_here(text: str, level: int = 1) -> bytes:
     processor()
     with _lock:
         module = _binding().parse_assembly(text)
-        return _target().emit_object(module)
+        return _target(level).emit_object(module)
 
 
 def _compiled_elsewhere(text: str, hasty: bool) -> bytes | None:

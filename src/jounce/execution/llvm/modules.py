@@ -38,6 +38,7 @@ def object_file(
     large: int | None = None,
     alone: bool = False,
     hasty: bool = False,
+    brief: bool = False,
 ) -> tuple[bytes, Any]:
     """Return the machine code of a function of one instant, as an object file, and the form of its results.
 
@@ -59,8 +60,8 @@ def object_file(
         unless given.
     alone : bool, default False
         Whether there is one instant only, all of whose arrays are in `shared`.
-    hasty : bool, default False
-        As `compiled` has it.
+    hasty, brief : bool, default False
+        As `compiled` has them.
 
     Raises
     ------
@@ -77,7 +78,7 @@ def object_file(
             if is_tried():
                 raise
             raise UnsupportedOperationError(f"JAX {jax.__version__}, which was not tried: {failure!r}") from failure
-    return compiled(text, hasty=hasty), results
+    return compiled(text, hasty=hasty, brief=brief), results
 
 
 def _text(
