@@ -37,8 +37,8 @@ import jounce as jn
 from benchmarks.cases import EXAMPLES, Case, Cases, Contestant, ready
 from jounce.errors import JounceError
 from jounce.io import load_limits
-from jounce.planning.retiming.paths import Path as JointPath, path_of
-from jounce.planning.retiming.robot_quantities import RobotQuantities
+from jounce.planning.paths.paths import Path as JointPath, path_of
+from jounce.planning.retiming.quantities.robot_quantities import RobotQuantities
 
 WINDOWS = (0.02, 0.05, 0.1)  # s, of the moving averages
 SHARE = 0.5  # of the joints' ranges, about their middles

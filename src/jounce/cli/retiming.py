@@ -213,7 +213,7 @@ def _of_robot(
 ) -> _Result:
     from jounce.io import load_motion_limits, load_path
     from jounce.planning import retime as find
-    from jounce.planning.retiming.limits import limits_of
+    from jounce.planning.retiming.quantities.limits import limits_of
     from jounce.trajectory import JointTrajectory
 
     model = reading.robot(file)

@@ -70,8 +70,8 @@ def check(
         examples/trajectories/panda_wave.yaml --payload "panda_hand=3 kg"
     """
     from jounce.io import load_motion_limits
-    from jounce.planning.retiming.limits import limits_of
-    from jounce.planning.retiming.motion_limits_check import check_motion
+    from jounce.planning.retiming.quantities.limits import limits_of
+    from jounce.planning.retiming.quantities.motion_limits_check import check_motion
     from jounce.reporting.json.results import limits_result
     from jounce.reporting.text.summaries import limits_summary, verdict
     from jounce.reporting.text.tables import limits_table

@@ -11,7 +11,7 @@ from jounce.planning.elastic.motor_motion import (
 from jounce.planning.elastic.robot import elastic_robot as elastic_robot
 from jounce.planning.elastic.simulation import simulate_elastic as simulate_elastic
 from jounce.planning.elastic.spring_deflection import SpringDeflection as SpringDeflection
-from jounce.planning.retiming.limits import MotionLimits as MotionLimits, PointLimits as PointLimits
+from jounce.planning.retiming.quantities.limits import MotionLimits as MotionLimits, PointLimits as PointLimits
 from jounce.planning.retiming.retime import retime as retime
 from jounce.planning.retiming.retimed import RetimedTrajectory as RetimedTrajectory
 from jounce.planning.smoothing.smooth import (

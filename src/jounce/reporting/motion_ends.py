@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd
-from jounce.planning.retiming.sampled_paths import lines_of
-from jounce.planning.retiming.straight_lines import polynomials_at
+from jounce.planning.paths.sampled_paths import lines_of
+from jounce.planning.paths.straight_lines import polynomials_at
 from jounce.planning.smoothing.smooth import sampled
 from jounce.trajectory import HermiteMotion, HermiteSplineMotion, JointTrajectory, SplineMotion
 

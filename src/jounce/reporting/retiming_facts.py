@@ -10,7 +10,7 @@ import numpy as np
 from jounce.dynamics.limits.limit_report import LimitReport
 from jounce.dynamics.limits.trajectories import drives_note
 from jounce.planning import RetimedTrajectory
-from jounce.planning.retiming.path import Path as JointPath
+from jounce.planning.paths.path import Path as JointPath
 from jounce.reporting.json.results import limits_result
 from jounce.reporting.motion_ends import ends_words
 from jounce.reporting.text.summaries import count

@@ -5,7 +5,7 @@ import pytest
 
 import jounce as jn
 from jounce.dynamics.limits.motion_ends import trajectory_ends
-from jounce.planning.retiming.motion_limits_check import check_motion
+from jounce.planning.retiming.quantities.motion_limits_check import check_motion
 
 ROD = jn.Inertia(1.0, center_of_mass=[0.2, 0, 0], tensor=[0.02, 0.03, 0.04])
 

@@ -7,8 +7,8 @@ import pytest
 
 import jounce as jn
 from jounce.errors import JounceError, RobotError, SolveError, TrajectoryError
-from jounce.planning.retiming.limits import limits_of
-from jounce.planning.retiming.motion_limits_check import check_motion
+from jounce.planning.retiming.quantities.limits import limits_of
+from jounce.planning.retiming.quantities.motion_limits_check import check_motion
 
 LENGTH, SPEED, ACCELERATION, JERK, JOUNCE = 2.0, 1.0, 2.0, 10.0, 200.0
 

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 
 import jounce as jn
 from jounce.errors import TrajectoryError
-from jounce.planning.retiming.paths import Between, path_of
+from jounce.planning.paths.paths import Between, path_of
 
 SPEED, ACCELERATION, TORQUE = 1.2, 4.0, 9.0
 GRID = 2001

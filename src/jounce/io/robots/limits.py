@@ -15,7 +15,7 @@ from jounce.errors import RobotError, no_such
 from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.jet import Jet
-from jounce.planning.retiming.limits import VARYING, MotionLimits, PointLimits, PositionLaw
+from jounce.planning.retiming.quantities.limits import VARYING, MotionLimits, PointLimits, PositionLaw
 from jounce.robot.model.links_and_joints import Joint, Limits
 from jounce.robot.robot import Robot
 from jounce.settings import under_own_settings

@@ -13,7 +13,7 @@ from jounce.io.files.samples import has_column, read_table
 from jounce.io.files.source import read_source
 from jounce.io.trajectories.loader import load_trajectory
 from jounce.io.trajectories.table_columns import TIMES
-from jounce.planning.retiming.paths import Path, path_of
+from jounce.planning.paths.paths import Path, path_of
 from jounce.robot import Robot
 from jounce.settings import under_own_settings
 from jounce.trajectory import JointTrajectory

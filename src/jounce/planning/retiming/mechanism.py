@@ -9,10 +9,10 @@ import numpy as np
 from jounce.dynamics.limits.limit_report import LimitReport, LimitRow
 from jounce.errors import MechanismError, SolveError, TrajectoryError
 from jounce.mechanism import Mechanism
+from jounce.planning.paths.paths import checked
 from jounce.planning.retiming.fastest import fastest
-from jounce.planning.retiming.mechanism_quantities import MechanismQuantities, rate_motion
-from jounce.planning.retiming.paths import checked
-from jounce.planning.retiming.rate_law import Conditions, RateLaw
+from jounce.planning.retiming.quantities.mechanism_quantities import MechanismQuantities, rate_motion
+from jounce.planning.retiming.rates.rate_law import Conditions, RateLaw
 from jounce.planning.retiming.retimed import RetimedTrajectory, active_limits
 from jounce.robot.model.links_and_joints import Limits
 from jounce.trajectory import FollowingMotion

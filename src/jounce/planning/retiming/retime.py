@@ -10,19 +10,20 @@ import numpy as np
 from jounce.dynamics.limits.trajectories import FollowedTrajectory, warn_of_degrees
 from jounce.errors import JounceError, SolveError, TrajectoryError, flag, whole_number
 from jounce.mechanism import Mechanism
-from jounce.planning.retiming.fastest import Search, fastest, slowed_only
-from jounce.planning.retiming.joining import SHARES, clean_state, joined, rates_along
-from jounce.planning.retiming.limits import GivenLimits, MotionLimits, limits_of
+from jounce.planning.paths.joining import SHARES, clean_state, joined, rates_along
+from jounce.planning.paths.path import Path
+from jounce.planning.paths.paths import Between, GivenPath, cells_needed, checked, path_of
+from jounce.planning.paths.sampled_paths import path_of_samples
+from jounce.planning.retiming.fastest import fastest, slowed_only
 from jounce.planning.retiming.mechanism import retime_mechanism
-from jounce.planning.retiming.motion_limits_check import check_motion
-from jounce.planning.retiming.path import Path
-from jounce.planning.retiming.paths import Between, GivenPath, cells_needed, checked, path_of
-from jounce.planning.retiming.quantities import Curves
-from jounce.planning.retiming.rate_law import Conditions, RateLaw
-from jounce.planning.retiming.rate_motion import RateMotion
+from jounce.planning.retiming.quantities.limits import GivenLimits, MotionLimits, limits_of
+from jounce.planning.retiming.quantities.motion_limits_check import check_motion
+from jounce.planning.retiming.quantities.path_quantities import Curves
+from jounce.planning.retiming.quantities.robot_quantities import RobotQuantities
+from jounce.planning.retiming.rates.rate_law import Conditions, RateLaw
+from jounce.planning.retiming.rates.rate_motion import RateMotion
 from jounce.planning.retiming.retimed import RetimedTrajectory, active_limits
-from jounce.planning.retiming.robot_quantities import RobotQuantities
-from jounce.planning.retiming.sampled_paths import path_of_samples
+from jounce.planning.retiming.search import Search
 from jounce.planning.solver import require_solver
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from jounce.dynamics.limits.limit_report import LimitReport
-from jounce.planning.retiming.fastest import Search
-from jounce.planning.retiming.path import Path
-from jounce.planning.retiming.rate_law import RateLaw
-from jounce.planning.retiming.rate_motion import RateMotion
+from jounce.planning.paths.path import Path
+from jounce.planning.retiming.rates.rate_law import RateLaw
+from jounce.planning.retiming.rates.rate_motion import RateMotion
+from jounce.planning.retiming.search import Search
 from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory
 
 BINDS = 1e-2  # of a limit: where less is left, it binds

@@ -7,8 +7,8 @@ import numpy as np
 
 from jounce.dynamics.limits.limit_report import LimitReport
 from jounce.errors import SampleWarning, TrajectoryError
-from jounce.planning.retiming.limits import MotionLimits
-from jounce.planning.retiming.motion_limits_check import check_motion
+from jounce.planning.retiming.quantities.limits import MotionLimits
+from jounce.planning.retiming.quantities.motion_limits_check import check_motion
 from jounce.planning.retiming.retimed import RetimedTrajectory
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory

@@ -10,9 +10,9 @@ import warnings
 import numpy as np
 
 from jounce.errors import SampleWarning
-from jounce.planning.retiming.path import Path
-from jounce.planning.retiming.straight_lines import Lines, rounded
-from jounce.planning.retiming.trajectory_paths import path_of_trajectory, turns_back_within
+from jounce.planning.paths.path import Path
+from jounce.planning.paths.straight_lines import Lines, rounded
+from jounce.planning.paths.trajectory_paths import path_of_trajectory, turns_back_within
 from jounce.planning.smoothing.smooth import FEWEST, sampled, smooth
 from jounce.trajectory import JointTrajectory, SplineMotion
 

@@ -7,7 +7,7 @@ import pytest
 import jounce as jn
 from jounce.errors import TrajectoryError
 from jounce.jet import tan
-from jounce.planning.retiming.rate_motion import RateMotion
+from jounce.planning.retiming.rates.rate_motion import RateMotion
 
 
 def test_the_root_of_a_linear_rate_grows_evenly():

@@ -11,9 +11,9 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError, TrajectoryError, whole_number
 from jounce.jet import Jet
-from jounce.planning.retiming.path import Path
-from jounce.planning.retiming.sampled_paths import lines_along, path_of_samples
-from jounce.planning.retiming.straight_lines import Lines, polynomials_at, rounded
+from jounce.planning.paths.path import Path
+from jounce.planning.paths.sampled_paths import lines_along, path_of_samples
+from jounce.planning.paths.straight_lines import Lines, polynomials_at, rounded
 from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory import AbstractMotion, Expression, JointTrajectory, PiecewiseMotion, SplineMotion
 from jounce.trajectory.checks import finite, finite_row, positive

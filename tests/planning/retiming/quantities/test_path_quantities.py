@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 import jounce as jn
-from jounce.planning.retiming.limits import MotionLimits, PointLimits
-from jounce.planning.retiming.paths import path_of
-from jounce.planning.retiming.quantities import Curves
-from jounce.planning.retiming.rate_law import RateLaw
-from jounce.planning.retiming.rate_motion import RateMotion
-from jounce.planning.retiming.rate_spline import Parametrization, RateBasis
-from jounce.planning.retiming.robot_quantities import RobotQuantities
+from jounce.planning.paths.paths import path_of
+from jounce.planning.retiming.quantities.limits import MotionLimits, PointLimits
+from jounce.planning.retiming.quantities.path_quantities import Curves
+from jounce.planning.retiming.quantities.robot_quantities import RobotQuantities
+from jounce.planning.retiming.rates.rate_law import RateLaw
+from jounce.planning.retiming.rates.rate_motion import RateMotion
+from jounce.planning.retiming.rates.rate_spline import Parametrization, RateBasis
 
 
 @pytest.mark.slow

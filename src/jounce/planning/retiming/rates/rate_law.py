@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from jaxtyping import Float
 
-from jounce.planning.retiming.rate_spline import Parametrization, RateBasis
+from jounce.planning.retiming.rates.rate_spline import Parametrization, RateBasis
 
 _Points = Float[np.ndarray, " _"]  # of any length
 

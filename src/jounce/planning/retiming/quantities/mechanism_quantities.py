@@ -21,10 +21,10 @@ from jounce.mechanism import Mechanism
 from jounce.mechanism.angle_laws import settle
 from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.time import instants_of
-from jounce.planning.retiming.path import Path
-from jounce.planning.retiming.quantities import Labels, PathQuantities, Quantity
-from jounce.planning.retiming.rate_law import RateLaw
-from jounce.planning.retiming.rate_motion import RateMotion
+from jounce.planning.paths.path import Path
+from jounce.planning.retiming.quantities.path_quantities import Labels, PathQuantities, Quantity
+from jounce.planning.retiming.rates.rate_law import RateLaw
+from jounce.planning.retiming.rates.rate_motion import RateMotion
 from jounce.robot.model.links_and_joints import Limits
 from jounce.trajectory import AbstractMotion, Expression, ExpressionMotion, FollowingMotion
 

@@ -8,9 +8,9 @@ from jaxtyping import Float
 from jounce.dynamics.limits.check_limits import REST, SLIDING, TURNING
 from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.errors import RobotError, TrajectoryError
-from jounce.planning.retiming.limits import MotionLimits, limits_of
-from jounce.planning.retiming.path import Path
-from jounce.planning.retiming.quantities import Labels, PathQuantities, Quantity
+from jounce.planning.paths.path import Path
+from jounce.planning.retiming.quantities.limits import MotionLimits, limits_of
+from jounce.planning.retiming.quantities.path_quantities import Labels, PathQuantities, Quantity
 from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.recursions.kinematics import forward_kinematics

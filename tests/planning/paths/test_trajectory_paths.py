@@ -5,8 +5,8 @@ import pytest
 
 import jounce as jn
 from jounce.errors import TrajectoryError
-from jounce.planning.retiming.paths import path_of
-from jounce.planning.retiming.trajectory_paths import Ramps
+from jounce.planning.paths.paths import path_of
+from jounce.planning.paths.trajectory_paths import Ramps
 
 THERE, BACK = jn.laws.Segment("cycloidal", 1.0, to=0.5), jn.laws.Segment("cycloidal", 1.3, to=0.0)
 

@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.errors import SampleWarning, TrajectoryError
+from jounce.planning.paths.path import Path
 from jounce.planning.pieces import JoinedPieces
-from jounce.planning.retiming.path import Path
 from jounce.trajectory import AbstractMotion, FollowingMotion, JointTrajectory, SplineMotion
 
 REST_SPEED = 1e-3  # of the largest speed: a trajectory that is slower than this at its ends stands still there

@@ -7,9 +7,9 @@ import pytest
 
 import jounce as jn
 from jounce.errors import TrajectoryError
-from jounce.planning.retiming.paths import Between, cells_needed, checked, path_of
-from jounce.planning.retiming.sampled_paths import path_of_samples
-from jounce.planning.retiming.straight_lines import taken_together
+from jounce.planning.paths.paths import Between, cells_needed, checked, path_of
+from jounce.planning.paths.sampled_paths import path_of_samples
+from jounce.planning.paths.straight_lines import taken_together
 
 
 def rise(t):

@@ -5,7 +5,7 @@ import pytest
 
 import jounce as jn
 from jounce.errors import TrajectoryError
-from jounce.planning.retiming.paths import cells_needed, path_of
+from jounce.planning.paths.paths import cells_needed, path_of
 
 SLIDER = jn.Robot(
     "slider",

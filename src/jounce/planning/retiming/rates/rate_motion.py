@@ -43,7 +43,7 @@ class RateMotion(AbstractMotion):
     Examples
     --------
     >>> import jounce as jn
-    >>> from jounce.planning.retiming.rate_motion import RateMotion
+    >>> from jounce.planning.retiming.rates.rate_motion import RateMotion
     >>> motion = RateMotion([0.0, 1.0], [[1.0], [2.0]])  # z = 1 + 2 u: u' = 1 + t
     >>> [round(float(x), 12) for x in motion(jn.Jet.variable(0.5, order=3)).derivatives()]
     [0.625, 1.5, 1.0, 0.0]

@@ -13,10 +13,10 @@ from jounce.dynamics.limits.local_maxima import local_maxima
 from jounce.dynamics.limits.motion_ends import TrajectoryEnd, end_jumps
 from jounce.dynamics.limits.trajectories import FollowedTrajectory
 from jounce.errors import SampleWarning
-from jounce.planning.retiming.limits import MotionLimits, limits_of
-from jounce.planning.retiming.path import Path
-from jounce.planning.retiming.quantities import Curves
-from jounce.planning.retiming.robot_quantities import RobotQuantities
+from jounce.planning.paths.path import Path
+from jounce.planning.retiming.quantities.limits import MotionLimits, limits_of
+from jounce.planning.retiming.quantities.path_quantities import Curves
+from jounce.planning.retiming.quantities.robot_quantities import RobotQuantities
 from jounce.robot.model.links_and_joints import Limits
 from jounce.robot.robot import Robot
 from jounce.trajectory import JointTrajectory

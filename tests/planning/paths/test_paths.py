@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jounce.planning.retiming.paths import checked, path_of
+from jounce.planning.paths.paths import checked, path_of
 
 
 @pytest.mark.parametrize("count", range(2, 9))

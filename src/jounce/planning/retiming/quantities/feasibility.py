@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import TrajectoryError
-from jounce.planning.retiming.quantities import G, Labels, PathQuantities, Source
+from jounce.planning.retiming.quantities.path_quantities import G, Labels, PathQuantities, Source
 
 POINTS = 1001  # places on the path
 STATIC = 1e-6  # of a limit, which what stands still must leave

@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.errors import TrajectoryError
+from jounce.planning.paths.path import Path
 from jounce.planning.pieces import SmoothPieces
-from jounce.planning.retiming.path import Path
 from jounce.trajectory import SplineMotion
 from jounce.trajectory.splines import local_powers
 

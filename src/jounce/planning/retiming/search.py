@@ -1,0 +1,372 @@
+"""The fastest rate along a path by sequential convex programming: each program takes up where the last one ended.
+
+Verscheure and others, Time-optimal path tracking for robots: a convex optimization approach, IEEE Transactions on
+Automatic Control 54 (2009), for velocity, acceleration and torque. What limits a rate is not convex in z; its tangent
+at the last iterate is, and lies on the safe side.
+"""
+
+import dataclasses
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from jounce.errors import SolveError
+from jounce.planning.retiming.quantities.path_quantities import Curves, Labels, Source
+from jounce.planning.retiming.rates.program import Program, solve_program
+from jounce.planning.retiming.rates.rate_law import Conditions, RateLaw, quadrature
+from jounce.planning.retiming.rates.rate_spline import Parametrization, RateBasis
+
+COARSE = 60  # cells of a first law
+ENDS = 1e-9  # of a cell: both sides of a knot are looked at
+OFFSETS = np.array([ENDS, 0.25, 0.5, 0.75, 1 - ENDS])  # in a cell, of the points that are looked at
+END_CELLS, END_POINTS = 2, 20
+FIRST = (1, 3)  # of them, where limits hold from the beginning
+NEAR, SETTLED_NEAR = 0.2, 0.6  # of a limit: where less is used, it is left out until it matters
+SETTLED = 2e-4  # of the duration: an improvement that ends the iteration
+EXCEEDED = 1e-4  # of a limit: what is left to the last slowing
+ROUNDS = 20
+EXCHANGES = 4
+EASE = 3.0  # times the limit of the fourth order: how much is taken back at a time
+TRUST = 4.0  # times a coefficient of z, where programs are but near the truth
+CLOSE = 2e-3  # to the largest ratio: peaks that are refined
+ZOOM, ZOOMS = 7, 4  # points about each, and how often
+SPARE = 2e-8  # of a limit, left to rounding
+SLOWINGS = 12
+HOPELESS = 0.1  # of a limit: no slowing as a whole is meant to mend so much
+MOST = 1e16
+EVENED, SAME = 20, 1e-12  # steps to a duration, and share of it that is none
+GIVEN = 4  # cells in which what is left of limits grows from nothing, after a state that is given
+FLOOR = 1e-7  # of the mean of z: its least value
+
+_Points = Float[np.ndarray, " _"]  # of any length
+
+
+class Search:
+    """The search for the fastest rate in one parametrization.
+
+    Parameters
+    ----------
+    source : callable
+        Gives the limited quantities at values of s.
+    labels : Labels
+        Their names.
+    parameter : Parametrization
+        s over u.
+    basis : RateBasis
+        Splines of z.
+    conditions : Conditions
+        What is asked of the law besides.
+    level : int, default 4
+        Of the limits that are kept: 2 for those of acceleration and torque, 3 for those of their rates too, 4 for all.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        labels: Labels,
+        parameter: Parametrization,
+        basis: RateBasis,
+        conditions: Conditions,
+        level: int = 4,
+    ):
+        self.source, self.labels, self.parameter, self.basis, self.conditions = (
+            source,
+            labels,
+            parameter,
+            basis,
+            conditions,
+        )
+        self.limit_level, self.margin = level, 0.0
+        self.duration: float | None = None  # that a law is to have, where the fastest is not wanted
+        self.points, self.enforced = np.zeros(0), np.zeros(0, bool)
+        self.prices = np.zeros((0, len(labels.every)))
+        grid = ((np.arange(basis.cells)[:, None] + OFFSETS) / basis.cells).reshape(-1)
+        ends = np.linspace(0.0, END_CELLS / basis.cells, END_POINTS)[1:]  # where it rests, limits change fast
+        enforced = np.isin(np.arange(len(grid)) % len(OFFSETS), FIRST)
+        self.extend(np.concatenate([grid, ends, 1 - ends]), np.append(enforced, np.ones(2 * len(ends), bool)))
+        self.nodes, self.weights = quadrature(basis.cells, 2)
+        self.node_matrix = basis.matrices(self.nodes, 0)[0]
+
+    def extend(self, points: _Points, enforced: Bool[np.ndarray, " point"]) -> None:
+        """Look at more values of u; where `enforced`, all limits that are near hold from the beginning."""
+        before, joined = self.points, np.concatenate([self.points, points])
+        self.points, first = np.unique(joined, return_index=True)
+        self.enforced = np.concatenate([self.enforced, enforced])[first]
+        self.shape = self.parameter.derivatives(self.points, 4)
+        quantities = self.source(self.shape[0])
+        left_out = {"rate_lower": (3, -np.inf), "rate_upper": (3, np.inf), "fourth_bounds": (4, np.inf)}
+        free = {
+            field: np.full_like(getattr(quantities, field), none)
+            for field, (level, none) in left_out.items()
+            if level > self.limit_level
+        }
+        quantities = dataclasses.replace(quantities, **free)
+        self.curves = Curves(quantities, self.shape)
+        self.matrices = self.basis.matrices(self.points)
+        self.compact = self.basis.compact(self.points, self.matrices)
+        known, self.prices = self.prices, np.zeros((len(self.points), len(self.labels.every)))
+        self.prices[np.searchsorted(self.points, before)] = known
+
+    @property
+    def largest_z(self) -> float:
+        """Largest z."""
+        if self.conditions.max_rate is None:
+            return np.inf
+        return float((self.conditions.max_rate / self.shape[1].max()) ** 2)
+
+    def law_of(self, coefficients: _Points) -> RateLaw:
+        """Return the law of coefficients."""
+        return RateLaw(self.parameter, self.basis, coefficients)
+
+    def at(self, coefficients: _Points) -> Float[np.ndarray, "4 point"]:
+        """Return z and its derivatives at the points."""
+        return np.stack([matrix @ coefficients for matrix in self.matrices])
+
+    def level(self) -> float:
+        """Return the largest even z that breaks no limit of velocity, acceleration or torque, within a twentieth."""
+        z, one = min(1.0, self.largest_z), np.ones(self.basis.count)
+
+        def worst(z: float) -> float:
+            return float(np.max(self.curves.ratios(self.at(z * one))))
+
+        while worst(z) > 1 and z > 1e-12:
+            z /= 4
+        while z * 1.2 <= min(self.largest_z, MOST) and worst(z * 1.2) <= 1:
+            z *= 1.2
+        return z
+
+    def run(self, start: _Points, rounds: int = ROUNDS, *, settled: bool = False) -> RateLaw:
+        """Return the fastest law, from the coefficients of one to begin with, which may be near the end already.
+
+        Raises
+        ------
+        SolveError
+            If no program has a solution: the message says which limit, and where.
+        """
+        x, cost = start, self._cost(start) if settled else np.inf
+        ratios = self.curves.ratios(self.at(x))
+        chosen = self.enforced[:, None] & (
+            ratios > (0 if len(self.nodes) == 2 * COARSE else SETTLED_NEAR if settled else NEAR)
+        )
+        chosen |= _peaks(ratios) & (ratios > 1)
+        for self.rounds in range(1, rounds + 1):
+            try:
+                x = self._improved(x, chosen, near=settled or self.rounds > 1)
+            except SolveError:
+                if not np.isfinite(cost):
+                    raise
+                break  # the solver came to the end of its accuracy: the law that it has is kept
+            ratios = self.curves.ratios(self.at(x))
+            new = self._cost(x)
+            over = float(ratios.max()) - 1
+            change, cost = abs(cost - new) / new, new
+            if over < EXCEEDED and change < SETTLED:
+                break
+            chosen |= _peaks(ratios) & (ratios > 1 + EXCEEDED / 10)
+        return self.law_of(x)
+
+    def _cost(self, x: _Points) -> float:
+        """Return what is to be least: the duration, or where that is given the mean of z."""
+        z = self.node_matrix @ x
+        return float(self.weights @ (1 / np.sqrt(z) if self.duration is None else z))
+
+    def _improved(self, x: _Points, chosen: np.ndarray, *, near: bool) -> _Points:
+        """Return the solution of the program about a law, which may be near the fastest."""
+        program, labels, at = self._program(x, chosen)
+        scale = float(np.mean(x))
+        if near:
+            program = dataclasses.replace(program, about=self.node_matrix @ x / scale)
+        solution = solve_program(program)
+        if solution.coefficients is None:
+            raise self._why_none(program, labels, at)
+        prices = np.zeros(chosen.shape)
+        np.add.at(prices, (at, labels), solution.prices[: len(at)])
+        counted = np.arange(chosen.shape[1]) < len(self.labels.first)
+        # limits of the first order are squared in the program: raised by a share, their bound rises by two
+        self.prices = prices * np.where(counted, 2.0, 1.0) / np.sqrt(scale)
+        return solution.coefficients * scale
+
+    def _why_none(self, program: Program, labels: np.ndarray, at: np.ndarray) -> SolveError:
+        """Return the error of a program without a solution: which limit stands against it most."""
+        elastic = solve_program(program, elastic=True)
+        prices = elastic.prices[: len(at)]
+        if elastic.coefficients is None or not prices.size or elastic.slack < 1e-5:
+            return SolveError("the cone program has no solution that can be computed; try another number of cells")
+        worst = int(np.argmax(prices))
+        label, s = self.labels.every[labels[worst]], float(self.shape[0][at[worst]])
+        message = (
+            f"no time law with these rates at the ends keeps the limits: the {label.word} of {label.owner} at "
+            f"s = {s:.6g} would exceed its limit; choose smaller rates"
+        )
+        return SolveError(message, name="rates", value=list(self.conditions.rates))
+
+    def ratios_at(self, u: _Points, law: RateLaw) -> Float[np.ndarray, "point curve"]:
+        """Return how much of its bound each quantity uses at values of u."""
+        shape = self.parameter.derivatives(u, 4)
+        return Curves(self.source(shape[0]), shape).ratios(law.at(u))
+
+    def peaks(self, law: RateLaw, zooms: int = ZOOMS) -> tuple[_Points, _Points]:
+        """Return where the highest peaks are between the points, and the ratios there, the largest among them."""
+        ratios = self.curves.ratios(law.at(self.points))
+        at, curve = np.nonzero(_peaks(ratios) & (ratios > min(float(ratios.max()), 1.0) - CLOSE))
+        best, positions = ratios[at, curve], self.points[at]
+        last = len(self.points) - 1
+        low, high = self.points[np.maximum(at - 1, 0)], self.points[np.minimum(at + 1, last)]
+        share, every = np.linspace(0.0, 1.0, ZOOM)[:, None], np.arange(len(at))
+        for _ in range(zooms):
+            u = low + share * (high - low)
+            refined = self.ratios_at(u.reshape(-1), law).reshape(*u.shape, -1)[:, every, curve]
+            top = np.argmax(refined, axis=0)
+            better = refined[top, every] > best
+            best, positions = np.where(better, refined[top, every], best), np.where(better, u[top, every], positions)
+            low, high = u[np.maximum(top - 1, 0), every], u[np.minimum(top + 1, ZOOM - 1), every]
+        return positions, best
+
+    def fastest_law(self, start: _Points) -> RateLaw:
+        """Return the fastest law that keeps its limits between the points too.
+
+        Where a limit is exceeded between them, it is held there, and the search goes on.
+        """
+        law = self.run(start)
+        for _ in range(EXCHANGES):
+            positions, ratios = self.peaks(law, 2)
+            over = ratios > 1 + EXCEEDED
+            if not over.any():
+                break
+            self.extend(positions[over], np.ones(int(over.sum()), bool))
+            law = self.run(law.coefficients, settled=True)
+        return self.slowed_to_limits(law)
+
+    def slowed_to_limits(self, law: RateLaw) -> RateLaw:
+        """Return a law slowed as a whole by what it exceeds limits between the points.
+
+        Raises
+        ------
+        SolveError
+            If slowing does not help.
+        """
+        for _ in range(SLOWINGS):
+            over = float(self.peaks(law)[1].max()) - 1 + SPARE
+            if over <= SPARE / 2:
+                return law
+            if over > HOPELESS:
+                break
+            law = self.tightened(law, over)
+        message = (
+            "the time law found cannot be made to keep its limits; smooth the path where it bends sharply, or try "
+            "another number of cells"
+        )
+        raise SolveError(message)
+
+    def tightened(self, law: RateLaw, over: float) -> RateLaw:
+        """Return a law that uses less of its limits by a share: slower as a whole, where no rate is given at an end."""
+        if self.duration is None and not any(self.conditions.rates):
+            return law.slowed(1 + over)
+        self.margin += 1.1 * over
+        return self.lasting(self.run(law.coefficients, settled=True), self.duration)
+
+    def lasting(self, law: RateLaw, duration: float | None) -> RateLaw:
+        """Return a law of a duration that is no shorter: as slow as it may be everywhere, from a faster one.
+
+        That is the same law slowed evenly, unless rates are given at the ends, or a limit is in the way, as of torques
+        with damping.
+        """
+        if duration is None:
+            return law
+        self.prices[:], self.duration = 0.0, duration
+        slowed = law.slowed(duration / law.duration)
+        if not any(self.conditions.rates) and self.peaks(slowed)[1].max() <= 1:
+            return slowed
+        law = self.run(law.coefficients, settled=True)
+        inside = np.zeros(self.basis.count)
+        inside[self.basis.degree + 1 : -self.basis.degree - 1] = 1.0  # what is given at the ends stays as it is
+        for _ in range(EVENED):
+            by = law.duration / duration
+            law = dataclasses.replace(law, coefficients=law.coefficients * by ** (2 * inside))
+            if abs(by - 1) < SAME:
+                break
+        return law
+
+    def _program(self, x: _Points, chosen: np.ndarray) -> tuple[Program, np.ndarray, np.ndarray]:
+        from scipy import sparse
+
+        scale = float(np.mean(x))
+        law = self.at(x)
+        eased = max(float(self.curves.fourth_ratio(law)) / EASE, 1.0)
+        slopes, right, curve = self.curves.rows(law, eased)
+        at, row = np.nonzero(chosen[:, curve] & np.isfinite(right))
+        first, dense = self.compact
+        data = np.einsum("kr,krj->rj", slopes[:, at, row] * scale, dense[:, at])
+        columns = first[at][:, None] + np.arange(data.shape[1])
+        # coefficients that are positive make a spline that is, also between its knots
+        count = self.basis.count
+        begins = np.append(np.arange(len(at)) * data.shape[1], data.size + np.arange(count + 1))
+        entries = np.append(data.reshape(-1), np.full(count, -1.0)), np.append(columns.reshape(-1), np.arange(count))
+        rows = sparse.csr_matrix((*entries, begins), shape=(len(at) + count, count))
+        squared = np.where(curve[row] < len(self.labels.first), 2.0, 1.0)
+        margin = self.margin * self._kept(at, curve[row])
+        right = np.append(right[at, row] - margin * squared, np.full(self.basis.count, -FLOOR))
+        if self.labels.fourth and self.limit_level == 4:  # their programs are near the truth only about the last law
+            rows = sparse.vstack([rows, sparse.identity(self.basis.count), -sparse.identity(self.basis.count)])
+            right = np.concatenate([right, TRUST * np.abs(x) / scale, -x / TRUST / scale])
+        if self.conditions.max_rate is not None:
+            rows = sparse.vstack([rows, sparse.identity(self.basis.count)])
+            right = np.append(right, np.full(self.basis.count, self.largest_z / scale))
+        vectors = self.curves.vector
+        bounds = self.curves.quantities.vector_bounds
+        first = sum(len(x) for x in (self.labels.first, self.labels.second, self.labels.rates))
+        points, which = np.nonzero(chosen[:, first : first + len(self.labels.vectors)] & np.isfinite(bounds))
+        size = bounds[points, which]
+        repeated = np.repeat(points, 3)
+        cones = sum(
+            sparse.diags((part[points, which] / size[:, None] * factor * scale).reshape(-1)) @ matrix[repeated]
+            for part, factor, matrix in zip(vectors, (0.5, 1.0), self.matrices[1::-1], strict=True)
+        )
+        equal, equal_right = self._end_equations(scale)
+        program = Program(
+            self.weights,
+            self.node_matrix,
+            rows,
+            right,
+            sparse.csr_matrix(cones),
+            np.full(len(size), 1 - self.margin),
+            equal,
+            equal_right,
+            None if self.duration is None else self.duration * np.sqrt(scale),
+        )
+        return program, curve[row], at
+
+    def _kept(self, at: np.ndarray, curve: np.ndarray) -> _Points:
+        """Return which share of the margin rows keep: a state that is given may touch its limits."""
+        if not self.conditions.further:
+            return np.ones(len(at))
+        counts = [len(self.labels.first), len(self.labels.second), len(self.labels.rates)]
+        given = curve < sum(counts[: 1 + len(self.conditions.further)])
+        return np.where(given, np.minimum(self.points[at] * self.basis.cells / GIVEN, 1.0) ** 2, 1.0)
+
+    def _end_equations(self, scale: float) -> tuple[object, _Points]:
+        """Return the equations for rates that are given at the ends."""
+        from scipy import sparse
+
+        ends = np.array([0.0, 1.0])
+        slopes = self.parameter.derivatives(ends, 1)[1]
+        given = [(k, rate) for k, rate in enumerate(self.conditions.rates) if rate]
+        values = [(rate / slopes[k]) ** 2 / scale for k, rate in given]
+        if not given:
+            return sparse.csr_matrix((0, self.basis.count)), np.zeros(0)
+        rows = [self.basis.matrices(ends[[k for k, _ in given]], 0)[0]]
+        if further := self.conditions.further:
+            # the second derivative of s is s_u z_u / 2 + s_uu z; the third, by the rate of u, the next but one line
+            s1, s2, s3 = self.parameter.derivatives(ends[:1], 3)[1:, 0]
+            z, z1, z2, _ = self.basis.matrices(ends[:1])
+            sums = [s1 / 2 * z1 + s2 * z, s1 / 2 * z2 + 1.5 * s2 * z1 + s3 * z]
+            divisors = [1.0, float(self.conditions.rates[0] or 0.0) / s1]
+            rows += sums[: len(further)]
+            values += [x / divisor / scale for x, divisor in zip(further, divisors, strict=False)]
+        return sparse.vstack(rows, format="csr"), np.array(values)
+
+
+def _peaks(ratios: np.ndarray) -> np.ndarray:
+    """Tell where curves have a local maximum."""
+    edge = np.full((1, ratios.shape[1]), -np.inf)
+    return (ratios >= np.concatenate([edge, ratios[:-1]])) & (ratios >= np.concatenate([ratios[1:], edge]))
