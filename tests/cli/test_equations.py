@@ -8,7 +8,7 @@ import pytest
 import xarray
 
 import jounce as jn
-from tests.problems.mechanisms import example
+from tests.problems.mechanisms import EXAMPLES, example
 from tests.problems.written import run as defined
 
 FOUR_BAR = example("four_bar")
@@ -78,3 +78,25 @@ def test_values_along_the_motion_are_tables(run, tmp_path):
     status, _, message = run(file, "--format", "table")
     assert status == 2
     assert "a table goes to a file" in message
+
+
+def test_robots_and_quantities(run, tmp_path):
+    robot = EXAMPLES / "robots" / "scara.urdf"
+    assert run(robot, "--order", "2", "--no-drives", "--out", tmp_path / "scara.py")[0] == 0
+    code = defined((tmp_path / "scara.py").read_text())
+    q = np.zeros((3, len(code["JOINTS"])))
+    np.testing.assert_allclose(
+        code["torque"](q), jn.inverse_dynamics(jn.load_robot(robot), q, drives=False), atol=1e-13
+    )
+    pendulum = example("double_pendulum")
+    parts = ("--quantity", "constraints", "--quantity", "forces", "--order", "2")
+    assert run(pendulum, *parts, "--format", "sympy", "--out", tmp_path / "p.py")[0] == 0
+    assert "def mass_matrix(t=t, q=q)" in (tmp_path / "p.py").read_text()
+    for options, words in (
+        ((robot, "--set", "a=1"), "--set: is for mechanism files"),
+        ((robot, "--format", "table"), "--format: is for mechanisms"),
+        ((pendulum, "--format", "table", "--quantity", "forces"), "--quantity: is for code"),
+    ):
+        status, _, message = run(*options)
+        assert status == 2
+        assert words in " ".join(message.split())

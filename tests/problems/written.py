@@ -41,11 +41,12 @@ def coordinates(equations):
 def differences(module, equations):
     """Return by how much code differs from numbers: residual, Jacobian, right sides, each over the size of its row."""
     q, found = coordinates(equations), []
+    moving, sides = (from_one(x) for x in (equations.velocities, equations.right_side))
     for k, t in enumerate(equations.time.values.tolist()):
         pairs = (
             (module["residual"](t, q[k]), equations.residual.values[k], ()),
             (module["jacobian"](t, q[k]), equations.jacobian.values[k], (1,)),
-            (module["right_side"](t, q[k], equations.velocities.values[k]), equations.right_side.values[k], (0,)),
+            (module["right_side"](t, q[k], moving[k])[: len(sides[k])], sides[k], (0,)),
         )
         for got, expected, axis in pairs:
             expected = np.nan_to_num(expected[: len(got)], nan=0.0)
@@ -53,6 +54,31 @@ def differences(module, equations):
             assert got.shape == expected.shape
             found.append(np.max(np.abs(got - expected) / size, initial=0.0))
     return np.array(found).reshape(-1, 3)
+
+
+def from_one(variable):
+    """Return the derivatives from the first on; with multipliers beside them, tables begin with the order zero."""
+    return variable.sel(derivative=slice(1, None)).values
+
+
+def imbalances(module, equations):
+    """Return by how much ``M q^(k+2) + Phi_q^T lambda^(k) = forces(k)`` fails, (time, order); compare mass matrices.
+
+    The multipliers are those of inverse or forward dynamics, which share no program with the code.
+    """
+    q, moving, found = coordinates(equations), from_one(equations.velocities), []
+    for k, t in enumerate(equations.time.values.tolist()):
+        known = equations.multipliers.values[k]
+        known = known[~np.isnan(known).any(axis=1)]
+        mass, jacobian = module["mass_matrix"](t, q[k]), module["jacobian"](t, q[k])
+        forces = module["forces"](t, q[k], moving[k], known)
+        count = min(len(forces), len(known), len(moving[k]) - 1)
+        parts = np.array([[mass @ moving[k][n + 1], jacobian.T @ known[n], -forces[n]] for n in range(count)])
+        sizes = np.maximum(np.abs(parts).max(axis=(1, 2)), np.abs(known[:count]).max(axis=1))
+        found.append(np.abs(parts.sum(axis=1)).max(axis=1) / np.maximum(sizes, 1e-3))
+        if "mass_matrix" in equations:
+            np.testing.assert_allclose(mass, equations.mass_matrix.values[k], rtol=0, atol=1e-13 * np.abs(mass).max())
+    return np.array(found)
 
 
 def run(text):

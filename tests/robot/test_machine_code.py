@@ -7,7 +7,7 @@ import jounce as jn
 from jounce.execution.backends import VARIABLE
 from jounce.execution.llvm.self_test import is_usable
 from jounce.robot.algorithms.forward_dynamics import _moved
-from jounce.robot.algorithms.inverse_dynamics import _generalized_forces
+from jounce.robot.algorithms.inverse_dynamics import generalized_forces
 from jounce.robot.recursions.batches import LEAST_THREADED
 from tests.problems.robots import random_robot, robot_named
 
@@ -57,7 +57,7 @@ def test_torques_agree(monkeypatch, robot, count):
     q = motion(robot, count, 4)
     expected, found = both_ways(monkeypatch, lambda: jn.inverse_dynamics(robot, q, drives=True))
     assert_same(found, expected)
-    assert _generalized_forces.mapped.program((robot.tree, ()), (q,), static=((), True)).backend == "llvm"
+    assert generalized_forces.mapped.program((robot.tree, ()), (q,), static=((), True)).backend == "llvm"
 
 
 @pytest.mark.slow

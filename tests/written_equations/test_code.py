@@ -38,7 +38,7 @@ def compiled(text, folder, name="mechanism"):
 
     def call(what, shape, t, *arrays):
         out, given = np.full(shape, np.nan), [np.ascontiguousarray(x, float) for x in arrays]
-        orders = [shape[0]] if what == "right_side" else []
+        orders = [shape[0]] if what in ("right_side", "forces", "outputs") else []
         getattr(functions, f"{name}_{what}")(ctypes.c_double(t), *map(pointer, given), *orders, pointer(out))
         return out
 

@@ -7,8 +7,8 @@ import jounce as jn
 from jounce.errors import MechanismError
 from jounce.mechanism import build
 from jounce.settings import under_own_settings
-from jounce.written_equations.latex import joint_equations, source_of
-from jounce.written_equations.symbolic_joint import symbolic_joint
+from jounce.written_equations.joint_forms.latex import joint_equations, source_of
+from jounce.written_equations.joint_forms.symbolic_joint import symbolic_joint
 from tests.oracles import sommer_planar as plane, sommer_spatial as space
 from tests.problems.mechanisms import example
 from tests.problems.reading_latex import Reader, assert_well_formed

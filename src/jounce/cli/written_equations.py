@@ -1,4 +1,4 @@
-"""The command that writes the equations of a mechanism: as code, as text, as values along its motion."""
+"""The command that writes the equations of a mechanism or a robot: as code, as text, as values along its motion."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from jounce.cli.options import MechanismReading, errors_about, written
+from jounce.cli.arguments import check_ending
+from jounce.cli.file_kinds import expecting
+from jounce.cli.options import MechanismReading, RobotReading, errors_about, written
 from jounce.errors import JounceError
+from jounce.io.files import DATA_FILES, ROBOT_FILES
 from jounce.reporting.terminal import say
 
 if TYPE_CHECKING:
     from jounce.mechanism import Mechanism
+    from jounce.robot import Robot
 
 AS_IN_FILES = MechanismReading()
 TABLES = (".csv", ".nc", ".json")
@@ -22,29 +26,38 @@ def equations(
     file: Path,
     /,
     *,
-    format: Literal["python", "c", "latex", "table"] = "python",  # noqa: A002 - the name of the option
+    format: Literal["python", "sympy", "c", "latex", "table"] = "python",  # noqa: A002 - the name of the option
     joint: str | None = None,
+    quantity: list[str] | None = None,
     order: int = 4,
+    no_drives: bool = False,
     out: Path | None = None,
     reading: MechanismReading = AS_IN_FILES,
     overwrite: bool = False,
 ) -> int:
-    r"""Write the equations of a mechanism as code, LaTeX, or a table.
+    r"""Write equations as code, SymPy, LaTeX, or a table.
 
-    Residual, Jacobian and right sides of all orders, from the same residuals
-    that are solved, in SI units. Sommer 2024, equations 1-8.
+    Of a mechanism residual, Jacobian and right sides of all orders, of a robot
+    its torques and their rates, from the same residuals that are solved, in SI
+    units. Sommer 2024, equations 1-8; Negrean 2025, equations 144-146.
 
     Parameters
     ----------
     file
-        Mechanism file: .yaml, .toml or .json.
+        Mechanism file, .yaml, .toml or .json; or robot, .urdf, .xml or .sdf.
     format
-        python, which needs NumPy alone, c, C99, or latex; or table,
-        their values along the motion, multipliers too.
+        python, which needs NumPy alone, sympy, c, C99, or latex; or
+        table, their values along the motion, multipliers too.
     joint
         The joint or driver whose equations alone are written.
+    quantity
+        Of code, repeatable. Of a mechanism constraints, unless given; forces,
+        with the mass matrix; outputs, with derivatives. Of a robot torque,
+        unless given; mass_matrix; regressor; energies.
     order
         Highest derivative, 4 unless given.
+    no_drives
+        Leave out armature, damping, friction and springs of a robot.
     out
         Write it to this file; else it is printed. A table is .csv, .nc
         (NetCDF) or .json.
@@ -55,23 +68,32 @@ def equations(
     --------
       jounce equations examples/four_bar.yaml --format python --out four_bar.py
       jounce equations examples/rsur.yaml --format c --order 6 --out rsur.c
+      jounce equations examples/double_pendulum.yaml \
+        --quantity constraints --quantity forces --out pendulum.py
+      jounce equations examples/robots/panda.urdf --format c --out panda.c
       jounce equations examples/four_bar.yaml --joint BC --format latex
       jounce equations examples/four_bar.yaml --format table --out values.csv
     """
     from jounce.io.files.writing import check_target, replacing
+    from jounce.mechanism import Mechanism
     from jounce.written_equations import equations as equations_as_text
     from jounce.written_equations.write import DEFAULT_NAME, ending_of
 
-    mechanism = reading.mechanism(file)
+    with expecting(file, "mechanism", "robot"):
+        check_ending(file, (*DATA_FILES, *ROBOT_FILES))
+    model = _robot(reading, file) if file.suffix.lower() in ROBOT_FILES else reading.mechanism(file)
+    if format == "table" and not isinstance(model, Mechanism):
+        raise JounceError("is for mechanisms; jounce torques has those of a robot", name="--format", value=format)
+    if format == "table" and quantity is not None:
+        raise JounceError("is for code; a table has all of them", name="--quantity", value=quantity)
     if format == "table":
-        return _table(mechanism, file, joint, order, out, overwrite=overwrite)
+        return _table(model, file, joint, order, out, overwrite=overwrite)
     if out is not None:
         check_target(out, (ending_of(format),), "code", overwrite=overwrite)
     name = re.sub("[^A-Za-z0-9]+", "_", (file if out is None else out).stem).strip("_")
+    chosen = {"format": format, "order": order, "name": name if name[:1].isalpha() else DEFAULT_NAME}
     with errors_about(file):
-        text = equations_as_text(
-            mechanism, joint, format=format, order=order, name=name if name[:1].isalpha() else DEFAULT_NAME
-        )
+        text = equations_as_text(model, joint, **chosen, quantities=quantity or (), drives=not no_drives)
     if out is None:
         say(text.rstrip("\n"))
         return 0
@@ -81,6 +103,14 @@ def equations(
             scratch.write_text(text, encoding="ascii")
 
     return _written(write, out)
+
+
+def _robot(reading: MechanismReading, file: Path) -> Robot:
+    """Return the robot of a file."""
+    for name in ("set_", "import_"):
+        if getattr(reading, name):
+            raise JounceError("is for mechanism files", name=f"--{name.rstrip('_')}", value=getattr(reading, name))
+    return RobotReading(allow=reading.allow).robot(file)
 
 
 def _table(

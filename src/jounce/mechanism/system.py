@@ -1,7 +1,7 @@
 """A mechanism in numbers: instances of a type stacked, bodies by index, residual and Jacobian of the whole."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -283,21 +283,25 @@ class System(Module):
         virtual velocities of ``pose.varied``, from which they follow by transposing how far each force acts along: no
         Jacobian is written. The order is one less than that of the pose; gravity is not among them.
         """
-        order, count = pose.order - 1, pose.shifts + pose.turns
-        shape = (count, *pose.position.shape[1:])
+        order = pose.order - 1
         if not self.forces:
-            return Jet.constant(jnp.zeros(shape), order)
+            return Jet.constant(jnp.zeros((pose.shifts + pose.turns, *pose.position.shape[1:])), order)
         sizes = jax.lax.optimization_barrier([stacked(group.force(pose, time)) for group in self.forces])
-        still, now = movable(pose.truncate(order)), time.truncate(order)
+        now = time.truncate(order)
 
-        def along(velocity: Any) -> list[Any]:
-            shift, turn = (Jet(tuple(part)) for part in (velocity[:, : pose.shifts], velocity[:, pose.shifts :]))
-            change = movable(still.varied(shift, turn).truncate(order))
+        def along(still: Any, change: Any) -> list[Any]:
             return [stacked(group.variation(still, change, now)) for group in self.forces]
 
-        transposed = jax.linear_transpose(along, jax.ShapeDtypeStruct((order + 1, *shape), jnp.float64))
-        # the transpose of a convolution runs backwards in the orders
-        return Jet(tuple(transposed([size[::-1] for size in sizes])[0][::-1]))
+        return conjugate_series(along, pose.truncate(order), sizes)
+
+    def constraint_forces(self, pose: Pose, time: Jet, multipliers: Float[Numbers, "order row batch"]) -> Jet:
+        """Return ``Phi_q^T lambda`` of all bodies for coefficients of multipliers, as `applied_forces` has forces.
+
+        The orders of pose, time and multipliers are the same.
+        """
+        if not self.groups:
+            return Jet.constant(jnp.zeros((pose.shifts + pose.turns, *pose.position.shape[1:])), pose.order)
+        return conjugate_series(lambda still, change: stacked(self.variation(still, change, time)), pose, multipliers)
 
     def finite_forces(self, pose: Pose, time: Jet) -> Bool[Numbers, "force batch"]:
         """Tell where each applied force is a finite number, shape (forces, batch); the pose has velocities.
@@ -317,6 +321,31 @@ class System(Module):
         parts = jnp.swapaxes(solution.reshape(self.body_count, count, -1), 0, 1)
         parts = jnp.pad(parts * self.column_scale[:, None, None], ((0, 0), (1, 0), (0, 0)))
         return parts[:shifts], parts[shifts:]
+
+
+def conjugate_series(along: Callable[[Any, Any], Any], pose: Pose, sizes: Any) -> Jet:
+    """Return the forces on all bodies that are conjugate to what some sizes act along, (coordinates, bodies, batch).
+
+    Parameters
+    ----------
+    along : callable
+        Of a pose and a change of it: how what is acted along varies, coefficients of the shapes of the sizes; linear.
+    pose : SpatialPose or PlanarPose
+        Of the order of the sizes.
+    sizes : pytree of array
+        Taylor coefficients.
+    """
+    still, order = movable(pose), pose.order
+
+    def varied(velocity: Any) -> Any:
+        shift, turn = (Jet(tuple(part)) for part in (velocity[:, : pose.shifts], velocity[:, pose.shifts :]))
+        return along(still, movable(still.varied(shift, turn).truncate(order)))
+
+    shape = (order + 1, pose.shifts + pose.turns, *pose.position.shape[1:])
+    transposed = jax.linear_transpose(varied, jax.ShapeDtypeStruct(shape, jnp.float64))
+    # the transpose of a convolution runs backwards in the orders
+    backwards = jax.tree.map(lambda size: size[::-1], sizes)
+    return Jet(tuple(transposed(backwards)[0][::-1]))
 
 
 def movable(pose: Pose) -> Any:

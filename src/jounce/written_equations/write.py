@@ -1,16 +1,21 @@
-"""The equations of a mechanism as text: code of Python and of C, and LaTeX."""
+"""The equations of a mechanism as text: code of Python, of SymPy and of C, and LaTeX."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from jounce.errors import MechanismError, check_choice, whole_number
+import numpy as np
+
+from jounce.errors import JounceError, MechanismError, RobotError, check_choice, flag, whole_number
 from jounce.kinematics import Motion
 from jounce.mechanism import Mechanism
-from jounce.written_equations.c_code import c_file
-from jounce.written_equations.latex import latex_document
-from jounce.written_equations.mechanism_equations import MechanismEquations, equations_of
-from jounce.written_equations.python_code import python_module
+from jounce.robot import Robot
+from jounce.written_equations.joint_forms.latex import latex_document
+from jounce.written_equations.languages.c_code import c_file
+from jounce.written_equations.languages.python_code import python_module
+from jounce.written_equations.languages.sympy_code import sympy_module
+from jounce.written_equations.models import mechanism_equations, robot_equations
+from jounce.written_equations.operations.functions import Code
 
 HIGHEST_ORDER = 12
 DEFAULT_NAME = "mechanism"
@@ -22,20 +27,21 @@ class Language(NamedTuple):
     Attributes
     ----------
     write : callable
-        Of equations and a name: the text.
+        Of code and a name: the text.
     ending : str
         Of its files.
     most : int
         Operations that a file of it may hold.
     """
 
-    write: Callable[[MechanismEquations, str], str]
+    write: Callable[[Code, str], str]
     ending: str
     most: int
 
 
 LANGUAGES = {
-    "python": Language(lambda equations, _: python_module(equations), ".py", 200_000),
+    "python": Language(lambda code, _: python_module(code), ".py", 200_000),
+    "sympy": Language(lambda code, _: sympy_module(code), ".py", 20_000),
     "c": Language(c_file, ".c", 200_000),
 }
 LATEX_ENDING, MOST_LATEX = ".tex", 8  # the highest order
@@ -48,35 +54,48 @@ def ending_of(format: str) -> str:  # noqa: A002 - the name of the option
 
 
 def equations(
-    mechanism: Mechanism | Motion,
+    model: Mechanism | Motion | Robot,
     joint: str | None = None,
     *,
     format: str = "python",  # noqa: A002 - the name of the option
     order: int = 4,
     name: str = DEFAULT_NAME,
+    quantities: Sequence[str] = (),
+    drives: bool = True,
 ) -> str:
-    """Return the constraint equations of a mechanism as code: residual, Jacobian and right sides. Sommer 2024, 1-8.
+    """Return the equations of a mechanism or a robot as code. Sommer 2024, 1-8; Negrean 2025, 65-122 and 144-146.
 
-    They are those of `constraint_equations`, with its labels and in SI units, read off the same residuals on jets, own
-    joints included; what is computed twice is shared. The code needs nothing of this package.
+    Those of a mechanism are residual, Jacobian and right sides as `constraint_equations` has them, with its labels, own
+    joints included; those of a robot its torques and their rates as `inverse_dynamics` gives them. They are read off
+    the same residuals on jets, in SI units, and what is computed twice is shared. The code needs nothing of this
+    package.
 
     Parameters
     ----------
-    mechanism : Mechanism or Motion
+    model : Mechanism, Motion or Robot
         A mechanism: angles about axes in space are counted from where its bodies are put together, at the start of its
-        grid of time. Or a motion: they are counted as along it.
+        grid of time. Or a motion: they are counted as along it. Or a robot.
     joint : str, optional
         Name of the joint or driver whose equations alone are written.
-    format : {"python", "c", "latex"}, default "python"
+    format : {"python", "sympy", "c", "latex"}, default "python"
         ``python`` is a module that needs NumPy alone, with ``COORDINATES``, ``COLUMNS``, ``ROWS`` and ``ORDER``, and
-        ``residual(t, q)``, ``jacobian(t, q)`` and ``right_side(t, q, velocities)``. ``c`` is a file of C99 with the
-        same functions, their names begun by `name`. Both state in their headings what the arguments are. ``latex`` is a
-        document with the equations of each type of joint in the
-        vectors of the paper; a joint that is not made of them has its equations by coordinates.
+        ``residual(t, q)``, ``jacobian(t, q)`` and ``right_side(t, q, velocities)``. ``sympy`` is one whose functions
+        return expressions of SymPy. ``c`` is a file of C99 with the same functions, their names begun by `name`. All
+        state in their headings what the arguments are. ``latex`` is a document with the equations of each type of joint
+        in the vectors of the paper; a joint that is not made of them has its equations by coordinates.
     order : int, default 4
         The highest derivative that has a right side, from 1 to 12, of LaTeX to 8.
     name : str, default "mechanism"
         With which the names of the functions of C begin.
+    quantities : sequence of str, optional
+        What is written. Of a mechanism ``constraints``, unless given; ``forces``, that is ``mass_matrix(t, q)`` and
+        ``forces(t, q, velocities, multipliers)``, which with the constraints give accelerations and multipliers, and
+        their rates; ``outputs``, that is ``outputs(t, q, velocities)``, what places and motions of bodies determine of
+        the mechanism's outputs, with derivatives. LaTeX has the constraints alone. Of a robot ``torque``, unless given:
+        ``torque(q)`` with q of shape (order + 1, joint); ``mass_matrix``; ``regressor``, by which inertial parameters
+        are multiplied; ``energies``, of acceleration and of velocity, with rates.
+    drives : bool, default True
+        Of a robot: whether armature, damping, friction and springs of its joints count.
 
     Returns
     -------
@@ -85,9 +104,9 @@ def equations(
 
     Raises
     ------
-    MechanismError
-        If there is no such joint; if a residual or a law holds what is no operation on numbers, such as a loop of
-        unknown length, or a table of too many of them; or if the order takes more operations than the format holds.
+    MechanismError, RobotError
+        If there is no such joint; if a residual, a law or a force holds what is no operation on numbers, such as a loop
+        of unknown length, or a table of too many of them; or if the order takes more operations than the format holds.
 
     Examples
     --------
@@ -102,17 +121,65 @@ def equations(
     >>> module["jacobian"](0.5, q).round(6).tolist()
     [[-0.089502, -0.289557, 0.002752, 0.089502, 0.289557, -0.041002]]
     """
-    check_choice("format", format, FORMATS, MechanismError)
-    if not isinstance(mechanism, Mechanism | Motion):
-        raise MechanismError("must be a jn.Mechanism or a jn.Motion", name="mechanism", value=mechanism)
-    most = MOST_LATEX if format == "latex" else HIGHEST_ORDER
-    order = whole_number("order", order, 1, most, error=MechanismError)
+    error = RobotError if isinstance(model, Robot) else MechanismError
+    check_choice("format", format, FORMATS, error)
+    if not isinstance(model, Mechanism | Motion | Robot):
+        raise MechanismError("must be a jn.Mechanism, a jn.Motion or a jn.Robot", name="model", value=model)
+    order = whole_number("order", order, 1, MOST_LATEX if format == "latex" else HIGHEST_ORDER, error=error)
+    drives = flag("drives", drives, error=error)
     if not isinstance(name, str) or not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
-        raise MechanismError("must be a name of C: letters, digits and _", name="name", value=name)
-    if format == "latex":
-        return latex_document(mechanism, joint, order)
-    language, found = LANGUAGES[format], equations_of(mechanism, joint, order)
-    if found.size > language.most:
-        message = f"takes {found.size} operations, more than the {language.most} of a file of {format}"
-        raise MechanismError(f"{message}; lower it, or name a joint", name="order", value=order)
-    return language.write(found, name)
+        raise error("must be a name of C: letters, digits and _", name="name", value=name)
+    if isinstance(model, Robot):
+        if joint is not None or format == "latex":
+            what = ("joint", joint) if joint is not None else ("format", format)
+            raise RobotError("is for mechanisms; a robot has code of all joints", name=what[0], value=what[1])
+        chosen = _quantities(quantities, robot_equations.QUANTITIES, error)
+        code = robot_equations.robot_code(model, order, chosen, drives=drives)
+    else:
+        chosen = _quantities(quantities, mechanism_equations.QUANTITIES, error)
+        other = next((x for x in chosen if x != mechanism_equations.CONSTRAINTS), None)
+        if other and joint is not None:
+            raise error("is of the whole mechanism; leave out the joint", name="quantities", value=other)
+        if other and format == "latex":
+            raise error("is not written as LaTeX; take python, sympy or c", name="quantities", value=other)
+        if format == "latex":
+            return latex_document(model, joint, order)
+        code = mechanism_equations.mechanism_code(model, joint, order, chosen)
+    return _text(code, format, name, error)
+
+
+def _quantities(given: Sequence[str], known: tuple[str, ...], error: type[JounceError]) -> tuple[str, ...]:
+    """Return what is to be written, in its usual order: the first of what there is, unless given."""
+    given = (given,) if isinstance(given, str) else tuple(given)
+    for quantity in given:
+        check_choice("quantities", quantity, known, error)
+    return tuple(quantity for quantity in known if quantity in given) or known[:1]
+
+
+def _text(code: Code, format: str, name: str, error: type[JounceError]) -> str:  # noqa: A002
+    """Return code in a language.
+
+    Raises
+    ------
+    MechanismError, RobotError
+        If it is too long, or SymPy has no expression for something in it.
+    """
+    language = LANGUAGES[format]
+    if code.size > language.most:
+        message = f"takes {code.size} operations, more than the {language.most} of a file of {format}"
+        raise error(f"{message}; lower it, or write less", name="order", value=code.order)
+    if format == "sympy" and (owner := owner_of_table(code)):
+        message = "reads a table of numbers, which SymPy has no expression for; take python or c"
+        raise error(message, name=owner)
+    return language.write(code, name)
+
+
+def owner_of_table(code: Code) -> str:
+    """Return the joint or driver that reads a table of numbers, or the function that does; nothing where none does."""
+    for function in code.functions:
+        for place in np.ndindex(*function.results.shape):
+            reached = code.graph.reached([int(function.results[place])])
+            if any(code.graph.nodes[n].operation == "lookup" for n in reached):
+                row = dict(zip(function.axes, place, strict=True)).get("row")
+                return function.name if row is None else code.labels["ROWS"][row].rpartition(".")[0]
+    return ""

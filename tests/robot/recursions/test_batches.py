@@ -7,7 +7,7 @@ import pytest
 
 import jounce as jn
 from jounce.jet.derivatives import plain_derivatives, taylor_coefficients
-from jounce.robot.algorithms.inverse_dynamics import _generalized_forces
+from jounce.robot.algorithms.inverse_dynamics import generalized_forces
 from jounce.robot.recursions.batches import WIDTHS
 from tests.problems.robots import random_robot
 
@@ -50,7 +50,7 @@ def test_shapes_of_batches_are_kept(torque, lead):
 
 
 def compilations():
-    return _generalized_forces.jitted._cache_size() + len(_generalized_forces.mapped.machine_code)
+    return generalized_forces.jitted._cache_size() + len(generalized_forces.mapped.machine_code)
 
 
 def test_values_and_robots_of_one_kind_compile_nothing_again(torque):

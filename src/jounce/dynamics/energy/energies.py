@@ -234,12 +234,16 @@ def energies_of(
         )
         return *parts, bodies, order
     series = checked_coordinates(system, q, order + 1)
-    names = [joint.name for joint in system.moving_joints]
-    leading = tuple(names.index(name) for name in system.joint_names) if drives else ()
-    balls = [x for x in system.couplings.values() if isinstance(x, BallDrive)] if drives else []
-    turned = tuple(names.index(ball.joints[-1]) for ball in balls)
-    parts = _of_robot(system, (series,), (), (order, function, leading, turned))
+    parts = energies_of_tree(system, (series,), (), (order, function, *rotors_of(system, drives=drives)))
     return *parts, system.moving_links, order
+
+
+def rotors_of(robot: Robot, *, drives: bool) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the bodies with whose rotation rotors count: those that coordinates move, and the links of balls."""
+    names = [joint.name for joint in robot.moving_joints]
+    leading = tuple(names.index(name) for name in robot.joint_names) if drives else ()
+    balls = [x for x in robot.couplings.values() if isinstance(x, BallDrive)] if drives else []
+    return leading, tuple(names.index(ball.joints[-1]) for ball in balls)
 
 
 def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None, *, drives: bool = True) -> Energy:
@@ -266,7 +270,7 @@ def mass_arrays(tree: Tree) -> tuple[Any, Any, Any]:
 
 
 @Batched
-def _of_robot(
+def energies_of_tree(
     tree: Tree,
     arrays: tuple[Series],
     _: Any,
@@ -275,6 +279,7 @@ def _of_robot(
     leading: tuple[int, ...],
     turned: tuple[int, ...],
 ) -> tuple[Float[Numbers, "levels body batch"], ...]:
+    """Return energies of all bodies of a robot, with those of rotors, on Taylor coefficients."""
     frames = body_frames(tree, arrays[0]).without_base()
     *parts, last = (stacked(part) for part in function(frames, *mass_arrays(tree), order))
     if leading:  # the bodies that coordinates move, in their order

@@ -98,3 +98,10 @@ def loads(
     if system.forces:
         load = load + stacked(system.applied_forces(pose, time))[: len(load)]
     return load[:, :, 1:]
+
+
+def constraint_loads(
+    system: System, pose: Pose, time: Jet, multipliers: Float[Numbers, "order row batch"]
+) -> Float[Numbers, "order coordinate moving batch"]:
+    """Return ``Phi_q^T lambda`` of all moving bodies, as Taylor coefficients, from those of the multipliers."""
+    return stacked(system.constraint_forces(pose, time, multipliers))[:, :, 1:]

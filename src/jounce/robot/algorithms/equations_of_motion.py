@@ -144,7 +144,8 @@ def centrifugal(tree: Tree, q: Series) -> Float[Numbers, "order-1 coordinate bat
 
 
 @Batched
-def _mass_matrix(tree: Tree, arrays: tuple[Series], _: Any, drives: bool) -> Any:
+def mass_matrix_of_tree(tree: Tree, arrays: tuple[Series], _: Any, drives: bool) -> Any:
+    """Return the mass matrix, with what drives add to it, on Taylor coefficients."""
     matrix = mass_jet(tree, arrays[0])
     return matrix + armature_matrix(tree, Jet(tuple(arrays[0]))) if drives else matrix
 
@@ -222,7 +223,7 @@ def mass_matrix(
     """
     rates, drives = flag("rates", rates, error=RobotError), flag("drives", drives, error=RobotError)
     q = checked_coordinates(robot, q) if rates else checked_position(robot, q)
-    matrix = _mass_matrix(robot, (q,), (), (drives,))
+    matrix = mass_matrix_of_tree(robot, (q,), (), (drives,))
     return matrix if rates else matrix[..., 0, :, :]
 
 

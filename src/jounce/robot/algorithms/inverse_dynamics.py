@@ -79,7 +79,7 @@ def inverse_dynamics(
     drives = flag("drives", drives, error=RobotError)
     arrays, static = _applied(robot, q, wrenches, time, free=base is not None)
     if base is None:
-        return _generalized_forces(robot, arrays[0], arrays[1], (*static, drives))
+        return generalized_forces(robot, arrays[0], arrays[1], (*static, drives))
     moved = base_arrays(base, q.shape[:-2], q.shape[-2] - 1)
     return _forces_of_free_tree(robot, (*arrays[0], *moved), (arrays[1], base_body(robot)), (*static, drives))
 
@@ -175,9 +175,10 @@ def _on_bodies(
 
 
 @Batched
-def _generalized_forces(
+def generalized_forces(
     tree: Tree, arrays: tuple[Any, ...], frames: tuple[Frame, ...], global_axes: tuple[bool, ...], drives: bool
 ) -> Float[Numbers, "levels coordinate batch"]:
+    """Return joint torques, as `inverse_dynamics` does, on Taylor coefficients."""
     q = arrays[0]
     applied = _on_bodies(tree, arrays, frames, global_axes)
     applied = None if applied is None else applied[:, :-1]

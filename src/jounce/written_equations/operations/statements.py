@@ -5,13 +5,13 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
-from jounce.written_equations.graph import Graph, Node
+from jounce.written_equations.operations.graph import Graph, Node
 
 LONGEST = 90  # characters of a statement, up to which operations stand within others
 RESERVED = frozenset(keyword.kwlist) | frozenset(
     "auto break case char const continue default do double else enum extern float for goto if inline int long register "
     "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while t q np "
-    "velocities orders residual jacobian right_side out shape y0 y1 yn j0 j1 jn gamma".split()
+    "orders out shape sp y0 y1 yn j0 j1 jn gamma".split()
 )
 
 
@@ -21,6 +21,11 @@ class Names:
     def __init__(self, taken: Iterable[str] = ()):
         self._taken = set(RESERVED) | set(taken)
         self._known: dict[str, str] = {}
+
+    def fix(self, label: str, name: str) -> None:
+        """Let a label have a name."""
+        self._taken.add(name)
+        self._known[label] = name
 
     def of(self, label: str) -> str:
         """Return the name that stands for a label."""

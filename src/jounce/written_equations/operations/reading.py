@@ -12,7 +12,7 @@ from jaxtyping import Int
 
 from jounce.jet.operations import COMPOSED
 from jounce.jet.programs import ProgramReader
-from jounce.written_equations.graph import REAL, TRUTH, WHOLE, Graph
+from jounce.written_equations.operations.graph import REAL, TRUTH, WHOLE, Graph
 
 MOST_ENTRIES = 200_000  # of a table
 _SAME = {
@@ -26,7 +26,7 @@ _SAME = {
 }  # fmt: skip
 _MOVING = frozenset(
     "broadcast_in_dim concatenate copy expand_dims gather pad reshape rev slice split squeeze stack "
-    "transpose dynamic_slice copy_p".split()
+    "transpose dynamic_slice copy_p unstack".split()
 )
 _BY_NUMPY: dict[str, Callable[..., Any]] = {  # without compiling a program for each shape
     "broadcast_in_dim": lambda x, *, shape, broadcast_dimensions, **_: np.broadcast_to(
@@ -152,6 +152,8 @@ class GraphReader(ProgramReader):
             return [self._summed_up(given[0], parameters["axis"], reverse=parameters["reverse"])]
         if name == "dynamic_update_slice":
             return [self._updated(given)]
+        if name in ("scatter", "scatter-add"):
+            return [self._put_at_places(equation, given)]
         if name in _MOVING:
             return self._moved(equation, operands, given, dtypes)
         raise NotWrittenError(f"it has the operation '{name}' of JAX, which is none on numbers")
@@ -227,6 +229,30 @@ class GraphReader(ProgramReader):
         numbers[tuple(slice(b, b + m) for b, m in zip(begins, part.shape, strict=True))] = part.numbers
         return Entries(numbers, target.dtype)
 
+    def _put_at_places(self, equation: JaxprEqn, given: list[Entries]) -> Entries:
+        """Return an array with entries replaced by others, or with others added to them, at places that are known."""
+        target, places, parts = given
+        if not self.graph.is_constant(*places.numbers.ravel().tolist()):
+            raise NotWrittenError("it writes at an index that changes")
+        known = np.array([self.graph.value(n) for n in places.numbers.ravel().tolist()], places.dtype)
+        known = jnp.asarray(known.reshape(places.shape))
+
+        def added(updates: Any) -> Any:
+            words = ("dimension_numbers", "indices_are_sorted", "unique_indices", "mode")
+            options = {word: equation.params[word] for word in words}
+            return jax.lax.scatter_add(jnp.zeros(target.shape), known, updates, **options)
+
+        # the transpose reads at each place what would be added to it: the number of the place, 0 for none
+        numbered = jnp.arange(1.0, target.numbers.size + 1).reshape(target.shape)
+        (owners,) = jax.linear_transpose(added, jax.ShapeDtypeStruct(parts.shape, jnp.float64))(numbered)
+        numbers = target.numbers.copy()
+        for owner, part in zip(np.asarray(owners, int).ravel().tolist(), parts.numbers.ravel().tolist(), strict=True):
+            if owner:
+                place = np.unravel_index(owner - 1, target.shape)
+                adds = equation.primitive.name == "scatter-add"
+                numbers[place] = self.graph.apply("add", int(numbers[place]), part) if adds else part
+        return Entries(numbers, target.dtype)
+
     def _moved(self, equation: JaxprEqn, operands: list[Any], given: list[Entries], dtypes: list[Any]) -> list[Any]:
         """Return what an operation makes that gives numbers other places: it is done with those of the nodes."""
         name = equation.primitive.name
@@ -238,9 +264,13 @@ class GraphReader(ProgramReader):
         places = [x.numbers for x in given[: len(given) - len(indices)]]
         if name in _BY_NUMPY:
             return [Entries(_BY_NUMPY[name](*places, **equation.params), dtypes[0])]
-        results = equation.primitive.bind(*map(jnp.asarray, [*places, *known]), **equation.params)
-        results = results if equation.primitive.multiple_results else [results]
-        return [Entries(np.asarray(x), dtype) for x, dtype in zip(results, dtypes, strict=True)]
+        filled = {"fill_value": 0} if name == "gather" else {}  # the number of no operation: beyond the ends
+        results = equation.primitive.bind(*map(jnp.asarray, [*places, *known]), **(equation.params | filled))
+        results = [np.asarray(x) for x in (results if equation.primitive.multiple_results else [results])]
+        if name == "gather" and (results[0] == 0).any():
+            beyond = self.graph.constant(np.full((), np.nan, dtypes[0]).item() if dtypes[0].kind == "f" else 0)
+            results = [np.where(results[0] == 0, beyond, results[0])]
+        return [Entries(x, dtype) for x, dtype in zip(results, dtypes, strict=True)]
 
     def _looked_up(self, equation: JaxprEqn, table: Any, indices: list[Entries], dtype: Any) -> Entries:
         """Return entries of a table at indices that are not known before."""

@@ -220,9 +220,30 @@ class Graph:
                 return y
             if self._is(x, -1):
                 return self.apply("neg", y)
+            if self._is_factor(x) and (rest := self._scaled(y)):
+                return self.apply("mul", self.constant(self.value(x) * rest[0]), rest[1])
+        for x, y in ((a, b), (b, a)):
             if self.nodes[x].operation == "neg":
                 return self.apply("neg", self.apply("mul", self.nodes[x].operands[0], y))
         return None
+
+    def _is_factor(self, number: int) -> bool:
+        """Tell whether a node is a number that may be multiplied with others beforehand."""
+        node = self.nodes[number]
+        return node.operation == "constant" and node.kind == REAL and math.isfinite(node.detail)
+
+    def _scaled(self, number: int) -> tuple[float, int] | None:
+        """Return the factor that an operation has, and what it is of; None where it has none."""
+        node = self.nodes[number]
+        if node.operation == "neg":
+            return -1.0, node.operands[0]
+        if node.operation not in ("mul", "div"):
+            return None
+        a, b = node.operands
+        if node.operation == "div":
+            return (1.0 / self.value(b), a) if self._is_factor(b) and self.value(b) else None
+        factor, other = (a, b) if self._is_factor(a) else (b, a)
+        return (self.value(factor), other) if self._is_factor(factor) else None
 
     def _selected(self, condition: int, yes: int, no: int) -> int | None:
         if yes == no:

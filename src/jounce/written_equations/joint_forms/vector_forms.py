@@ -9,8 +9,8 @@ X^T R^T Y, and ("vector", X) for a row of several.
 import math
 from fractions import Fraction
 
-from jounce.written_equations.polynomials import Atom, Monomial, Polynomial, joined, without
-from jounce.written_equations.symbolic_joint import SymbolicJoint
+from jounce.written_equations.joint_forms.polynomials import Atom, Monomial, Polynomial, joined, without
+from jounce.written_equations.joint_forms.symbolic_joint import SymbolicJoint
 
 _COMPONENTS = ("u", "d", "r")
 

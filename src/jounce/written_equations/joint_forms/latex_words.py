@@ -4,8 +4,8 @@ from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
 
-from jounce.written_equations.polynomials import Atom, Monomial, Polynomial
-from jounce.written_equations.symbolic_joint import length_of
+from jounce.written_equations.joint_forms.polynomials import Atom, Monomial, Polynomial
+from jounce.written_equations.joint_forms.symbolic_joint import length_of
 
 SIDES = (r"\mathbf{v}", r"\boldsymbol{\gamma}", r"\boldsymbol{\eta}", r"\boldsymbol{\sigma}")
 _DOTS = ("", r"\dot", r"\ddot", r"\dddot", r"\ddddot")

@@ -15,9 +15,9 @@ from jounce.modules import with_fields
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.spatial import quaternion_spins
 from jounce.trajectory import AbstractMotion
-from jounce.written_equations.graph import FUNCTIONS, Graph, Node
-from jounce.written_equations.polynomials import Atom, Polynomial
-from jounce.written_equations.reading import Entries, GraphReader, NotWrittenError
+from jounce.written_equations.joint_forms.polynomials import Atom, Polynomial
+from jounce.written_equations.operations.graph import FUNCTIONS, Graph, Node
+from jounce.written_equations.operations.reading import Entries, GraphReader, NotWrittenError
 
 SLOTS = "ijmn"
 

@@ -14,13 +14,13 @@ from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.builder import group_rows
 from jounce.mechanism.system import Group
 from jounce.version import __version__
-from jounce.written_equations.component_forms import component_jacobian, in_coordinates, without_unknown
-from jounce.written_equations.latex_words import Words, escaped, in_brackets, local, of_vector, skew, total
-from jounce.written_equations.mechanism_equations import put_together
-from jounce.written_equations.polynomials import Atom, Polynomial, TooManyTermsError, without
-from jounce.written_equations.reading import NotWrittenError
-from jounce.written_equations.symbolic_joint import SymbolicJoint, symbolic_joint
-from jounce.written_equations.vector_forms import in_angles, recognized, right_side
+from jounce.written_equations.joint_forms.component_forms import component_jacobian, in_coordinates, without_unknown
+from jounce.written_equations.joint_forms.latex_words import Words, escaped, in_brackets, local, of_vector, skew, total
+from jounce.written_equations.joint_forms.polynomials import Atom, Polynomial, TooManyTermsError, without
+from jounce.written_equations.joint_forms.symbolic_joint import SymbolicJoint, symbolic_joint
+from jounce.written_equations.joint_forms.vector_forms import in_angles, recognized, right_side
+from jounce.written_equations.models.mechanism_equations import put_together
+from jounce.written_equations.operations.reading import NotWrittenError
 
 LONGEST_VALUE = 200  # characters of a value
 MOST_TERMS = 400  # of a right side that a person is to read

@@ -3,9 +3,9 @@
 import math
 from fractions import Fraction
 
-from jounce.written_equations.polynomials import Atom, Monomial, Polynomial, without
-from jounce.written_equations.symbolic_joint import SymbolicJoint
-from jounce.written_equations.vector_forms import of_body, turning
+from jounce.written_equations.joint_forms.polynomials import Atom, Monomial, Polynomial, without
+from jounce.written_equations.joint_forms.symbolic_joint import SymbolicJoint
+from jounce.written_equations.joint_forms.vector_forms import of_body, turning
 
 _TURNED = {(1, 2): 0, (2, 0): 1, (0, 1): 2}  # entries below the diagonal of a skew matrix, and above it
 

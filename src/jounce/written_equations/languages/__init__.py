@@ -1,0 +1,1 @@
+"""The languages that equations are written in."""

@@ -1,0 +1,1 @@
+"""What is written: the equations of mechanisms and of robots, as operations on their coordinates."""

@@ -1,0 +1,1 @@
+"""Operations on numbers, read off programs of JAX, and written as statements."""

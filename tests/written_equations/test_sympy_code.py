@@ -1,0 +1,85 @@
+"""Equations as expressions of SymPy, turned into numbers and differentiated by SymPy."""
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from jounce.errors import MechanismError
+from tests.problems.bank import cases
+from tests.problems.mechanisms import example
+from tests.problems.written import at, between_free_bodies, coordinates, from_one, random_states, run
+
+sympy = pytest.importorskip("sympy")
+
+QUICK = "planar-joint-double_revolute"
+CASES = [
+    pytest.param(case, id=str(case), marks=[] if str(case) == QUICK else pytest.mark.slow)
+    for case in cases()
+    if str(case) != "spatial-joint-gear"  # whose axes are held by other joints
+]
+
+
+def numbers(module, name, *values):
+    """Return the values of the expressions of a function."""
+    given = [module[x] for x in ("t", "q", "velocities", "multipliers")[: len(values)]]
+    expressions = module[name](*given)
+    return np.array(sympy.lambdify(given, expressions, cse=True)(*values), float)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_joint_and_driver(case):
+    random = np.random.default_rng(7)
+    mechanism = between_free_bodies(case.element(random), case.space)
+    equations = jn.constraint_equations(mechanism, state := random_states(mechanism, 2, random), 0.3)
+    code = run(jn.equations(at(mechanism, state, 0.3), format="sympy", order=3))
+    q, v = coordinates(equations)[0], np.nan_to_num(from_one(equations.velocities)[0])
+    for name, found in (
+        ("residual", numbers(code, "residual", 0.3, q)[:, 0]),
+        ("jacobian", numbers(code, "jacobian", 0.3, q)),
+        ("right_side", numbers(code, "right_side", 0.3, q, v)[..., 0]),
+    ):
+        expected = from_one(equations.right_side)[0] if name == "right_side" else equations[name].values[0]
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * max(1.0, np.abs(expected).max()))
+
+
+def test_sympy_differentiates_the_residual_to_the_same_jacobian_and_right_sides():
+    """Of the four-bar, along coordinates that are functions of time: nothing of jets is used."""
+    code = run(jn.equations(jn.load(example("four_bar")), "BC", format="sympy", order=3))
+    t = code["t"]
+    moving = [sympy.Function(str(x))(t) for x in code["q"]]
+    phi = code["residual"](t, moving)[0]
+    velocities = [[x.diff(t, k) for x in moving] for k in (1, 2, 3)]
+    jacobian = code["jacobian"](t, moving)
+    for x, entry in zip(moving, jacobian, strict=True):
+        assert largest(phi.diff(x) - entry) < 1e-15
+    for k, side in enumerate(code["right_side"](t, moving, velocities), 1):
+        left = sum(a * b for a, b in zip(jacobian, velocities[k - 1], strict=True))
+        assert largest(phi.diff(t, k) - left + side[0]) < 1e-14
+
+
+def largest(expression):
+    """Return the size of the largest coefficient of an expression: zero up to rounding of the numbers in it."""
+    return max(map(abs, sympy.expand(expression).as_coefficients_dict().values()))
+
+
+def test_forces_and_mass_matrix():
+    mechanism = jn.load(example("double_pendulum"))
+    code, plain = (
+        run(jn.equations(mechanism, format=word, order=3, quantities=("forces", "constraints")))
+        for word in ("sympy", "python")
+    )
+    random = np.random.default_rng(2)
+    values = 0.0, random.normal(size=6), random.normal(size=(3, 6)), random.normal(size=(1, 4))
+    found = numbers(code, "forces", *values)[..., 0]
+    np.testing.assert_allclose(found, plain["forces"](*values), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(numbers(code, "mass_matrix", *values[:2]), plain["mass_matrix"](*values[:2]), atol=1e-14)
+
+
+@pytest.mark.filterwarnings("ignore::jounce.errors.SampleWarning")
+def test_tables_are_refused():
+    law = jn.laws.SplineMotion(np.linspace(0, 2, 30), np.sin(3 * np.linspace(0, 2, 30)))
+    crank = jn.planar.Revolute(("ground", "crank"), [0, 0], [0, 0])
+    driver = jn.drivers.CoordinateDriver(("ground", "crank"), "angle", motion=law)
+    parts = {"bodies": {"crank": jn.Body([0, 0])}, "joints": {"O": crank}, "drivers": {"it": driver}}
+    with pytest.raises(MechanismError, match="it: reads a table of numbers, which SymPy"):
+        jn.equations(jn.Mechanism(space="planar", **parts), format="sympy")
