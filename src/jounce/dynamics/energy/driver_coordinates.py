@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.energy.slopes import Columns, Form, slope_values
+from jounce.dynamics.energy.slopes import Columns, Form, column_of, slope_values
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import Masses, required_masses
@@ -22,8 +22,7 @@ from jounce.dynamics.motion_values import Coordinates, cut, labeled, pose_of
 from jounce.errors import MechanismError
 from jounce.execution.chunks import in_chunks
 from jounce.execution.compilation import compiled
-from jounce.jet import Jet, cross
-from jounce.jet.algebra import stacked, total
+from jounce.jet import Jet
 from jounce.kinematics import Motion
 from jounce.kinematics.continuation.change_points import spoiled
 from jounce.kinematics.continuation.jacobian_factors import Factor, factored
@@ -31,9 +30,8 @@ from jounce.mechanism.driver_outputs import is_turning
 from jounce.mechanism.element_indices import element_indices
 from jounce.mechanism.system import System, movable
 from jounce.modules import Module
-from jounce.rigid import PlanarPose
 from jounce.rigid.pose import Pose
-from jounce.shapes import ArrayLike, Numbers
+from jounce.shapes import Numbers
 from jounce.units.shown_units import derivative_unit
 
 if TYPE_CHECKING:
@@ -53,7 +51,6 @@ class ChangedLaw(Module):
 
 def in_driver_coordinates(
     motion: Motion,
-    q: ArrayLike | None,
     form: Form,
     *,
     power: int = 0,
@@ -64,8 +61,6 @@ def in_driver_coordinates(
     ----------
     motion : Motion
         Of a mechanism whose bodies have masses.
-    q : None
-        The motion has its own coordinates.
     form : Form
         The sum, with its rates.
     power : int, default 0
@@ -80,10 +75,8 @@ def in_driver_coordinates(
     Raises
     ------
     MechanismError
-        If coordinates are given, no body has a mass, or something moves that no driver prescribes.
+        If no body has a mass, or something moves that no driver prescribes.
     """
-    if q is not None:
-        raise MechanismError("a motion has its coordinates already, the laws of its drivers", name="q", value=q)
     model, names = motion.model, drivers_of(motion)
     indices = element_indices(model)
     order = tuple((indices[name].group, indices[name].instance) for name in names)
@@ -108,6 +101,13 @@ def _of_drivers(motion: Motion, values: Float[np.ndarray, "order driver time"], 
     return labeled(motion, values, driver=tuple(drivers)).assign_coords(unit=("driver", units))
 
 
+def is_driven(motion: Motion) -> bool:
+    """Tell whether drivers prescribe all that moves."""
+    system = motion.model.system
+    rows, columns = system.shape if system.groups else (0, 1)
+    return (rows if system.rank is None else system.rank) == columns and bool(motion.mechanism.drivers)
+
+
 def drivers_of(motion: Motion) -> tuple[str, ...]:
     """Return the names of the drivers of a motion.
 
@@ -116,9 +116,8 @@ def drivers_of(motion: Motion) -> tuple[str, ...]:
     MechanismError
         If something moves that no driver prescribes.
     """
-    system, names = motion.model.system, tuple(motion.mechanism.drivers)
-    rows, columns = system.shape if system.groups else (0, 1)
-    if (rows if system.rank is None else system.rank) != columns or not names:
+    names = tuple(motion.mechanism.drivers)
+    if not is_driven(motion):
         message = "the coordinates here are the laws of the drivers, and they do not prescribe all that can move"
         raise MechanismError(message, name="drivers", value=list(names))
     return names
@@ -178,20 +177,11 @@ def _evaluated(
     pose, slope = jax.linearize(pose_after, unchanged)
 
     def column(unit: Any) -> tuple[Any, Any]:
-        return _column(pose, slope(jnp.broadcast_to(unit, unchanged.shape)), masses.center, form.column_order)
+        return column_of(pose, slope(jnp.broadcast_to(unit, unchanged.shape)), masses.center, form.column_order)
 
     linear, angular = jax.vmap(column, out_axes=2)(np.eye(len(order))[..., None])
     columns = Columns(Jet(tuple(linear)), Jet(tuple(angular)))
     return slope_values(form, pose, columns, *masses)
-
-
-def _column(pose: Any, change: Any, center: Any, order: int) -> tuple[Any, Any]:
-    """Return how fast centers of mass move, and bodies turn, as a pose changes, (levels, components, bodies, batch)."""
-    linear = change.point(center).truncate(order)
-    if isinstance(pose, PlanarPose):
-        return stacked(linear), stacked(change.angle.truncate(order)[None])
-    turns = (cross(axis.truncate(order), moved) for axis, moved in zip(pose.axes, change.axes, strict=True))
-    return stacked(linear), stacked(total(turns) * 0.5)
 
 
 def with_changes(

@@ -4,7 +4,8 @@ All give the generalized inertia forces Q_i of a robot and their rates, and agre
 `virtual_work` and `newton_euler`; for work, `jounce.inverse_dynamics` is the one to use. Each is a list of partial
 derivatives of energies with respect to ``q^(m)``, which `slopes` adds up in closed form: they differ in the weights of
 the same products, and what cancels is not computed. `energy_slope` gives one of them alone. The coordinates are those
-of a robot, or the laws of the drivers of a mechanism (`driver_coordinates`).
+of a robot; of a driven mechanism the laws of its drivers (`driver_coordinates`); of one that moves freely those of its
+bodies (`body_coordinates`), in which ``Q + Phi_q^T lambda`` is what is applied.
 """
 
 import math
@@ -14,10 +15,11 @@ from typing import TYPE_CHECKING, Any, overload
 
 from jaxtyping import Float
 
-from jounce.dynamics.energy.driver_coordinates import in_driver_coordinates
+from jounce.dynamics.energy.body_coordinates import in_body_coordinates
+from jounce.dynamics.energy.driver_coordinates import in_driver_coordinates, is_driven
 from jounce.dynamics.energy.energies import error_for, mass_arrays
 from jounce.dynamics.energy.slopes import Columns, Form, Slope, slope_values
-from jounce.errors import whole_number
+from jounce.errors import MechanismError, whole_number
 from jounce.kinematics import Motion
 from jounce.robot.algorithms.equations_of_motion import partial_velocities
 from jounce.robot.model.arguments import checked_coordinates
@@ -62,18 +64,21 @@ def _of_robot(tree: Tree, arrays: tuple[Series], _: Any, form: Form) -> Any:
 
 
 def _evaluated(system: Robot | Motion, q: ArrayLike | None, *slopes: Slope, rates: int = 0, power: int = 0) -> Any:
-    """Return a sum of slopes for a robot, (..., rates + 1, n), or for the drivers of a motion, labeled.
+    """Return a sum of slopes for a robot, (..., rates + 1, n), or for the drivers or bodies of a motion, labeled.
 
     It is in units of forces, divided by a power of s.
 
     Raises
     ------
     RobotError, MechanismError
-        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
+        If q does not fit the robot or has too few derivatives, or the motion has too few.
     """
     form = Form(slopes, rates + 1)
     if isinstance(system, Motion):
-        return in_driver_coordinates(system, q, form, power=power)
+        if q is not None:
+            raise MechanismError("a motion has its coordinates already", name="q", value=q)
+        place = in_driver_coordinates if is_driven(system) else in_body_coordinates
+        return place(system, form, power=power)
     return _of_robot(system, (checked_coordinates(system, q, form.order, form.order),), (), (form,))
 
 
@@ -97,7 +102,8 @@ def energy_slope(
     ----------
     system : Robot or Motion
         A robot; gravity does not count. Or the motion of a mechanism whose bodies have masses: its coordinates are the
-        laws of its drivers.
+        laws of its drivers; where these do not prescribe all that moves, as in a simulation, those of its bodies:
+        places of their origins, global, and angles, in space turns about the axes of a body, away from the motion.
     q : array_like of shape (..., K + 1, n), optional
         Coordinates of a robot and their derivatives; order + rate + rates + 1 are enough for K, and of those beyond
         2 order + rate + rates + 2 - m the slope does not depend.
@@ -113,13 +119,13 @@ def energy_slope(
     Returns
     -------
     array of shape (..., rates + 1, n)
-        For a motion an `xarray.DataArray` of dimensions time, derivative and driver, with the unit of each driver.
+        For a motion an `xarray.DataArray` of dimensions time, derivative and driver, with the unit of each driver; or
+        column in the place of driver, "BODY.x", ..., as `constraint_equations` has them.
 
     Raises
     ------
     RobotError, MechanismError
-        If q does not fit the robot or has too few derivatives, the mechanism is not driven in all that can move, or a
-        number is none.
+        If q does not fit the robot, it or the motion has too few derivatives, or a number is none.
 
     Examples
     --------
@@ -146,7 +152,9 @@ def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0)
     ----------
     system : Robot or Motion
         A robot; gravity does not count. Or the motion of a mechanism whose bodies have masses: its coordinates are the
-        laws of its drivers, and the forces are those that the inertia of all bodies asks of the drivers.
+        laws of its drivers, and the forces are those that the inertia of all bodies asks of the drivers. Where these do
+        not prescribe all that moves, as in a simulation, they are those of its bodies, and the forces are what inertia
+        asks of constraints, weight and applied forces: at the origins, global, and about the axes of the body.
     q : array_like of shape (..., K + 1, n), optional
         Coordinates of a robot and their derivatives, K at least rates + 2.
     rates : int, default 0
@@ -156,12 +164,13 @@ def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0)
     -------
     array of shape (..., rates + 1, n)
         Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
-        driver, with the unit of each driver.
+        driver, with the unit of each driver; or column in the place of driver, "BODY.x", ..., as
+        `constraint_equations` has them.
 
     Raises
     ------
     RobotError, MechanismError
-        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
+        If q does not fit the robot or has too few derivatives, or the motion has too few.
 
     Examples
     --------
@@ -192,12 +201,13 @@ def mangeron_nielsen(
     -------
     array of shape (..., rates + 1, n)
         Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
-        driver, with the unit of each driver.
+        driver, with the unit of each driver; or column in the place of driver, "BODY.x", ..., as
+        `constraint_equations` has them.
 
     Raises
     ------
     RobotError, MechanismError
-        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
+        If q does not fit the robot or has too few derivatives, or the motion has too few.
 
     Examples
     --------
@@ -229,12 +239,13 @@ def gibbs_appell(
     -------
     array of shape (..., rates + 1, n)
         Forces and their rates, N m or N by s. For a motion an `xarray.DataArray` of dimensions time, derivative and
-        driver, with the unit of each driver.
+        driver, with the unit of each driver; or column in the place of driver, "BODY.x", ..., as
+        `constraint_equations` has them.
 
     Raises
     ------
     RobotError, MechanismError
-        If q does not fit the robot or has too few derivatives, or the motion is not that of a driven mechanism.
+        If q does not fit the robot or has too few derivatives, or the motion has too few.
 
     Examples
     --------
@@ -273,14 +284,13 @@ def higher_order(
     Returns
     -------
     array of shape (..., n)
-        N m or N by s^(k - 1). For a motion an `xarray.DataArray` of dimensions time and driver, with
-        the unit of each driver.
+        N m or N by s^(k - 1). For a motion an `xarray.DataArray` of dimensions time and driver, or column, with the
+        unit of each.
 
     Raises
     ------
     RobotError, MechanismError
-        If q does not fit the robot or has too few derivatives, the motion is not that of a driven mechanism, or m is
-        too small.
+        If q does not fit the robot or has too few derivatives, or the motion has too few, or m is too small.
 
     Examples
     --------

@@ -19,7 +19,8 @@ from jaxtyping import Float
 
 from jounce.dynamics.energy.energies import axes_of
 from jounce.jet import Jet, cross, dot
-from jounce.jet.algebra import total
+from jounce.jet.algebra import stacked, total
+from jounce.rigid import PlanarPose
 from jounce.rigid.frames import Frames
 from jounce.rigid.pose import Pose
 from jounce.shapes import Numbers
@@ -105,6 +106,15 @@ class Columns(NamedTuple):
 
     linear: Jet
     angular: Jet
+
+
+def column_of(pose: Any, change: Any, center: Any, order: int) -> tuple[Any, Any]:
+    """Return how fast centers of mass move, and bodies turn, as a pose changes, (levels, components, bodies, batch)."""
+    linear = change.point(center).truncate(order)
+    if isinstance(pose, PlanarPose):
+        return stacked(linear), stacked(change.angle.truncate(order)[None])
+    turns = (cross(axis.truncate(order), moved) for axis, moved in zip(pose.axes, change.axes, strict=True))
+    return stacked(linear), stacked(total(turns) * 0.5)
 
 
 def slope_values(

@@ -1,0 +1,95 @@
+"""A mechanism in the coordinates of its bodies: slopes of energies where drivers do not prescribe all that moves.
+
+The coordinates of a body are the place of its origin and, in the plane, its angle; in space, turns about the axes of
+the body, away from the motion. Each changes a whole motion by a constant, and how the points of the body change with
+it is a jet: the column of a Jacobian.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.energy.slopes import Columns, Form, column_of, slope_values
+from jounce.dynamics.inverse.constraint_equations import COLUMNS
+from jounce.dynamics.masses import Masses, required_masses
+from jounce.dynamics.motion_values import Coordinates, cut, labeled, pose_of
+from jounce.errors import MechanismError
+from jounce.execution.chunks import in_chunks
+from jounce.execution.compilation import compiled
+from jounce.jet import Jet
+from jounce.kinematics import Motion
+from jounce.kinematics.continuation.change_points import spoiled
+from jounce.mechanism.system import movable
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+from jounce.units.shown_units import derivative_unit
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def in_body_coordinates(motion: Motion, form: Form, *, power: int = 0) -> "xarray.DataArray":
+    """Return a sum of slopes of energies in the coordinates of all bodies.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a mechanism whose bodies have masses.
+    form : Form
+        The sum, with its rates.
+    power : int, default 0
+        By which power of s what the form gives is divided, in units of forces.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimensions time, derivative and column, with the unit of each column; NaN at instants that were not solved.
+
+    Raises
+    ------
+    MechanismError
+        If no body has a mass, or the motion has too few derivatives.
+    """
+    mechanism, (pose_type, coordinates) = motion.mechanism, motion.poses
+    masses = required_masses(mechanism)
+    known = len(coordinates["position"]) - 1
+    if known < form.order:
+        raise MechanismError(f"this needs a motion of order {form.order} or higher", name="order", value=motion.order)
+    start = cut(coordinates, form.order)
+
+    def chunk(lanes: np.ndarray) -> Any:
+        return _evaluated({name: values[..., lanes] for name, values in start.items()}, masses, pose_type, form)
+
+    values = in_chunks(chunk, len(motion.time))
+    values = np.where(spoiled(motion.passages, motion.time, form.order), np.nan, values)
+    names = COLUMNS[mechanism.space]
+    efforts = ["N" if name in "xyz" else "N*m" for name in names] * len(mechanism.bodies)
+    units = [derivative_unit(unit, power) if power >= 0 else f"{unit}*s^{-power}" for unit in efforts]
+    columns = [f"{body}.{name}" for body in mechanism.bodies for name in names]
+    return labeled(motion, values, column=columns).assign_coords(unit=("column", units))
+
+
+@compiled("pose_type", "form")
+def _evaluated(
+    coordinates: Coordinates, masses: Masses, pose_type: type[Pose], form: Form
+) -> Float[Numbers, "level coordinate time"]:
+    pose = movable(pose_of(coordinates, pose_type, form.order).truncate(form.order))
+    moving, own = jax.tree.map(lambda x: x[..., 1:, :], (pose, masses))  # without the ground
+
+    def of_body(pose: Any, masses: Any) -> Any:
+        pose, masses = jax.tree.map(lambda x: x[..., None, :], (pose, masses))
+        size = pose.shifts + pose.turns
+
+        def column(direction: Any) -> tuple[Any, Any]:
+            unit = jnp.broadcast_to(direction[:, None, None], (size, *pose.position.shape[1:]))
+            shift, turn = (Jet.constant(x, pose.order).dense() for x in (unit[: pose.shifts], unit[pose.shifts :]))
+            return column_of(pose, movable(pose.varied(shift, turn)), masses.center, form.column_order)
+
+        linear, angular = jax.vmap(column, out_axes=2)(np.eye(size))
+        return slope_values(form, pose, Columns(Jet(tuple(linear)), Jet(tuple(angular))), *masses)
+
+    found = jax.vmap(of_body, in_axes=-2, out_axes=1)(moving, own)  # levels, bodies, coordinates, time
+    return found.reshape(found.shape[0], -1, found.shape[-1])
