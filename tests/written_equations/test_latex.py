@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.constraints.angles import perpendiculars
 from jounce.errors import MechanismError
 from jounce.mechanism import build
 from jounce.settings import under_own_settings
+from jounce.written_equations.joint_forms.axial_forms import axial_equations, is_axial
 from jounce.written_equations.joint_forms.latex import joint_equations, source_of
 from jounce.written_equations.joint_forms.symbolic_joint import symbolic_joint
 from tests.oracles import sommer_planar as plane, sommer_spatial as space
@@ -64,6 +66,13 @@ def in_space(bodies):
         }
         symbols |= {rf"\mathbf{{A}}_{name}": body.A, rf"\mathbf{{a}}_{name}": column(body.A @ a)}
         symbols |= {rf"\mathbf{{s}}_{name}'^{{P}}": column(s), rf"\mathbf{{a}}_{name}'": column(a)}
+        for letter, x in zip("fg", perpendiculars(U_I[:, None]), strict=True):  # of the axis of body i
+            local = np.asarray(x)[:, 0]
+            symbols |= {rf"\mathbf{{{letter}}}_{name}": column(body.A @ local)}
+            symbols |= {rf"\mathbf{{{letter}}}_{name}'": column(local)}
+            symbols |= {rf"\tilde{{\mathbf{{{letter}}}}}_{name}'": skew(local)}
+        symbols |= {rf"\mathbf{{u}}_{name}": column(body.A @ a), rf"\mathbf{{u}}_{name}'": column(a)}
+        symbols |= {rf"\tilde{{\mathbf{{u}}}}_{name}'": skew(a)}
         symbols |= {rf"\tilde{{\mathbf{{s}}}}_{name}'^{{P}}": skew(s), rf"\tilde{{\mathbf{{a}}}}_{name}'": skew(a)}
     relative = [
         e(i, j, P_I, P_J) for e in (space.equation_067, space.equation_068, space.equation_069, space.equation_070)
@@ -151,6 +160,21 @@ def planar_cases():
     }  # fmt: skip
 
 
+def hinge(element, i, j, ball, blocks):
+    """Return a revolute of section 5, as section 6 has it: spherical, and two dot-1 across the axis of body i."""
+    e = space
+    side, other = (np.asarray(x) for x in perpendiculars(U_I[:, None]))
+    pairs = [(i, j, x[:, 0], U_J) for x in (side, other)]
+    parts = [blocks(e.equation_078(), e.equation_079(*ball))]
+    parts += [blocks(e.equation_090(), e.equation_091(*pair)) for pair in pairs]
+    sides = [np.zeros(5)]
+    for ball_side, arm in zip(("080", "081", "082"), ("092", "093", "094"), strict=True):
+        first = getattr(e, f"equation_{ball_side}")(*ball)
+        sides.append(np.r_[first, [getattr(e, f"equation_{arm}")(*pair) for pair in pairs]])
+    residual = np.r_[e.equation_077(*ball), [e.equation_089(*pair) for pair in pairs]]
+    return element, residual, [np.vstack(x) for x in zip(*parts, strict=True)], sides
+
+
 def spatial_cases():
     i, j = random_bodies(spatial=True)
     e = space
@@ -177,6 +201,7 @@ def spatial_cases():
                     blocks(e.equation_105(*ball), e.equation_106(*ball)), e.equation_107(*ball, F)),
         "108-111": (jn.drivers.SpatialSlideDriver(*points, U_I, "t"), e.equation_108(*plate, F),
                     blocks(e.equation_109(i, U_I), e.equation_110(*plate)), e.equation_111(*plate, F)),
+        "revolute": hinge(SPATIAL.Revolute(*points, U_I, U_J), i, j, ball, blocks),
         "universal": (SPATIAL.Universal(*points, U_I, U_J), np.r_[e.equation_077(*ball), e.equation_089(*arms)],
                       [np.vstack(x) for x in zip(blocks(e.equation_078(), e.equation_079(*ball)),
                                                  blocks(e.equation_090(), e.equation_091(*arms)), strict=True)],
@@ -215,6 +240,22 @@ def test_the_double_revolute_reads_as_it_is_printed():
     d, v, gamma = r"\mathbf{d}_{ij}", r"\dot{\mathbf{d}}_{ij}", r"\boldsymbol{\gamma}"
     assert found[r"\Phi"] == rf"{d}^T {d} - L^{{2}}"
     assert found[gamma] == f"2 {d}^T {gamma}^{{r}} - 2 {v}^T {v}"
+
+
+@pytest.mark.parametrize("vectors", [{}, {"vector_i": [0, 0, 1.0], "vector_j": [1.0, 0, 0.2]}])
+def test_the_rotation_driver_reads_as_101_to_103_are_printed(vectors):
+    """But for the sign of the angle, which S 101 loses."""
+    element = jn.drivers.RotationDriver(BODIES, [1.0, 0.2, 0.0], "t", **vectors)
+    group = build(between_free_bodies(element, "spatial")).system.groups[0]
+    assert is_axial(group)
+    found = dict(axial_equations(group, 4))
+    assert found[r"\Phi"] == r"\theta - f"
+    axis = r"\hat{\mathbf{u}}^T"
+    along = rf"{axis} \tilde{{\mathbf{{a}}}}_i \mathbf{{a}}_j, \mathbf{{a}}_i^T \mathbf{{a}}_j"
+    inside = along if vectors else rf"{axis} \mathbf{{e}}, e_{{0}}"
+    assert found[r"\theta"] == rf"{'' if vectors else '2 '}\operatorname{{atan2}}\left( {inside} \right)"
+    assert found[r"\Phi_{qj}"] == rf"\left[ \mathbf{{0}}, {axis} \right]"
+    assert [found[side] for side in SIDES] == ["f_{t}", "f_{tt}", "f_{ttt}", "f_{tttt}"]
 
 
 def test_documents_of_mechanisms(tmp_path):

@@ -66,9 +66,9 @@ def without_unknown(row: Polynomial, order: int) -> Polynomial:
     return Polynomial({m: c for m, c in row.terms.items() if not any(map(unknown, m))})
 
 
-def component_jacobian(joint: SymbolicJoint, rate: Polynomial, body: str) -> list[Polynomial]:
+def component_jacobian(rate: Polynomial, body: str, *, planar: bool) -> list[Polynomial]:
     """Return the derivatives of a residual by the coordinates of a body, from its first time derivative."""
-    count = 2 if joint.planar else 3
+    count = 2 if planar else 3
     atoms: list[Atom] = [("r", body, 1, c) for c in range(count)]
-    atoms += [("phi", body, 1)] if joint.planar else [("w", body, 0, c) for c in range(3)]
+    atoms += [("phi", body, 1)] if planar else [("w", body, 0, c) for c in range(3)]
     return [Polynomial({without(m, atom): c for m, c in rate.terms.items() if atom in m}) for atom in atoms]

@@ -14,6 +14,7 @@ from jounce.mechanism import Mechanism, Model
 from jounce.mechanism.builder import group_rows
 from jounce.mechanism.system import Group
 from jounce.version import __version__
+from jounce.written_equations.joint_forms.axial_forms import PREMISE, axial_equations, is_axial
 from jounce.written_equations.joint_forms.component_forms import component_jacobian, in_coordinates, without_unknown
 from jounce.written_equations.joint_forms.latex_words import Words, escaped, in_brackets, local, of_vector, skew, total
 from jounce.written_equations.joint_forms.polynomials import Atom, Polynomial, TooManyTermsError, without
@@ -96,6 +97,10 @@ def _section(
     title = (kind.type_name or kind.__name__).replace("_", " ")
     lines = ["", rf"\subsection*{{{escaped(title)}{f' (S {source})' if source else ''}}}", r"\begin{itemize}"]
     try:
+        if is_axial(group):
+            lines += [rf"\item {escaped(name)}: {_instance(elements[name])}" for name in names]
+            rows = axial_equations(group, order)
+            return [*lines, r"\end{itemize}", PREMISE, r"\begin{align*}", *_aligned(rows), r"\end{align*}"]
         joint = symbolic_joint(group, model.pose_type, order)
         rows = joint_equations(joint)
     except (NotWrittenError, TooManyTermsError) as error:
@@ -109,6 +114,8 @@ def _section(
     for name in names:
         constants = enumerate(joint.constants[members.index(name)], 1)
         values = "".join(f", $c_{{{k}}} = {value:.17g}$" for k, value in constants if ("c", k) in used)
+        for vector, parts in joint.derived[members.index(name)].items():
+            values += f", ${local(vector, vector[-1])} = [{', '.join(f'{part:.17g}' for part in parts)}]$"
         lines.append(rf"\item {escaped(name)}: {_instance(elements[name])}{values}")
     return [*lines, r"\end{itemize}", r"\begin{align*}", *_aligned(rows), r"\end{align*}"]
 
@@ -189,7 +196,7 @@ def _in_components(joint: SymbolicJoint, words: Words) -> list[tuple[str, str]]:
         levels = [in_coordinates(joint, _checked(level[k], n)) for n, level in enumerate(joint.rows)]
         equations.append((rf"\Phi{mark}", words.polynomial(levels[0])))
         for body in joint.slots:
-            blocks = [words.polynomial(x) for x in component_jacobian(joint, levels[1], body)]
+            blocks = [words.polynomial(x) for x in component_jacobian(levels[1], body, planar=joint.planar)]
             equations.append((rf"\Phi_{{q{body}{within}}}", rf"\left[ {', '.join(blocks)} \right]"))
         for n in range(1, len(levels)):
             side = _checked(without_unknown(levels[n], n) * -1, n)

@@ -157,8 +157,8 @@ class Words:
         if kind == "f":
             n = rest[0]
             return "f" if n == 0 else f"f_{{{'t' * n}}}" if n <= 4 else f"f_{{t^{{{n}}}}}"
-        if kind == "t":
-            return "t"
+        if kind in ("t", "theta"):
+            return "t" if kind == "t" else r"\theta"
         if kind == "c":
             return f"c_{{{rest[0]}}}"
         if kind == "k":

@@ -7,6 +7,8 @@ from typing import Any
 
 import jax
 import numpy as np
+from jax.ad_checkpoint import checkpoint_name
+from jax.extend.core import JaxprEqn
 
 from jounce.constraints.facts import field_kinds, value_fields
 from jounce.jet import Jet
@@ -20,15 +22,18 @@ from jounce.written_equations.operations.graph import FUNCTIONS, Graph, Node
 from jounce.written_equations.operations.reading import Entries, GraphReader, NotWrittenError
 
 SLOTS = "ijmn"
+DERIVED = "fghbcke"  # letters of vectors that are made of fields
+MARK = "vector of body "
 
 
-class _Law(AbstractMotion):
+class GivenLaw(AbstractMotion):
     """A law of which only the Taylor coefficients are known."""
 
     coefficients: Any
     time: Any
 
     def __call__(self, time: Jet) -> Jet:
+        """Return the law at the time alone."""
         if time is not self.time:
             raise NotWrittenError("its law is one of a coordinate, not of time alone")
         return Jet(self.coefficients[: time.order + 1])
@@ -50,6 +55,8 @@ class SymbolicJoint:
         Its bodies.
     constants : list of list of float
         What is computed of the values of the joint alone, for each joint of the group: ("c", k) is the k-th.
+    derived : list of dict of str to tuple of float
+        For each joint of the group, the vectors among `vectors` that are no fields, but made of them.
     """
 
     rows: list[list[Polynomial]]
@@ -57,6 +64,7 @@ class SymbolicJoint:
     planar: bool
     slots: str
     constants: list[list[float]] = dataclasses.field(default_factory=list)
+    derived: list[dict[str, tuple[float, ...]]] = dataclasses.field(default_factory=list)
 
 
 # Atoms, by kind: ("r", body, n, c) component of the n-th derivative of a position, ("A", body, n, row, column) entry of
@@ -74,30 +82,40 @@ def symbolic_joint(group: Group, pose_type: type, order: int) -> SymbolicJoint:
     for name in value_fields(type(element)):
         kind, value = field_kinds(type(element))[name], getattr(element, name)
         if kind == "motion":
-            law = [_scaled(graph, ("f", n), n, (1, 1)) for n in range(order + 1)]
+            law = [scaled(graph, ("f", n), n, (1, 1)) for n in range(order + 1)]
         elif value is not None and kind == "scalar":
             fields[name] = _entries(graph, [("k", name)], (1, 1))
         elif value is not None and kind == "vector":
             fields[name] = _entries(graph, [("v", name, c) for c in range(count)], (count, 1, 1))
             vectors[name] = name.rpartition("_")[2] if name[-2:] in ("_i", "_j", "_m") else "i"
-    slots = SLOTS[: len(group.bodies)]
+    slots, pose_of = SLOTS[: len(group.bodies)], planar_pose if planar else spatial_pose
     poses = [_coefficients(graph, body, order, planar=planar) for body in slots]
 
     def residual(fields: Any, law: Any, poses: Any, instant: Any) -> Any:
         time = Jet((instant, np.ones((1, 1)), *[None] * (order - 1)))
-        values = {**fields} if law is None else {**fields, "motion": _Law(tuple(law), time)}
-        bodies = [(_planar if planar else _spatial)(pose) for pose in poses]
+        values = {**fields} if law is None else {**fields, "motion": GivenLaw(tuple(law), time)}
+        bodies = [
+            (planar_pose if planar else spatial_pose)(slot, pose) for slot, pose in zip(slots, poses, strict=True)
+        ]
         return with_rows(with_fields(element, **values).residual(*bodies, time)).dense().coefficients
 
-    found = GraphReader(graph).function(residual, fields, law, poses, _entries(graph, [("t",)], (1, 1)))
-    read = _Expansion(graph)
+    reader = NamingReader(graph)
+    found = reader.function(residual, fields, law, poses, _entries(graph, [("t",)], (1, 1)))
+    read = Expansion(graph)
     rows = [
         [read.of(int(x)) * math.factorial(n) for x in level.numbers.reshape(len(level.numbers), -1)[:, 0]]
         for n, level in enumerate(found)
     ]
     values = [_values(group, fields, vectors, k) for k in range(group.instances)]
+    derived = [
+        {name: tuple(evaluated(graph, n, known) for n in parts) for parts, name in reader.derived.items()}
+        for known in values
+    ]
+    for known, its in zip(values, derived, strict=True):
+        known |= {("v", name, c): part for name, parts in its.items() for c, part in enumerate(parts)}
     constants = [[evaluated(graph, number, known) for number in read.constants] for known in values]
-    return SymbolicJoint(rows, vectors, planar, slots, constants)
+    vectors |= {name: name[-1] for name in reader.derived.values()}
+    return SymbolicJoint(rows, vectors, planar, slots, constants, derived)
 
 
 def _values(group: Group, fields: dict[str, Any], vectors: dict[str, str], instance: int) -> dict[Atom, float]:
@@ -128,7 +146,8 @@ def _entries(graph: Graph, atoms: list[Atom], shape: tuple[int, ...]) -> Entries
     return Entries(np.array([graph.input(atom) for atom in atoms]).reshape(shape), float)
 
 
-def _scaled(graph: Graph, atom: Atom, n: int, shape: tuple[int, ...]) -> Entries:
+def scaled(graph: Graph, atom: Atom, n: int, shape: tuple[int, ...]) -> Entries:
+    """Return the Taylor coefficient of an atom that is an n-th derivative."""
     number = graph.apply("div", graph.input(atom), graph.constant(float(math.factorial(n))))
     return Entries(np.full(shape, number), float)
 
@@ -140,7 +159,7 @@ def _coefficients(graph: Graph, body: str, order: int, *, planar: bool) -> dict[
     def jet(kind: str, tails: list[tuple], shape: tuple[int, ...], last: int = order) -> list[Entries]:
         levels = []
         for n in range(last + 1):
-            parts = [_scaled(graph, (kind, body, n, *tail), n, ()) for tail in tails]
+            parts = [scaled(graph, (kind, body, n, *tail), n, ()) for tail in tails]
             levels.append(Entries(np.array([int(x.numbers) for x in parts]).reshape(shape), float))
         return levels
 
@@ -153,18 +172,84 @@ def _coefficients(graph: Graph, body: str, order: int, *, planar: bool) -> dict[
     return found | {f"axis_{k}": jet("A", [(c, k) for c in range(3)], (3, 1, 1)) for k in range(3)}
 
 
-def _planar(pose: dict[str, Any]) -> PlanarPose:
-    return PlanarPose(*(Jet(pose[name]) for name in ("position", "angle", "sine", "cosine")))
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class _NamedPlanarPose(PlanarPose):
+    """A pose that tells which constant vectors of its body a residual uses."""
+
+    slot: str = dataclasses.field(default="i", metadata={"static": True})
+
+    def direction(self, local: Any) -> Jet:
+        return super().direction(_marked(local, self.slot))
 
 
-def _spatial(pose: dict[str, Any]) -> SpatialPose:
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class _NamedSpatialPose(SpatialPose):
+    """A pose that tells which constant vectors of its body a residual uses."""
+
+    slot: str = dataclasses.field(default="i", metadata={"static": True})
+
+    def direction(self, local: Any) -> Jet:
+        return super().direction(_marked(local, self.slot))
+
+
+def _marked(local: Any, slot: str) -> Any:
+    return local if isinstance(local, Jet) else checkpoint_name(local, MARK + slot)
+
+
+class NamingReader(GraphReader):
+    """Reads constant vectors that are made of the fields of a joint as vectors of their own, angles without turns."""
+
+    def __init__(self, graph: Graph):
+        super().__init__(graph)
+        self.derived: dict[tuple[int, ...], str] = {}
+
+    def results(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
+        """Return the results of one operation."""
+        given = operands[0] if equation.primitive.name == "name" else None
+        if not isinstance(given, Entries) or not str(equation.params["name"]).startswith(MARK):
+            return super().results(equation, operands)
+        numbers = tuple(int(x) for x in given.numbers.ravel())
+        fixed = all(self._is_of_fields(x) for x in numbers)
+        if not fixed or all(self.graph.nodes[x].operation in ("input", "constant") for x in numbers):
+            return [given]
+        slot = str(equation.params["name"])[-1]
+        if numbers not in self.derived:
+            letters = iter(DERIVED)
+            taken = set(self.derived.values())
+            self.derived[numbers] = next(name for x in letters if (name := f"{x}_{slot}") not in taken)
+        name = self.derived[numbers]
+        parts = [self.graph.input(("v", name, c)) for c in range(len(numbers))]
+        return [Entries(np.array(parts, np.int64).reshape(given.shape), given.dtype)]
+
+    def applied(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
+        """Return what an operation makes of values; what is rounded is how many whole turns an angle has."""
+        if equation.primitive.name == "round":
+            zero = self.graph.constant(0.0)
+            return [Entries(np.full(v.aval.shape, zero), v.aval.dtype) for v in equation.outvars]
+        return super().applied(equation, operands)
+
+    def _is_of_fields(self, number: int) -> bool:
+        inputs = (self.graph.nodes[x] for x in self.graph.reached([number]))
+        return all(node.operation != "input" or node.detail[0] in ("v", "k") for node in inputs)
+
+
+def planar_pose(slot: str, pose: dict[str, Any]) -> PlanarPose:
+    """Return a pose of coefficients, which tells the vectors that are used of it."""
+    return _NamedPlanarPose(*(Jet(pose[name]) for name in ("position", "angle", "sine", "cosine")), slot=slot)
+
+
+def spatial_pose(slot: str, pose: dict[str, Any]) -> SpatialPose:
+    """Return a pose of coefficients, which tells the vectors that are used of it."""
     spins = zip(*map(quaternion_spins, pose["quaternion"]), strict=True)
     axes = tuple(Jet(pose[f"axis_{k}"]) for k in range(3))
     velocity = Jet(pose["angular_velocity"]) if pose["angular_velocity"] else None
-    return SpatialPose(Jet(pose["position"]), Jet(pose["quaternion"]), tuple(map(Jet, spins)), axes, velocity)
+    parts = Jet(pose["position"]), Jet(pose["quaternion"]), tuple(map(Jet, spins)), axes, velocity
+    return _NamedSpatialPose(*parts, slot=slot)
 
 
-class _Expansion:
+class Expansion:
     """Operations as polynomials; what is none is an atom of its own, ("function", name, polynomials)."""
 
     def __init__(self, graph: Graph):
@@ -207,8 +292,6 @@ class _Expansion:
             return parts[0] * parts[1]
         if node.operation == "div":
             return parts[0] * parts[1].inverse()
-        if node.operation == "round":  # of whole turns, of which an angle is told without
-            return Polynomial.number(Fraction(0))
         return Polynomial.atom(("function", node.operation, tuple(part.frozen() for part in parts)))
 
 

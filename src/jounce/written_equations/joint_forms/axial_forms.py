@@ -1,0 +1,126 @@
+"""Drivers of an angle about an axis, where their bodies turn about that alone: Sommer 2024, equations 101-103.
+
+An angle about an axis does not depend on how frames are drawn. So its residual is read in a frame whose z is the axis,
+at rest on body i, as body j turns about it: what else the residual does when the axes tilt is zero there.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from jounce.constraints.facts import field_kinds, value_fields
+from jounce.jet import Jet
+from jounce.mechanism.system import Group, with_rows
+from jounce.modules import with_fields
+from jounce.written_equations.joint_forms.component_forms import component_jacobian
+from jounce.written_equations.joint_forms.latex_words import Words
+from jounce.written_equations.joint_forms.polynomials import Atom, Polynomial
+from jounce.written_equations.joint_forms.symbolic_joint import Expansion, GivenLaw, NamingReader, scaled, spatial_pose
+from jounce.written_equations.operations.graph import Graph
+from jounce.written_equations.operations.reading import Entries, NotWrittenError
+
+PREMISE = (
+    r"For bodies that turn against each other about $\hat{\mathbf{u}}$ alone, as their bearing holds them."
+)
+_AXIS = r"\hat{\mathbf{u}}^T"
+_NAMES: dict[Atom, str] = {
+    ("e", "j", 0, 0): "e_{0}",
+    ("e", "j", 0, 3): rf"{_AXIS} \mathbf{{e}}",
+    ("A", "j", 0, 0, 0): r"\mathbf{a}_i^T \mathbf{a}_j",
+    ("A", "j", 0, 1, 0): rf"{_AXIS} \tilde{{\mathbf{{a}}}}_i \mathbf{{a}}_j",
+}
+
+
+class _AxialWords(Words):
+    """Words for what is seen along the axis."""
+
+    def _coordinate(self, kind: str, body: str, n: int, *place: int) -> str:
+        return _NAMES.get((kind, body, n, *place)) or super()._coordinate(kind, body, n, *place)
+
+
+def is_axial(group: Group) -> bool:
+    """Tell whether a group drives angles about axes, by what its class states and by its fields."""
+    kind = type(group.element)
+    vectors = {name for name in value_fields(kind) if field_kinds(kind)[name] == "vector"}
+    return group.is_driver and group.element.periodic and "axis_i" in vectors <= {"axis_i", "vector_i", "vector_j"}
+
+
+def axial_equations(group: Group, order: int) -> list[tuple[str, str]]:
+    """Return the equations of drivers of an angle as pairs of left and right sides in LaTeX.
+
+    Raises
+    ------
+    NotWrittenError
+        If the residual is another function of more than the angle there.
+    """
+    words = _AxialWords(planar=False)
+    levels = _derivatives(group, order, turning=False)
+    angle = Polynomial({m: c for m, c in levels[0].terms.items() if not any(a[0] == "f" for a in m)})
+    pairs = [(r"\Phi", words.polynomial(Polynomial.atom(("theta",)) + levels[0] + angle * -1))]
+    pairs.append((r"\theta", words.polynomial(angle)))
+    rate = _derivatives(group, 1, turning=True)[1]
+    for body in "ij":
+        whole = [x.terms.get((), 0) for x in component_jacobian(rate, body, planar=False)]
+        if whole[:5] != [0] * 5 or abs(whole[5]) != 1:
+            raise NotWrittenError("its rate is not that of an angle about its axis")
+        pairs.append((rf"\Phi_{{q{body}}}", rf"\left[ \mathbf{{0}}, {'-' if whole[5] < 0 else ''}{_AXIS} \right]"))
+    for n in range(1, order + 1):
+        side = Polynomial({m: -c for m, c in levels[n].terms.items() if m != (("w", "j", n - 1, 2),)})
+        if any(atom[0] != "f" for m in side.terms for atom in m):
+            raise NotWrittenError("its right sides are not those of an angle about its axis")
+        pairs.append((words.side(n), words.polynomial(side)))
+    return pairs
+
+
+def _derivatives(group: Group, order: int, *, turning: bool) -> list[Polynomial]:
+    """Return the residual and its derivatives; `turning` if both bodies have any angular velocity at that place."""
+    graph = Graph()
+    element = group.element
+    law = [scaled(graph, ("f", n), n, (1, 1)) for n in range(order + 1)]
+    along, across = np.array([0.0, 0.0, 1.0])[:, None, None], np.array([1.0, 0.0, 0.0])[:, None, None]
+    values: dict[str, Any] = {"axis_i": along, "datum": None}
+    values |= {name: across for name in ("vector_i", "vector_j") if getattr(element, name, None) is not None}
+    poses = {body: _pose(graph, body, order, turning=turning) for body in "ij"}
+
+    def residual(law: Any, poses: Any, instant: Any) -> Any:
+        time = Jet((instant, np.ones((1, 1)), *[None] * (order - 1)))
+        bodies = [spatial_pose(body, pose) for body, pose in poses.items()]
+        changed = with_fields(element, **values, motion=GivenLaw(tuple(law), time))
+        return with_rows(changed.residual(*bodies, time)).dense().coefficients
+
+    instant = Entries(np.array([[graph.input(("t",))]]), float)
+    found = NamingReader(graph).function(residual, law, poses, instant)
+    read = Expansion(graph)
+    factorials = [float(np.prod(np.arange(1, n + 1))) for n in range(order + 1)]
+    return [read.of(int(x.numbers.ravel()[0])) * int(f) for x, f in zip(found, factorials, strict=True)]
+
+
+def _pose(graph: Graph, body: str, order: int, *, turning: bool) -> dict[str, list[Entries]]:
+    """Return the coefficients of a body at rest, i, or of one that turns about z, j."""
+    zero, one = graph.constant(0.0), graph.constant(1.0)
+
+    def atom(kind: str, n: int, *place: int) -> int:
+        return int(scaled(graph, (kind, body, n, *place), n, ()).numbers)
+
+    def column(numbers: list[int]) -> Entries:
+        return Entries(np.array(numbers, np.int64)[:, None, None], float)
+
+    def moved(kind: str, n: int, *place: int, start: int = zero) -> int:
+        return atom(kind, n, *place) if body == "j" else start if n == 0 else zero
+
+    def spin(n: int) -> list[int]:
+        if turning:
+            return [atom("w", n, c) for c in range(3)]
+        return [zero, zero, atom("w", n, 2) if body == "j" else zero]
+
+    levels = range(order + 1)
+    cosines = [moved("A", n, 0, 0, start=one) for n in levels]
+    sines = [moved("A", n, 1, 0) for n in levels]
+    return {
+        "position": [column([zero] * 3) for _ in levels],
+        "quaternion": [column([moved("e", n, 0, start=one), zero, zero, moved("e", n, 3)]) for n in levels],
+        "angular_velocity": [column(spin(n)) for n in range(order)],
+        "axis_0": [column([c, s, zero]) for c, s in zip(cosines, sines, strict=True)],
+        "axis_1": [column([graph.apply("neg", s), c, zero]) for c, s in zip(cosines, sines, strict=True)],
+        "axis_2": [column([zero, zero, one if n == 0 else zero]) for n in levels],
+    }
