@@ -29,6 +29,7 @@ class Benchmark(NamedTuple):
 BENCHMARKS = {
     "four-bar": Benchmark("four_bar", "Four-bar to jounce, beside CasADi and SymPy"),
     "rsur": Benchmark("rsur", "RSUR mechanism to jounce, beside the bare LAPACK factorization and solves it needs"),
+    "written-c": Benchmark("written_c", "Equations of the RSUR as C, beside CasADi's C from the same residual"),
     "bodies": Benchmark("bodies", "Chains of four-bars against the number of bodies, beside banded LAPACK"),
     "orders": Benchmark("orders", "Cost of each further derivative, beside nested automatic differentiation"),
     "reactions": Benchmark("reactions", "Driver torque and two rates, beside NumPy with differenced multipliers"),

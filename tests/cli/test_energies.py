@@ -63,3 +63,25 @@ def test_bad_input(run, files):
         status, _, message = run(*arguments)
         assert status == 2
         assert words in " ".join(message.split())
+
+
+def test_json(run, files):
+    import json
+
+    from jsonschema import Draft202012Validator
+
+    from jounce.reporting.json.result_schema import result_schema
+
+    status, output, _ = run(*files, "--order", "1", "--rates", "1", "--json")
+    assert status == 0
+    found = json.loads(output)
+    Draft202012Validator(result_schema()).validate(found)
+    assert (found["command"], found["order"], found["rates"], found["time"]["count"]) == ("energies", 1, 1, 5)
+    energy, rate = (row for row in found["peaks"] if row["body"] is None)
+    robot = jn.load_robot(files[0])
+    t = np.linspace(0, 1, 5)
+    q = np.stack([0.5 * np.sin(2 * t), np.cos(2 * t), -2 * np.sin(2 * t)], axis=1)[..., None]
+    expected = jn.energy.acceleration_energy(robot, q).total[:, 0]
+    np.testing.assert_allclose([energy["minimum"], energy["maximum"]], [expected.min(), expected.max()], rtol=1e-12)
+    assert energy["maximum_at"] == t[expected.argmax()]
+    assert (energy["unit"], rate["unit"]) == ("J/s^2", "J/s^3")

@@ -222,3 +222,19 @@ def test_names_are_nearest_to_their_own_places(written, name):
             if other == text or np.hypot(u - places[text][0], v - places[text][1]) > 4.0
         }
         assert min(gap, key=gap.get) == text
+
+
+def test_equations_for_a_thesis(four_bar, page, tmp_path):
+    path = tmp_path / "equations.html"
+    report(four_bar, path, equations=True, at=0.51)
+    text = html.unescape(re.sub("<[^>]+>", " ", path.read_text(encoding="utf-8").partition('id="equations"')[2]))
+    assert "Constraint equations at t = 0.5 s" in text
+    assert re.search(r"BC +double revolute +equations 26-30 +crank, rocker +1", text)
+    assert "Jacobian, 6 by 6" in text
+    assert re.search(r"A\.1 +x \. \. +\. \. \.", text)
+    assert re.search(r"BC\.1 +x x x +x x x", text)
+    equations = jn.constraint_equations(four_bar).sel(time=0.5, row="BC.1")
+    assert f"{float(equations.right_side.sel(derivative=3)):.9g}" in text
+    assert 'id="equations"' not in page.read_text(encoding="utf-8")
+    with pytest.raises(jn.errors.MechanismError, match="at: is beyond the motion, 0 to 2 s, got 3"):
+        report(four_bar, path, equations=True, at=3)

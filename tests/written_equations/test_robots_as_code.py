@@ -26,7 +26,7 @@ def arm():
     drive = {"armature": 0.3, "damping": 0.2, "friction": 0.7}
     joints = [
         jn.Joint("a", "base", "one", axis=[0, 0, 1], **drive),
-        jn.Joint("b", "one", "two", axis=[0, -1, 0], position=[0.4, 0, 0.1], rotation=[0.1, 0.2, 0.3], **drive),
+        jn.Joint("b", "one", "two", axis=[0, -1, 0], position=[0.4, 0, 0.1], **drive),
         jn.Joint("c", "two", "three", axis=[1, 1, 0], type="prismatic", position=[0.2, 0, 0]),
     ]
     return jn.Robot("arm", [jn.Link("base"), *(jn.Link(x, body) for x in ("one", "two", "three"))], joints)

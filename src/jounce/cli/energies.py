@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from jounce.cli.arguments import check_ending
 from jounce.cli.file_kinds import expecting
-from jounce.cli.options import MechanismReading, RobotReading, errors_about, spare_inputs, written
+from jounce.cli.options import MechanismReading, RobotReading, errors_about, spare_inputs, tell, written
 from jounce.errors import JounceError
 from jounce.io.files import DATA_FILES, ROBOT_FILES
 from jounce.reporting.terminal import say
@@ -30,6 +30,7 @@ def energies(
     import_: list[Path] | None = None,
     allow: list[Path] | None = None,
     out: Path | None = None,
+    json: bool = False,
     overwrite: bool = False,
 ) -> int:
     r"""Compute acceleration energies of any order, and their rates.
@@ -57,6 +58,8 @@ def energies(
         Folder whose files it may name, besides its own; repeatable.
     out
         Write all values to this .csv or .nc (NetCDF) file.
+    json
+        Print extreme values as JSON instead, SI.
     overwrite
         Let --out replace a file that is read here.
 
@@ -67,6 +70,7 @@ def energies(
       jounce energies examples/double_pendulum.yaml --order 1 --out energies.csv
     """
     from jounce.io import check_writable, write
+    from jounce.reporting.facts.mechanism_facts import grid_facts
     from jounce.units.shown_units import derivative_unit
 
     for name, value in (("--order", order), ("--rates", rates)):
@@ -85,16 +89,36 @@ def energies(
         reading = MechanismReading(set_=set_, import_=import_, allow=allow)
         dataset = _of_mechanism(reading, file, order, rates)
     spare_inputs(out, overwrite=overwrite)
-    times = dataset["time"].values
-    what = "Kinetic energy" if order == 0 else f"Acceleration energy of order {order}"
-    say(f"{what}, t = {times[0]:g} to {times[-1]:g} s")
-    for k, values in enumerate(dataset["energy"].values.T):
-        unit = derivative_unit("J", 2 * order + k)
-        say(f"  {'energy' if k == 0 else f'rate {k}'}: from {values.min():.9g} to {values.max():.9g} {unit}")
     if out is not None:
         written(lambda: write(dataset, out, overwrite=overwrite))
-        say(f"Written to {out}")
+    if not json:
+        times = dataset["time"].values
+        what = "Kinetic energy" if order == 0 else f"Acceleration energy of order {order}"
+        say(f"{what}, t = {times[0]:g} to {times[-1]:g} s")
+        for k, values in enumerate(dataset["energy"].values.T):
+            unit = derivative_unit("J", 2 * order + k)
+            say(f"  {'energy' if k == 0 else f'rate {k}'}: from {values.min():.9g} to {values.max():.9g} {unit}")
+    facts = {"file": str(file), "trajectory": None if trajectory is None else str(trajectory)}
+    facts |= {"order": order, "rates": rates, "time": grid_facts(dataset["time"].values)}
+    tell("energies", lambda: {**facts, "peaks": _peaks(dataset, order), "written": out}, out, json=json)
     return 0
+
+
+def _peaks(dataset: xarray.Dataset, order: int) -> list[dict[str, Any]]:
+    """Return the extreme values of the energies of all bodies together and of each, and of their rates."""
+    import numpy as np
+
+    from jounce.units.shown_units import derivative_unit
+
+    times, found = dataset["time"].values, []
+    for name, variable in dataset.data_vars.items():
+        body = None if name == "energy" else str(name).removeprefix("energy_of_")
+        for k, values in enumerate(variable.values.T):
+            row: dict[str, Any] = {"body": body, "rate": k, "unit": derivative_unit("J", 2 * order + k)}
+            for word, place in (("minimum", np.argmin(values)), ("maximum", np.argmax(values))):
+                row |= {word: float(values[place]), f"{word}_at": float(times[place])}
+            found.append(row)
+    return found
 
 
 def _of_robot(

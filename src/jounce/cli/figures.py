@@ -175,6 +175,8 @@ def report(
     out: Path | None = None,
     azimuth: float = -60.0,
     elevation: float = 25.0,
+    equations: bool = False,
+    at: float | None = None,
     reading: MechanismReading = PLAIN_MECHANISM,
     overwrite: bool = False,
 ) -> int:
@@ -196,6 +198,11 @@ def report(
         Around a spatial mechanism, degrees.
     elevation
         Above it, degrees.
+    equations
+        Add the constraint equations: joints with their numbers in Sommer
+        2024, the pattern of the Jacobian, right sides.
+    at
+        Instant of these, s, or the nearest one [default: the first].
     overwrite
         Let --out replace a file that is read here.
 
@@ -203,15 +210,19 @@ def report(
     --------
       jounce report examples/four_bar.yaml --out four_bar.html
       jounce report examples/press.yaml --order 3
+      jounce report examples/rsur.yaml --equations --at 0.5
     """
     from jounce.plot import check_report, report as write_report
 
+    if at is not None and not equations:
+        raise JounceError("goes with --equations", name="--at", value=at)
     out = Path(f"{file.stem}.html") if out is None else out
     check_report(out, overwrite=overwrite)
     mechanism = reading.mechanism(file)
     spare_inputs(out, overwrite=overwrite)
     motion = moved(mechanism, file, order)
     look: dict[str, Any] = {"view": (azimuth, elevation), "source": file.name, "overwrite": overwrite}
+    look |= {"equations": equations, "at": at}
     with errors_about(file):
         written(lambda: write_report(motion, out, **look))
     say(f"Written to {out}")

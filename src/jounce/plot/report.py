@@ -30,6 +30,7 @@ from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.peaks import Peak, derivative_name, peaks, shown_peaks
 from jounce.reporting.text.summaries import motion_summary
 from jounce.units.shown_units import ShownUnits, derivative_unit
+from jounce.written_equations.report_section import equations_section
 
 __all__ = ["check_report", "report"]
 
@@ -58,6 +59,8 @@ def report(
     *,
     view: View = VIEW,
     source: str = "",
+    equations: bool = False,
+    at: float | None = None,
     overwrite: bool = False,
 ) -> None:
     """Write a page to explore a motion in: a moving sketch, plots of all outputs, peak values, and what was solved.
@@ -74,6 +77,11 @@ def report(
         Azimuth and elevation from which a spatial mechanism is seen, degrees.
     source : str, optional
         The file that the mechanism came from, for the foot of the page.
+    equations : bool, default False
+        Whether the page ends with the constraint equations: joints with their numbers in Sommer 2024, the pattern of
+        the Jacobian, and right sides.
+    at : float, optional
+        Instant of these, s: the nearest of the motion; its first one unless given.
     overwrite : bool, default False
         Whether the page may replace a file that this process has read as an input.
 
@@ -81,6 +89,8 @@ def report(
     ------
     OutputError
         The file cannot be written.
+    MechanismError
+        The equations are asked for where the motion was not solved.
 
     Examples
     --------
@@ -98,6 +108,7 @@ def report(
     parts = {
         "TITLE": html.escape(motion.mechanism.title or source or "Motion of a mechanism"),
         "STYLE": _part("report.css"),
+        "EQUATIONS": equations_section(motion, at) if equations else "",
         "SCRIPT": _part("report.js") + _part("plots.js"),
         "DATA": data.replace("<", "\\u003c"),  # no name can end the script early
     }

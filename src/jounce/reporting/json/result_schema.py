@@ -168,6 +168,31 @@ class TorquesResult(TrajectoryResult):
     peaks: list[TorquePeak]
 
 
+class EnergyPeak(TypedDict):
+    """Extreme values of a rate of an energy of all bodies, where the body is null, or of one, with their times."""
+
+    body: str | None
+    rate: int
+    unit: str
+    minimum: float | None
+    minimum_at: float | None
+    maximum: float | None
+    maximum_at: float | None
+
+
+class EnergiesResult(Result):
+    """jounce energies --json; the trajectory is null for a mechanism."""
+
+    command: Literal["energies"]
+    file: str
+    trajectory: str | None
+    order: int
+    rates: int
+    time: Grid
+    peaks: list[EnergyPeak]
+    written: str | None
+
+
 class DriveFacts(TypedDict):
     """A drive: time constant of its spring, s, what the expansion in it misses, and how its motor begins."""
 
@@ -389,6 +414,7 @@ RESULTS: dict[str, Any] = {
     "inspect_robot": InspectRobotResult,
     "check": CheckResult,
     "torques": TorquesResult,
+    "energies": EnergiesResult,
     "feedforward": FeedforwardResult,
     "retime": RetimeResult,
     "smooth": SmoothResult,
@@ -417,7 +443,7 @@ def result_schema() -> dict[str, Any]:
     Examples
     --------
     >>> sorted(result_schema()["$defs"])[:6]
-    ['cam', 'check', 'complaint', 'feedforward', 'inspect_mechanism', 'inspect_robot']
+    ['cam', 'check', 'complaint', 'energies', 'feedforward', 'inspect_mechanism']
     """
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -88,7 +88,7 @@ def symbolic_joint(group: Group, pose_type: type, order: int) -> SymbolicJoint:
         elif value is not None and kind == "vector":
             fields[name] = _entries(graph, [("v", name, c) for c in range(count)], (count, 1, 1))
             vectors[name] = name.rpartition("_")[2] if name[-2:] in ("_i", "_j", "_m") else "i"
-    slots, pose_of = SLOTS[: len(group.bodies)], planar_pose if planar else spatial_pose
+    slots = SLOTS[: len(group.bodies)]
     poses = [_coefficients(graph, body, order, planar=planar) for body in slots]
 
     def residual(fields: Any, law: Any, poses: Any, instant: Any) -> Any:
