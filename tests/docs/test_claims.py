@@ -106,11 +106,10 @@ def test_floors_of_the_sweeps_of_tolerances():
     for name, tolerances in (("four_bar", (1e-11, 1e-10)), ("rsur", (1e-12, 1e-11))):
         sweep = ResidualStop(VALIDATION_CASES[name])
         for tolerance in tolerances:
-            (printed,) = re.findall(
-                rf"([\d.]+e-1\d)(?: for the [\w-]+)? at {tolerance:.0e}", text.split("at most")[1 + (name == "rsur")]
-            )
-            computed = sweep.error(tolerance).max()
-            assert float(printed) / 3 <= computed <= 3 * float(printed)  # rounding, which differs between machines
+            four_bar, rsur = re.split(r"(?<=at 1e-10), and ", text)
+            part = rsur if name == "rsur" else four_bar
+            (printed,) = re.findall(rf"([\d.]+e-1\d)(?: for the [\w-]+)? at {tolerance:.0e}", part)
+            assert sweep.error(tolerance).max() <= 3 * float(printed)  # as the page says
 
 
 def phase(order, step):
@@ -127,7 +126,11 @@ def test_gain_by_jerk():
     assert " is {:.0f} at $\\omega h$ = 2, {:.0f} at 1, {:.0f} at 0.1".format(*gains) in text
     assert phase(2, 0.01) == pytest.approx(0.01**2 / 12, rel=1e-3)
     assert phase(4, 0.1) == pytest.approx(0.1**4 / 720, rel=1e-2)
-    assert 2 * np.pi / 3 == pytest.approx(2.1, abs=0.1)  # a third of a period
+    low, high = 2.0, 3.0
+    for _ in range(50):
+        middle = (low + high) / 2
+        low, high = (middle, high) if phase(2, middle) > 10 * phase(4, middle) else (low, middle)
+    assert f"steps of $\\omega h$ = {low:.3g} give, {2 * np.pi / low:.3g} of them to a period" in text
 
 
 def test_steps_for_an_accuracy():

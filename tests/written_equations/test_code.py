@@ -23,6 +23,7 @@ CASES = [
 ]
 ROUNDING = 1e-12
 COMPILER = shutil.which("cc")
+BY_ORDER = {"right_side", "forces", "outputs", "torque", "regressor"}
 
 
 def compiled(text, folder, name="mechanism"):
@@ -36,10 +37,11 @@ def compiled(text, folder, name="mechanism"):
     def pointer(values):
         return np.ascontiguousarray(values, float).ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
-    def call(what, shape, t, *arrays):
-        out, given = np.full(shape, np.nan), [np.ascontiguousarray(x, float) for x in arrays]
-        orders = [shape[0]] if what in ("right_side", "forces", "outputs") else []
-        getattr(functions, f"{name}_{what}")(ctypes.c_double(t), *map(pointer, given), *orders, pointer(out))
+    def call(what, shape, *given):
+        out, kept = np.full(shape, np.nan), [np.ascontiguousarray(x, float) for x in given]
+        values = [pointer(x) if x.ndim else ctypes.c_double(float(x)) for x in kept]
+        orders = [shape[0]] if what in BY_ORDER else []
+        getattr(functions, f"{name}_{what}")(*values, *orders, pointer(out))
         return out
 
     return call

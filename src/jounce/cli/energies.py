@@ -36,7 +36,7 @@ def energies(
     r"""Compute acceleration energies of any order, and their rates.
 
     Order 0 is the kinetic energy, order 1 Gibbs' energy of accelerations.
-    Negrean 2025, equations 65-120.
+    Negrean 2025, equations 65-122.
 
     Parameters
     ----------

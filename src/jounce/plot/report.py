@@ -29,6 +29,7 @@ from jounce.plot.style import BODY_COLORS
 from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.peaks import Peak, derivative_name, peaks, shown_peaks
 from jounce.reporting.text.summaries import motion_summary
+from jounce.shapes import Real
 from jounce.units.shown_units import ShownUnits, derivative_unit
 from jounce.written_equations.report_section import equations_section
 
@@ -60,7 +61,7 @@ def report(
     view: View = VIEW,
     source: str = "",
     equations: bool = False,
-    at: float | None = None,
+    at: Real | None = None,
     overwrite: bool = False,
 ) -> None:
     """Write a page to explore a motion in: a moving sketch, plots of all outputs, peak values, and what was solved.

@@ -9,7 +9,7 @@ import numpy as np
 from jounce.dynamics.inverse.constraint_equations import constraint_equations
 from jounce.errors import MechanismError
 from jounce.kinematics import Motion, Status
-from jounce.shapes import real_numbers
+from jounce.shapes import Real, real_numbers
 from jounce.written_equations.joint_forms.latex import source_of
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 SIDES = ("v", "&gamma;", "&eta;", "&sigma;")
 
 
-def equations_section(motion: Motion, at: float | None = None) -> str:
+def equations_section(motion: Motion, at: Real | None = None) -> str:
     """Return the equations of a mechanism as HTML: joints with their numbers in Sommer 2024, the pattern, right sides.
 
     Parameters

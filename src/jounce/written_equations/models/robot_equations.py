@@ -179,7 +179,7 @@ def _parameters(robot: Robot, *, drives: bool) -> tuple[list[dict[str, Any]], di
         unit(mass=(k, 1.0))
         for place in turn.T:
             unit(mass=(k, 1.0), center=(k, place), inertia=(k, -_about_origin(place)))
-        for i, j in zip(*np.triu_indices(3), strict=True):
+        for i, j in zip(*(x.tolist() for x in np.triu_indices(3)), strict=True):
             unit(inertia=(k, turn @ _unit(i, j) @ turn.T))
         center, mass = turn.T @ tree.center[k], float(tree.mass[k])
         moments = turn.T @ tree.inertia[k] @ turn + mass * _about_origin(center)
