@@ -1,0 +1,199 @@
+"""What commands about robots and their energies print with ``--json``, as types."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from typing_extensions import TypedDict
+
+from jounce.reporting.facts.mechanism_facts import Grid
+from jounce.reporting.json.schema_parts import Result, TorquePeak
+
+
+class LimitRow(TypedDict):
+    """The worst instant of a joint and quantity; without a limit, its ratio is null, and both where it is infinite."""
+
+    joint: str
+    quantity: str
+    unit: str
+    worst: float | None
+    limit: float | None
+    ratio: float | None
+    at: float
+    broken: bool
+
+
+class BrokenAtEnd(TypedDict):
+    """A joint or a link, and a quantity of it that has a limit and is infinite at an end."""
+
+    name: str
+    quantity: str
+
+
+class EndFacts(TypedDict):
+    """What is met at the start or the stop of a trajectory: what does not rest, SI, and the limits that this breaks."""
+
+    end: Literal["start", "stop"]
+    time: float
+    at_rest: bool
+    velocities: dict[str, float]
+    accelerations: dict[str, float]
+    breaks: list[BrokenAtEnd]
+
+
+class BetweenFacts(TypedDict):
+    """What was taken to happen between points, and how far, where, that leads from the straight lines between them."""
+
+    words: str
+    deviation: float
+    joint: str | None
+    at: float | None
+
+
+class TrajectoryResult(Result):
+    """What is told of a robot on a trajectory; between is null where its laws say what happens between points."""
+
+    robot: str
+    file: str
+    trajectory: str
+    time: Grid
+    ends: list[EndFacts]
+    between: BetweenFacts | None
+    written: str | None
+
+
+class CheckResult(TrajectoryResult):
+    """jounce check --json."""
+
+    command: Literal["check"]
+    kept: bool
+    broken: int
+    held: dict[str, float]
+    drives: bool
+    limits: list[LimitRow]
+    hand_over: bool
+
+
+class TorquesResult(TrajectoryResult):
+    """jounce torques --json."""
+
+    command: Literal["torques"]
+    rates: int
+    held: list[str]
+    drives: bool
+    peaks: list[TorquePeak]
+
+
+class EnergyPeak(TypedDict):
+    """Extreme values of a rate of an energy of all bodies, where the body is null, or of one, with their times."""
+
+    body: str | None
+    rate: int
+    unit: str
+    minimum: float | None
+    minimum_at: float | None
+    maximum: float | None
+    maximum_at: float | None
+
+
+class EnergiesResult(Result):
+    """jounce energies --json; the trajectory is null for a mechanism."""
+
+    command: Literal["energies"]
+    file: str
+    trajectory: str | None
+    order: int
+    rates: int
+    time: Grid
+    peaks: list[EnergyPeak]
+    written: str | None
+
+
+class DriveFacts(TypedDict):
+    """A drive: time constant of its spring, s, what the expansion in it misses, and how its motor begins."""
+
+    name: str
+    elastic: bool
+    time_constant: float
+    expansion_errors: list[float]
+    velocity_at_start: float
+
+
+class SimulatedLink(TypedDict):
+    """By how much a link errs in a simulation, under all of the torques, and without what accelerates the springs."""
+
+    name: str
+    unit: str
+    error: float | None
+    error_without_springs: float | None
+
+
+class FeedforwardResult(Result):
+    """jounce feedforward --json."""
+
+    command: Literal["feedforward"]
+    system: str
+    file: str
+    trajectory: str | None
+    time: Grid
+    drives: list[DriveFacts]
+    kept: bool
+    limits: list[LimitRow]
+    simulated: list[SimulatedLink] | None
+    written: str | None
+
+
+class BindingLimit(TypedDict):
+    """A limit that binds somewhere, for how long, and what it costs."""
+
+    limit: str
+    unit: str
+    seconds: float
+    price: float
+
+
+class RetimeResult(Result):
+    """jounce retime --json; the trajectory is the file of the path, null for a mechanism."""
+
+    command: Literal["retime"]
+    robot: str
+    file: str
+    trajectory: str | None
+    time: Grid
+    written: str | None
+    duration: float
+    before: float | None
+    path: str | None
+    deviation: float
+    deviation_allowed: float | None
+    kept: bool
+    drives: bool
+    limits: list[LimitRow]
+    ends: list[EndFacts]
+    hand_over: bool
+    binding: list[BindingLimit]
+    figure: str | None
+
+
+class SmoothedJointFacts(TypedDict):
+    """What smoothing made of the samples of a joint, SI; followed are frequencies, Hz, from which on nothing is."""
+
+    joint: str
+    noise: float
+    farthest: float
+    followed: list[float]
+    dwells: list[list[float]]
+
+
+class SmoothResult(Result):
+    """jounce smooth --json."""
+
+    command: Literal["smooth"]
+    file: str
+    trajectory: str
+    time: Grid
+    deviation: float
+    joints: list[SmoothedJointFacts]
+    follows_noise: list[str]
+    written: str | None
+    figure: str | None
