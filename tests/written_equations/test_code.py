@@ -38,7 +38,7 @@ def compiled(text, folder, name="mechanism"):
         return np.ascontiguousarray(values, float).ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
     def call(what, shape, *given):
-        out, kept = np.full(shape, np.nan), [np.ascontiguousarray(x, float) for x in given]
+        out, kept = np.full(shape, np.nan), [np.asarray(x, float, order="C") for x in given]
         values = [pointer(x) if x.ndim else ctypes.c_double(float(x)) for x in kept]
         orders = [shape[0]] if what in BY_ORDER else []
         getattr(functions, f"{name}_{what}")(*values, *orders, pointer(out))
