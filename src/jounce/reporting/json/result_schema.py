@@ -20,6 +20,7 @@ from jounce.reporting.json.robot_results import (
     EnergiesResult,
     FeedforwardResult,
     RetimeResult,
+    SmoothResult,
     TorquesResult,
 )
 from jounce.reporting.json.schema_parts import Extremes, Result, TorquePeak, Written
