@@ -100,3 +100,28 @@ def test_robots_and_quantities(run, tmp_path):
         status, _, message = run(*options)
         assert status == 2
         assert words in " ".join(message.split())
+
+
+@pytest.mark.slow
+def test_tables_have_masses_and_multipliers(run, tmp_path):
+    """Phi, Phi_q, right sides, multipliers and M of each format, of a motion that is simulated."""
+    text = example("double_pendulum").read_text()
+    file = tmp_path / "short.yaml"
+    file.write_text(text[: text.index("time:")] + "time: {start: 0, stop: 0.1, count: 3}\n")
+    motion = jn.simulate(jn.load(file))
+    expected = jn.constraint_equations(motion)
+    for ending in ("csv", "nc", "json"):
+        assert run(file, "--format", "table", "--out", tmp_path / f"values.{ending}")[0] == 0
+    table = np.genfromtxt(tmp_path / "values.csv", delimiter=",", names=True, deletechars="")
+    for name, values in {
+        "residual.A.1": expected.residual.sel(row="A.1"),
+        "jacobian.B.1.upper.angle": expected.jacobian.sel(row="B.1", column="upper.angle"),
+        "right_side_3.B.1": expected.right_side.sel(row="B.1", derivative=3),
+        "multipliers_1.B.2": expected.multipliers.sel(row="B.2", derivative=1),
+        "mass_matrix.upper.x.upper.angle": expected.mass_matrix.sel(column="upper.x", other_column="upper.angle"),
+    }.items():
+        np.testing.assert_array_equal(table[name], values.values)
+    stored = json.loads((tmp_path / "values.json").read_text())
+    assert set(stored) >= {"residual", "jacobian", "right_side", "multipliers", "mass_matrix", "velocities"}
+    with xarray.open_dataset(tmp_path / "values.nc") as found:
+        np.testing.assert_array_equal(found.multipliers, expected.multipliers)
