@@ -34,6 +34,35 @@ outputs:
   torque: {driver: shaft, quantity: torque}
 time: {start: 0, stop: 0.3, count: 31}
 """
+IN_SPACE = """
+space: spatial
+gravity: [0, -9.81, 0]
+bodies:
+  shaft: {position: [0, 0, 0], orientation: {axis: [0, 1, 0], angle: -90 deg}, mass: 1 kg, inertia: [0.004, 1, 1]}
+  follower: {position: [0, 46 mm, 0], mass: 1.3 kg, inertia: [0.1, 0.1, 0.1]}
+  rocker: {position: [0.2, 0, 0], orientation: {axis: [1, 1, 0], angle: 50 deg}, mass: 1 kg,
+    inertia: [0.02, 0.02, 0.02]}
+joints:
+  axle: {type: revolute, bodies: [ground, shaft], points: [[0, 0, 0], [0, 0, 0]], axes: [[0, 0, 1], [1, 0, 0]]}
+  guide: {type: prismatic, bodies: [ground, follower], points: [[0, 0, 0], [0, 0, 0]], axes: [[0, 1, 0], [0, 1, 0]],
+    normals: [[1, 0, 0], [1, 0, 0]]}
+  pivot: {type: revolute, bodies: [ground, rocker], points: [[0.2, 0, 0], [0, 0, 0]], axes: [[0, 0, 1], [1, -1, 0]]}
+  cam: {type: slide, bodies: [ground, follower], points: [[0, 46 mm, 0], [0, 0, 0]], vector: [0, 1, 0],
+    motion: {MOTION, of: LEADER}}
+  swing: {type: rotation, bodies: [ground, rocker], axis: [0, 0, 1], motion: {expression: t + 0.1*sin(2*t), of: LEADER}}
+drivers:
+  shaft: {type: rotation, bodies: [ground, shaft], axis: [0, 0, 1], vectors: [[1, 0, 0], [0.3, 0, -1]],
+    motion: 20*t + 0.3*sin(5*t)}
+forces:
+  spring: {type: slide_spring, bodies: [ground, follower], points: [[0, 0, 0], [0, 0, 0]], vector: [0, 1, 0],
+    stiffness: 5 kN/m, length: 30 mm}
+outputs:
+  theta: {bodies: [ground, shaft], quantity: angle, axis: [0, 0, 1], vectors: [[1, 0, 0], [0.3, 0, -1]]}
+  rocker: {bodies: [ground, rocker], quantity: angle, axis: [0, 0, 1]}
+  contact: {joint: cam, quantity: contact}
+  turning: {joint: swing, quantity: contact_torque}
+  torque: {driver: shaft, quantity: torque}
+"""
 SMOOTH = "expression: rise*(1 - cos(t))/2 + 0.001*sin(3*t)"
 RISES = (
     "profile: [{profile: cycloidal, duration: 120 deg, to: rise}, {profile: dwell, duration: 60 deg}, "
@@ -78,6 +107,52 @@ def test_contact_and_shaft_torque_with_rates(tmp_path, leader):
     for name, exact in zip(("contact", "torque"), expected(smooth, instants), strict=True):
         sizes = np.abs(exact).max(axis=0)
         np.testing.assert_allclose(found[name] / sizes, exact / sizes, rtol=0, atol=1e-11, err_msg=name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("leader", ["shaft", "theta"])
+def test_cams_in_space_know_angles_about_hinges(tmp_path, leader):
+    """A tappet on the shaft, and a rocker that goes a turn with each of it: frames askew, many turns."""
+    law = SMOOTH.replace("rise", "0.015")
+    instants = [-0.4, 0.02, 0.13, 1.07]
+    motion = jn.solve(load(tmp_path, law, leader, IN_SPACE), instants, order=4)
+
+    def angle(t):
+        return 20 * t + mpmath.mpf("0.3") * mpmath.sin(5 * t)
+
+    def swing(theta):
+        return theta + mpmath.mpf("0.1") * mpmath.sin(2 * theta)
+
+    def turning(t):
+        return mpmath.mpf("0.02") * mpmath.diff(lambda x: swing(angle(x)), t, 2)
+
+    def more(t):  # on the shaft, by the rocker
+        return turning(t) * mpmath.diff(swing, angle(t))
+
+    force, torque = expected(smooth, instants)
+    with mpmath.workdps(80):
+        told, added = (
+            np.array([[mpmath.diff(f, x, k) for k in range(5)] for x in instants], float) for f in (turning, more)
+        )
+    for name, exact in zip(("contact", "turning", "torque"), (force, told, torque + added), strict=True):
+        sizes = np.abs(exact).max(axis=0)
+        np.testing.assert_allclose(motion.outputs[name] / sizes, exact / sizes, rtol=0, atol=1e-10, err_msg=name)
+    bearing = jn.joint_reaction(motion, "swing", body="shaft", point=[0, 0, 0])
+    assert float(abs(bearing.force).max()) == 0
+
+
+@pytest.mark.parametrize(
+    "motion, leader, words",
+    [
+        ("expression: 0.01*t", "shaft", r"joints.cam.motion: must come back after a whole turn"),
+        ("piecewise: [{until: 90 deg, expression: 0.01}]", "shaft", "must come back after a whole turn"),
+        ("expression: sin(t)", "slanted", r"joints.cam.motion.of: the body does not turn about this axis"),
+    ],
+)
+def test_laws_and_axes_that_tell_no_angle_in_space_are_named_before_any_computing(tmp_path, motion, leader, words):
+    slanted = "\n  slanted: {type: rotation, bodies: [ground, shaft], axis: [0.3, 0, 1], motion: t}"
+    with pytest.raises(jn.errors.MechanismError, match=words):
+        jn.solve(load(tmp_path, motion, leader, IN_SPACE.replace("drivers:", f"drivers:{slanted}")), [0.0])
 
 
 def test_the_exercise_of_the_forum(tmp_path):

@@ -7,10 +7,10 @@ from typing import Any
 import equinox as eqx
 
 from jounce.constraints.base import AbstractConstraint, MotionLaw, Part
-from jounce.constraints.drivers import CoordinateDriver, SlideDriver, SpatialSlideDriver
+from jounce.constraints.drivers import CoordinateDriver, RotationDriver, SlideDriver, SpatialSlideDriver
 from jounce.constraints.facts import facts_of
 from jounce.errors import MechanismError
-from jounce.jet import Jet
+from jounce.jet import Jet, wrap
 from jounce.modules import is_ours
 
 AT_REST = 0.0  # the law of a driver of which the coordinate alone is meant
@@ -20,7 +20,9 @@ class Cam(AbstractConstraint):
     """A coordinate is a law of another one: a cam, which presses its follower and is pressed by it.
 
     The residual is the coordinate of the follower less the law of that of the leader. So the leader bears the force on
-    the follower times the slope of the law, whatever moves it.
+    the follower times the slope of the law, whatever moves it. An angle in space is that of a body about an axis by
+    which it is hinged; attitudes tell it up to whole turns, after which the law must come back, or an angle that
+    follows have gone whole turns.
 
     Parameters
     ----------
@@ -84,7 +86,13 @@ class Cam(AbstractConstraint):
 
     def residual(self, *bodies_and_time: Any) -> Jet:
         *bodies, _ = bodies_and_time
-        return self.evaluate(*bodies) - self.motion(self.leader.evaluate(*(bodies[k] for k in self.slots[1])))
+        excess = self.evaluate(*bodies) - self.motion(self.leader.evaluate(*(bodies[k] for k in self.slots[1])))
+        return wrap(excess) if turns_in_space(self.follower) else excess
+
+
+def turns_in_space(part: Any) -> bool:
+    """Tell whether the follower or the leader of a cam is an angle about an axis, known up to whole turns."""
+    return hasattr(part, "datum")
 
 
 def coordinate_of_element(element: Any, name: str = "leader") -> Any:
@@ -115,9 +123,6 @@ def coordinate_of_element(element: Any, name: str = "leader") -> Any:
     if not isinstance(element, AbstractConstraint) or not is_ours(kind.residual):
         message = "must be a driver, or a joint that turns or slides, of this package"
         raise MechanismError(f"{message}; a law of something else is a joint of your own", name=name, value=element)
-    if hasattr(element, "datum"):
-        message = "an angle about an axis in space leads no cam yet, and follows none; take a slide or a distance"
-        raise MechanismError(message, name=name, value=kind.type_name)
     if element.role == "driver" and hasattr(element, "evaluate"):
         return dataclasses.replace(element, motion=AT_REST)
     pair = facts_of(kind).pair
@@ -127,6 +132,8 @@ def coordinate_of_element(element: Any, name: str = "leader") -> Any:
         return SlideDriver(bodies, element.point_i, element.point_j, element.vector_i, AT_REST)
     if kind.space == "spatial" and kind.type_name == "prismatic":
         return SpatialSlideDriver(bodies, element.point_i, element.point_j, element.axis_i, AT_REST)
+    if kind.space == "spatial" and kind.type_name == "revolute":
+        return RotationDriver(bodies, element.axis_i, AT_REST)
     message = "has no coordinate that a cam could follow; name a driver, a pin, a slide, or an output"
     raise MechanismError(message, name=name, value=kind.type_name or kind.__name__)
 

@@ -17,15 +17,16 @@ from jax.core import Tracer
 
 from jounce.constraints import planar, spatial
 from jounce.constraints.angles import Datum, coaxial
+from jounce.constraints.cams import Cam, turns_in_space
 from jounce.constraints.facts import PAIRS, facts_of
 from jounce.constraints.ropes import Rope, distinct, shares_points
-from jounce.errors import JounceError, MechanismError, UnsupportedError
+from jounce.errors import JounceError, MechanismError
 from jounce.mechanism.mechanism import GROUND, Mechanism
 from jounce.mechanism.resolve import along_instances, resolve
 from jounce.mechanism.rope_lengths import check_ropes
 from jounce.mechanism.system import POSITION_COMPONENTS, Group, group_elements, holding
+from jounce.modules import with_fields
 
-LEAST_DIFFERENCE = 0.05  # of the radii of a belt's pulleys where no body carries both: less is a tiny part of a turn
 LARGEST_GAP = 1e-6  # of the distance of centers, as written numbers are rounded
 SAME_DIRECTION = 1e-9  # largest sine
 LARGEST_WHOLE = 1000  # of the whole numbers in a ratio of turns in space
@@ -63,67 +64,6 @@ def on_line(element: Any) -> bool:
     return is_toothed(element) or isinstance(element, planar.Belt)
 
 
-def check_gears(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None:
-    """Raise MechanismError unless what carries the gears of all groups was found, and ropes are as long as can be.
-
-    Parameters
-    ----------
-    groups : sequence of Group
-        Of joints and drivers.
-    names : sequence of sequence of str
-        Of the elements of each, with their kinds before them.
-    """
-    check_ropes(groups, names)
-    for group, members in zip(groups, names, strict=True):
-        if is_toothed(group.element) and group.element.arm is None:
-            message = (
-                "no body carries both gears: pin each gear at its center, by a revolute joint with the same point, to "
-                "one body, such as a carrier or the ground, so that the centers keep their distance"
-            )
-            raise MechanismError(message, name=f"{members[0]}.points")
-        if isinstance(group.element, planar.Belt) and group.element.arm is None:
-            _check_belts(group.element, members)
-        if isinstance(group.element, spatial.Gear) and None in (group.element.held_i, group.element.held_j):
-            slot = 0 if group.element.held_i is None else 1
-            message = (
-                f"the {('first', 'second')[slot]} gear does not turn about this axis in the frame, the third body: "
-                "hinge it there, or to a body that turns about the same axis, by joints that have the axis"
-            )
-            raise MechanismError(message, name=f"{members[0]}.axes")
-        if isinstance(group.element, spatial.Gear) and not isinstance(group.element.whole, Tracer):
-            odd = np.flatnonzero(np.isnan(group.element.whole))
-            if odd.size:
-                message = (
-                    f"must be one of whole numbers up to {LARGEST_WHOLE}, such as teeth, as attitudes tell angles up "
-                    "to whole turns only: write it as 22/37"
-                )
-                value = float(np.asarray(group.element.ratio).ravel()[odd[0]])
-                raise MechanismError(message, name=f"{members[odd[0]]}.ratio", value=value)
-
-
-def _check_belts(belts: planar.Belt, names: Sequence[str]) -> None:
-    """Raise MechanismError where belts cannot count the turns of their lines of centers."""
-    if isinstance(belts.ratio, Tracer):
-        return
-    apart = np.abs(1.0 - np.asarray(belts.ratio)).ravel()
-    odd = np.flatnonzero((apart > 0) & (apart < LEAST_DIFFERENCE))
-    if odd.size:
-        message = (
-            "radii that are nearly the same need one body that carries both pulleys, which counts the turns of the "
-            "line of centers: pin both to it, or make the radii equal"
-        )
-        values = [float(np.asarray(x).ravel()[odd[0]]) for x in (belts.radius_i, belts.radius_j)]
-        raise MechanismError(message, name=f"{names[odd[0]]}.radii", value=values)
-
-
-def check_ratios(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None:
-    """Raise UnsupportedError if JAX differentiates by a ratio of turns in space: whole turns are not known to it."""
-    for group, members in zip(groups, names, strict=True):
-        if isinstance(group.element, spatial.Gear) and isinstance(group.element.ratio, Tracer):
-            message = "a ratio of turns in space is not differentiated, as whole turns go with it; vary it instead"
-            raise UnsupportedError(message, name=f"{members[0]}.ratio")
-
-
 def grouped_with_frames(mechanism: Mechanism, elements: Mapping[str, Any]) -> Grouped:
     """Return the groups of some elements of a mechanism, by name with their kinds; gears with what carries them."""
     index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
@@ -142,6 +82,11 @@ def check_distances(mechanism: Mechanism) -> None:
     if any(isinstance(joint, Rope) for joint in joints.values()):
         check_ropes(*grouped_with_frames(mechanism, joints))
     _arms(mechanism, joints)
+
+
+def carriers(mechanism: Mechanism) -> set[str]:
+    """Return the bodies that carry gears with teeth, or both pulleys of a belt; the ground may be among them."""
+    return {arm.body for arm in _arms(mechanism, mechanism.joints).values()}
 
 
 def _arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, Arm]:
@@ -259,6 +204,8 @@ def _carried(
         return holding(group, "slots", distinct(elements[members[0]].bodies)[1])
     if isinstance(group.element, spatial.Gear):
         return _on_frames(group, [elements[name] for name in members], mechanism)
+    if isinstance(group.element, Cam):
+        return _on_hinges(group, [elements[name] for name in members], mechanism)
     return group
 
 
@@ -281,6 +228,31 @@ def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism
             axis, there = (along_instances(*vectors) for vectors in zip(*data, strict=True))
             group = holding(group, field, _coaxial(axis, there))
     return holding(group, "whole", _whole(group.element.ratio))
+
+
+def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group:
+    """Return cams of which the parts that are angles in space know the axis on both bodies, where it is found."""
+    hinges = None
+    for field in ("follower", "leader"):
+        if not turns_in_space(getattr(group.element, field)):
+            continue
+        hinges = _joined(mechanism, _held_parallel) if hinges is None else hinges
+        parts = [getattr(cam, field) for cam in cams]
+        axes = [_place(part.bodies[0], part.axis_i, mechanism.parameter_values) for part in parts]
+        found = [_reached(axis, hinges, _parallel).get(part.bodies[1]) for axis, part in zip(axes, parts, strict=True)]
+        if any(there is None for there in found):
+            continue
+        first, second = (along_instances(*(_vector(x.value) for x in its if x)) for its in (axes, found))
+        part, datum = getattr(group.element, field), _coaxial(first, second)
+        if part.vector_j is not None:  # what of it is along the axis turns nothing
+            datum = with_fields(datum, across=_across(part.vector_j, second))
+        group = holding(group, field, with_fields(part, datum=datum))
+    return group
+
+
+def _across(vector: Any, axis: Any) -> Any:
+    unit = axis / ((axis * axis).sum(axis=0) ** 0.5)
+    return vector - (vector * unit).sum(axis=0) * unit
 
 
 def _coaxial(axis: Any, there: Any) -> Datum:

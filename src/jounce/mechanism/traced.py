@@ -20,7 +20,7 @@ from jounce.errors import UnsupportedError
 from jounce.jet.turns import brought_near
 from jounce.mechanism.axis_angles import measures_angle
 from jounce.mechanism.builder import Model, grouped_elements, model_of, with_offsets, with_sense
-from jounce.mechanism.gear_frames import check_ratios
+from jounce.mechanism.gear_checks import check_ratios
 from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.preconditions import PLAIN
 from jounce.mechanism.resolve import resolve

@@ -88,9 +88,7 @@ def cam_types(space: str) -> dict[str, type[Any]]:
     ['coordinate', 'distance', 'slide']
     """
     return {
-        name: kind
-        for name, kind in catalogue(space, "driver").items()
-        if is_ours(kind) and hasattr(kind, "evaluate") and not hasattr(kind, "datum")
+        name: kind for name, kind in catalogue(space, "driver").items() if is_ours(kind) and hasattr(kind, "evaluate")
     }
 
 

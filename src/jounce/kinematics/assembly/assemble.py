@@ -33,7 +33,7 @@ from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
 from jounce.mechanism.builder import group_rows, with_reference
 from jounce.mechanism.carriages import ENDING
-from jounce.mechanism.gear_frames import check_gears
+from jounce.mechanism.gear_checks import check_gears
 from jounce.modules import with_fields
 from jounce.trajectory import AbstractMotion
 
