@@ -95,10 +95,16 @@ PICTURES = {
         module="own_joint.py",
         outline=("cam", pitch_curve),
     ),
+    "barrel_cam": Picture(
+        ("pin", "groove"), 0.06, points={"groove": ("drum", (-0.025, 0.0, 0.04))}, view=(-70.0, 20.0)
+    ),
     "belt_drive": Picture(("rim",), 0.3, points={"rim": ("tool", (0.0, 0.064))}),
     "block_and_tackle": Picture(("load",), 1.0, order=2),
     "camshaft": Picture(("roller",), 0.04, outline=("shaft", disc_cam)),
     "bicycle": Picture(("seat", "track"), 0.3, view=(-70.0, 14.0), stop=0.6),
+    "bevel_differential": Picture(
+        ("rim", "pinion"), 0.3, points={"pinion": ("spider", (0.02, 0, 0.025))}, view=(-60.0, 25.0)
+    ),
     "bennett": Picture(("B", "C"), 0.25, points={"B": ("BC", (0, 0, 0))}, view=(-60.0, 30.0)),
     "delta_robot": Picture(("platform",), 0.15, view=(-70.0, 18.0)),
     "rolling_disc_in_space": Picture(("center", "mark"), 0.3, view=(-60.0, 30.0), stop=2.0),
@@ -127,6 +133,7 @@ PICTURES = {
     "flyball_governor": Picture(("ball",), 0.02, points={"ball": ("right", (1, 0, 0))}, view=(-70.0, 20.0)),
     "four_bar": Picture(("C",), 0.3),
     "four_bar_in_space": Picture(("C",), 0.3, points={"C": ("rocker", (0.2031, 0, 0))}, view=(-75.0, 60.0)),
+    "garage_door": Picture(("bottom_roller", "top_roller"), 2.8),
     "gear_pair": Picture(("C",), 0.2),
     "hooke_joint": Picture(("rim",), 0.1, view=(-70.0, 40.0)),
     "human_arm": robot(
@@ -145,6 +152,7 @@ PICTURES = {
     "panda": robot("Franka Panda", "panda.urdf", "panda_pick.yaml", "panda_hand", (0, 0, 0.1), view=(-50.0, 15.0)),
     "pantograph": Picture(("P", "Q"), 0.1),
     "peaucellier": Picture(("P", "B"), 0.2),
+    "planetary_train": Picture(("tooth",), 0.4),
     "planar_arm": robot(
         "Planar arm", "planar_arm.xml", "planar_arm_lift.yaml", "ram", (0.25, 0, 0), view=(-80.0, 12.0)
     ),

@@ -175,6 +175,50 @@ def test_where_only_positions_count_a_wheel_is_refused_by_name():
         jn.solve_batch(jn.load(DISC), {"turn": [3.0, 4.0]}, [0.0, 1.0])
 
 
+@pytest.mark.parametrize(
+    "changes, words",
+    [
+        ({"normal_i": [0.0, 0.0, -1.0]}, r"joints\.roll\.plane\.normal: the center of the wheel is 0.178.* m behind"),
+        ({"axis_j": [0.0, np.sin(1.1), np.cos(1.1)]}, r"joints\.roll\.axis: the wheel lies flat on its plane"),
+    ],
+)
+def test_a_wheel_behind_its_plane_or_flat_on_it_is_named(changes, words):
+    disc = jn.load(DISC)
+    changed = dataclasses.replace(disc.joints["roll"], **changes)
+    with pytest.raises(jn.errors.MechanismError, match=words):
+        jn.simulate(dataclasses.replace(disc, joints={"roll": changed}), [0.0, 0.1])
+
+
+@pytest.mark.slow
+def test_a_wheel_on_a_plane_of_a_body_that_moves_rolls_as_it_does_seen_from_there():
+    """A disc upright on a cart that goes along: driven at w, it goes w r farther than the cart, and does not slip."""
+    level = {"mass": 2.0, "inertia": [0.1, 0.1, 0.1]}
+    bodies = {"cart": jn.Body(ORIGIN, **level), "wheel": jn.Body([0, 0, 0.7], **level)}
+    turn = [0.0, 0.6, 0.8]  # the plane is on a cart whose frame is drawn askew
+    half = np.array([1 + turn[2], -turn[1], turn[0], 0.0])
+    bodies["cart"] = dataclasses.replace(bodies["cart"], orientation=(half / np.linalg.norm(half)).tolist())
+    joints = {
+        "rail": spatial.Prismatic(("ground", "cart"), ORIGIN, ORIGIN, X, X, Z, turn),
+        "level": spatial.Dot1(("ground", "wheel"), X, Y),
+        "upright": spatial.Dot1(("ground", "wheel"), Z, Y),
+        "lane": spatial.Dot2(("ground", "wheel"), ORIGIN, ORIGIN, Y),
+        "roll": spatial.Wheel(("cart", "wheel"), ORIGIN, Y, 0.2, [0.5 * x for x in turn], turn),
+    }
+    motors = {
+        "haul": drivers.SpatialSlideDriver(("ground", "cart"), ORIGIN, ORIGIN, X, "0.3*t + 0.1*t**3"),
+        "spin": drivers.RotationDriver(("ground", "wheel"), Y, "2*t**2"),
+    }
+    outputs = {"place": jn.outputs.PointOutput("wheel", ORIGIN)}
+    made = jn.Mechanism(
+        space="spatial", gravity=[0, 0, -9.81], bodies=bodies, joints=joints, drivers=motors, outputs=outputs
+    )
+    found = jn.simulate(made, [0.0, 0.4, 1.0]).outputs["place"]
+    t = np.array([0.0, 0.4, 1.0])
+    expected = [0.3 * t + 0.1 * t**3 + 0.4 * t**2, 0.3 + 0.3 * t**2 + 0.8 * t, 0.6 * t + 0.8]
+    np.testing.assert_allclose(found[:, :3, 0], np.transpose(expected), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(found[:, 0, 2], 0.7, rtol=0, atol=1e-12)
+
+
 def test_a_file_has_the_plane_as_one_key(tmp_path):
     made = jn.load(DISC)
     wheel = made.joints["roll"]

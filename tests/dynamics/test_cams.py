@@ -1,6 +1,7 @@
 """Cams as joints: force on the follower, and what it does to the shaft, with rates, against closed forms in mpmath."""
 
 import dataclasses
+import shutil
 
 import mpmath
 import numpy as np
@@ -153,6 +154,62 @@ def test_laws_and_axes_that_tell_no_angle_in_space_are_named_before_any_computin
     slanted = "\n  slanted: {type: rotation, bodies: [ground, shaft], axis: [0.3, 0, 1], motion: t}"
     with pytest.raises(jn.errors.MechanismError, match=words):
         jn.solve(load(tmp_path, motion, leader, IN_SPACE.replace("drivers:", f"drivers:{slanted}")), [0.0])
+
+
+ROLLER = """
+space: planar
+gravity: [0, -9.81]
+parameters: {h: sqrt((18 + 8)**2 - 2**2)*1e-3}
+bodies:
+  shaft: {position: [0, 0], mass: 1, inertia: 0.001}
+  follower: {position: [0, h], mass: 0.3, inertia: 0.001}
+joints:
+  axle: {type: revolute, bodies: [ground, shaft], points: [[0, 0], [0, 0]]}
+  guide: {type: prismatic, bodies: [ground, follower], points: [[-2 mm, 0], [-2 mm, 0]], vectors: [[0, 1], [0, 1]]}
+  roller: {type: curve, bodies: [shaft, follower], curve: {cam: CAM}, point: [-2 mm, 0]}
+drivers:
+  motor: {type: coordinate, bodies: [ground, shaft], coordinate: angle, motion: -80*t}
+forces:
+  spring: {type: slide_spring, bodies: [ground, follower], points: [[0, 0], [0, 0]], vector: [0, 1], stiffness: 20 N/mm,
+    length: 15 mm}
+outputs:
+  on_roller: {joint: roller, quantity: reaction, body: follower}
+  bearing: {joint: axle, quantity: reaction, body: shaft}
+  torque: {driver: motor, quantity: torque}
+"""
+
+
+@pytest.mark.slow
+def test_a_roller_on_the_path_of_a_cam_file_loads_its_bearing_and_its_guide(tmp_path):
+    """The force of the law, and beside it as the pressure angle says; the torque of the shaft is its power."""
+    profile = jn.cams.load_cam("examples/cams/intake.yaml")
+    angle = np.radians([130.0, 155.0, 200.0])
+    shutil.copy("examples/cams/intake.yaml", tmp_path)
+    found = jn.solve(load(tmp_path, text=ROLLER.replace("CAM", "intake.yaml")), angle / 80, order=2).outputs
+    there = profile.at(angle)
+    rates = profile.law(jn.Jet.variable(angle, 2)).derivatives()
+    lift, slope, bend = (np.asarray(x) for x in rates)
+    height = np.sqrt(0.026**2 - 0.002**2) + lift
+    force = 0.3 * (bend * 80**2 + 9.81) + 20e3 * (height - 0.015)
+    np.testing.assert_allclose(found["on_roller"][:, 0, 1], force, rtol=1e-6)
+    aside = found["on_roller"][:, 0, 0] / found["on_roller"][:, 0, 1]
+    np.testing.assert_allclose(np.abs(aside), np.abs(np.tan(there.pressure_angle)), rtol=1e-6)
+    np.testing.assert_allclose(found["torque"][:, 0], -force * slope, rtol=1e-5)
+    np.testing.assert_allclose(found["bearing"][:, 0], found["on_roller"][:, 0] + [0, 9.81], rtol=1e-9)
+
+
+def test_a_flat_face_has_no_path_and_is_named(tmp_path):
+    shutil.copy("examples/cams/indexing_rocker.yaml", tmp_path)
+    with pytest.raises(jn.errors.MechanismFileError, match=r"joints.roller.curve.cam: a flat face touches the cam"):
+        load(tmp_path, text=ROLLER.replace("CAM", "indexing_rocker.yaml"))
+
+
+def test_a_driver_is_told_what_follows_it_as_a_signal(tmp_path):
+    (follows,) = (line for line in FILE.splitlines() if line.startswith("  cam:"))
+    text = FILE.replace(f"{follows}\n", "").replace("drivers:", f"drivers:\n{follows}")
+    text = text.replace("joint: cam, quantity: contact", "driver: cam, quantity: force")
+    found = jn.solve(load(tmp_path, text=text), [0.02, 0.13], order=2).dataset
+    assert "cam follows it as a signal does" in found["torque"].attrs["comment"]
 
 
 def test_the_exercise_of_the_forum(tmp_path):

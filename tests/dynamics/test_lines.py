@@ -410,3 +410,23 @@ def test_the_view_shows_strands_where_they_are():
         np.testing.assert_allclose(np.linalg.norm(on_tool - tool, axis=1), 0.04, rtol=1e-12)
     ropes = mechanism_appearance(jn.simulate(atwood(), [0.0, 0.1], order=2)).connectors
     assert [each.bodies for each in ropes] == [("a", "ground"), ("ground", "ground"), ("ground", "b")]
+
+
+@pytest.mark.parametrize("push, word", [(30.0, "undetermined"), (10.0, "held")])
+def test_an_equilibrium_on_a_rope_that_would_have_to_push_is_told(push, word):
+    """2 kg weigh 19.62 N: pushed up with 30 N they do not hang on the rope."""
+    joints = {
+        "guide": planar.Prismatic(("ground", "load"), [0, 0], [0, 0], [0, 1], [0, 1]),
+        "rope": Rope(("ground", "load"), [[0, 0], [0, 0]], 1.0),
+    }
+    hung = jn.Mechanism(
+        space="planar",
+        gravity=[0, -9.81],
+        bodies={"load": jn.Body([0, -1], mass=2.0, inertia=0.1)},
+        joints=joints,
+        forces={"push": jn.forces.PointForce("load", [0, 0], [0, push])},
+    )
+    found = jn.equilibrium(hung)
+    assert (found.stability, found.stable) == (word, None if word == "undetermined" else True)
+    assert ("joints.rope is slack, as it would have to push with 10.38 N" in found.reason) == (push > 19.62)
+    assert len(found.cautions) == (push > 19.62)

@@ -207,3 +207,40 @@ def test_torques_of_the_human_arm_by_virtual_work():
         found = mp_robot.State(arm, [mp_robot.motion(column) for column in sample.T]).forces()
         expected.append(np.array([[float(d) for d in torque.derivatives()] for torque in found]).T)
     near(jn.inverse_dynamics(robot, q), expected)
+
+
+@pytest.mark.slow
+def test_the_pin_of_a_barrel_cam_takes_the_power_of_its_motor():
+    """Of the slide at a cos(2 w t): its spring and its inertia, times the slope of the groove, are the torque."""
+    motion = solved("barrel_cam")
+    speed, half = 4 * np.pi, 0.025
+    angle = 2 * speed * motion.time
+    push = 2000.0 * (0.2 + half * np.cos(angle) - 0.15) - 3.0 * half * (2 * speed) ** 2 * np.cos(angle)
+    torque = -push * 2 * half * np.sin(angle)
+    np.testing.assert_allclose(motion.outputs["pin"][:, 0, 0], half * np.cos(angle), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(motion.outputs["press"][:, 0, 0], push, rtol=1e-11)
+    np.testing.assert_allclose(motion.outputs["torque"][:, 0], torque, rtol=0, atol=1e-11 * np.abs(torque).max())
+
+
+@pytest.mark.slow
+def test_planets_share_their_load_by_least_norm():
+    """90 N m at 54 mm, and what accelerates the carrier; a third of it on each pin, along its path."""
+    motion = solved("planetary_train")
+    arm, made = 0.054, motion.mechanism
+    pins = {f"pin{k}": jn.outputs.JointForceOutput(f"pin{k}", f"planet{k}") for k in (1, 2, 3)}
+    sizes = [np.linalg.norm(motion.evaluate(pin, name).values[0, 0]) for name, pin in pins.items()]
+    assert made.redundant_reactions == "least_norm"
+    speed = np.asarray(motion.outputs["carrier_angle"])
+    assert speed[0, 2] == 0
+    np.testing.assert_allclose(sizes, 90 / 3 / arm, rtol=1e-9)
+    np.testing.assert_allclose(motion.outputs["drive"][0, 0], 90 * 2 / 9, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_the_garage_door_lifts_its_weight():
+    """The force of the lift is what its work is: weights, cable and kinetic energy, by the positions alone."""
+    motion = solved("garage_door")
+    lift = np.asarray(motion.outputs["bottom_roller"])[:, 1, 1]
+    balance = jn.energy.power_balance(motion)
+    assert lift.max() > 0.5
+    assert (np.abs(balance["residual"]) <= 1e-9 * balance["scale"].max("time")).all()

@@ -1,6 +1,7 @@
-"""Whether gears, belts and cams have what carries and turns them, and ratios and laws that keep count of turns."""
+"""Whether gears, belts, cams and wheels have what they need: what carries and turns them, ratios and laws, a side."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import jax
 import numpy as np
@@ -11,11 +12,13 @@ from jounce.constraints.cams import Cam, turns_in_space
 from jounce.errors import MechanismError, UnsupportedError
 from jounce.jet import Jet
 from jounce.jet.turns import WHOLE_TURN
+from jounce.mechanism.axis_angles import turned
 from jounce.mechanism.gear_frames import LARGEST_WHOLE, WHOLE, is_toothed
 from jounce.mechanism.rope_lengths import check_ropes
 from jounce.mechanism.system import Group
 
 LEAST_DIFFERENCE = 0.05  # of the radii of a belt's pulleys where no body carries both: less is a tiny part of a turn
+FLAT = 1e-6  # sine of the angle between the axis of a wheel and the normal of its plane: less, and it lies on it
 TURN = np.linspace(-np.pi, np.pi, 128, endpoint=False)[None] + 0.0123  # rad, where laws of angles are looked at
 
 
@@ -99,6 +102,43 @@ def _check_cams(cams: Cam, names: Sequence[str]) -> None:
         if turns_in_space(cams.follower):
             message += "; an angle that follows may have gone whole turns"
         raise MechanismError(message, name=f"{names[int(odd[0])]}.motion")
+
+
+def check_wheels(groups: Sequence[Group], names: Sequence[Sequence[str]], guess: Mapping[str, Any]) -> None:
+    """Raise MechanismError where a wheel lies flat on its plane, or behind it, at the starting guess.
+
+    Parameters
+    ----------
+    groups : sequence of Group
+        Of joints and drivers.
+    names : sequence of sequence of str
+        Of the elements of each, with their kinds before them.
+    guess : dict of str to array
+        Coordinates of all bodies, the ground first, (..., bodies, 1).
+    """
+    for group, members in zip(groups, names, strict=True):
+        wheel = group.element
+        if not isinstance(wheel, spatial.Wheel):
+            continue
+        plane, own = (guess["quaternion"][:, list(bodies)] for bodies in group.bodies)
+        on_plane, center = (
+            guess["position"][:, list(bodies)] + turned(attitude, np.asarray(point))
+            for bodies, attitude, point in zip(group.bodies, (plane, own), (wheel.point_i, wheel.point_j), strict=True)
+        )
+        normal, axis = turned(plane, np.asarray(wheel.normal_i)), turned(own, np.asarray(wheel.axis_j))
+        sizes = np.linalg.norm(normal, axis=0) * np.linalg.norm(axis, axis=0)
+        flat = np.linalg.norm(np.cross(normal, axis, axis=0), axis=0) <= FLAT * sizes
+        height = ((center - on_plane) * normal).sum(axis=0) / np.linalg.norm(normal, axis=0)
+        for k, name in enumerate(members):
+            if flat[k, 0]:
+                message = "the wheel lies flat on its plane, where no point of its rim touches alone: tilt the body"
+                raise MechanismError(message, name=f"{name}.axis")
+            if height[k, 0] < 0:
+                message = (
+                    f"the center of the wheel is {-height[k, 0]:.4g} m behind its plane at the starting guess, and "
+                    "the normal leads from the plane to the wheel: reverse it, or guess the body on its side"
+                )
+                raise MechanismError(message, name=f"{name}.plane.normal")
 
 
 def check_ratios(groups: Sequence[Group], names: Sequence[Sequence[str]]) -> None:

@@ -126,7 +126,8 @@ class FollowingMotion(MadeOfOthers):
             law.check_instants(least, most)
         except JounceError as error:
             words = f"its leader goes from {least:.9g} to {most:.9g}: of that coordinate in the place of the time, "
-            raise type(error)(words + error.message, value=error.value) from None
+            message = error.message.replace(" s, and the law", ", and the law")  # rad or m
+            raise type(error)(words + message, value=error.value) from None
 
     def __call__(self, time: Jet) -> Jet:
         """Return the jet of the law at the instants of the time jet."""

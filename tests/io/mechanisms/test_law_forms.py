@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import jounce as jn
+from jounce.constraints import MotionLaw
 from jounce.io.mechanisms.writer import write_mechanism
+from tests.problems.own_types import taken_back
 
 TURNS = """
 title: Laws
@@ -140,3 +142,31 @@ def test_a_law_that_does_not_go_as_far_as_its_leader_is_named_before_any_computi
         jn.errors.MechanismError, match=r"drivers.wheel.motion: its leader goes from -3.14159265 to -1.14"
     ):
         jn.solve(mechanism, [0.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        "{profile: [{profile: cycloidal, duration: 90 deg, to: 45 deg}], beyond: hold}",
+        "{piecewise: [{until: 90 deg, expression: t/2 - sin(4*t)/8}, {expression: 45 deg}]}",
+        "{samples: table.csv, degree: 1, beyond: hold}",
+    ],
+)
+def test_laws_of_own_joints_are_of_what_they_are_called_with_in_any_unit(tmp_path, law):
+    joint = f"  own: {{type: law_of_an_angle, bodies: [crank, wheel], motion: {law}}}\ndrivers:"
+    driver = "  wheel: {type: coordinate, bodies: [ground, wheel], coordinate: angle, motion: MOTION}\n"
+    (tmp_path / "table.csv").write_text("angle [deg],value [deg]\n0,0\n45,22.5\n90,45\n")
+    path = tmp_path / "own.yaml"
+    path.write_text(TURNS.replace(driver, "").replace("drivers:", joint))
+    with taken_back():
+
+        class Follower(jn.joints.AbstractConstraint, type="law_of_an_angle", space="planar"):
+            motion: MotionLaw
+
+            dimensions = {"motion": "angle"}
+
+            def residual(self, body_i, body_j, time):
+                return body_j.angle - self.motion(body_i.angle)
+
+        found = wheel(jn.load(path), [math.pi / 2 + math.pi / 8, 3.0], order=0)[:, 0]
+    np.testing.assert_allclose(found, [math.pi / 8, math.pi / 4], atol=1e-12)

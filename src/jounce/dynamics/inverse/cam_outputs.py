@@ -7,7 +7,8 @@ import numpy as np
 
 from jounce.constraints import Cam
 from jounce.dynamics.inverse.motion_forces import MotionForces
-from jounce.dynamics.inverse.outputs import RATES, AbstractForceOutput, lift_off_words
+from jounce.dynamics.inverse.output_words import lift_off_words
+from jounce.dynamics.inverse.outputs import RATES, AbstractForceOutput
 from jounce.errors import MechanismError
 from jounce.kinematics import Motion
 from jounce.mechanism.driver_outputs import is_turning

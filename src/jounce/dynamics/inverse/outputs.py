@@ -1,6 +1,6 @@
 """Forces as outputs: of drivers along what they prescribe, of joints on their bodies, and applied ones, with rates."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
 import equinox as eqx
@@ -10,6 +10,15 @@ from jounce.constraints import Cam, Rope
 from jounce.constraints.base import Vector, by_ratio_alone
 from jounce.constraints.planar import Belt
 from jounce.dynamics.inverse.motion_forces import MotionForces
+from jounce.dynamics.inverse.output_words import (
+    belt_words,
+    cam_words,
+    following,
+    lift_off_words,
+    ratio_words,
+    signal_words,
+    slack_words,
+)
 from jounce.dynamics.inverse.tooth_flanks import flank_words
 from jounce.dynamics.masses import check_loads
 from jounce.errors import MechanismError, check_choice, check_name, did_you_mean
@@ -23,8 +32,6 @@ from jounce.mechanism.system import POSITION_COMPONENTS
 from jounce.shapes import ArrayLike, Numbers
 from jounce.trajectory import FollowingMotion
 
-ROUNDING = 1e-9  # of the largest force
-MOST_SHOWN = 4  # instants
 RATES = ("yank", "second rate", "third rate", "fourth rate")
 
 
@@ -77,28 +84,9 @@ class _DriverOutput(AbstractForceOutput):
         """Return why values are NaN, or where the force of a cam on its follower changes its sign."""
         if why := super().remark(motion, values):
             return why
-        if not isinstance(getattr(motion.mechanism.drivers[self.driver], "motion", None), FollowingMotion):
-            return ""
-        return lift_off_words(motion.time, values[:, 0])
-
-
-def lift_off_words(time: np.ndarray, forces: np.ndarray) -> str:
-    """Say before which instants the force of a cam on its follower changes its sign; nothing where it keeps it.
-
-    Examples
-    --------
-    >>> lift_off_words(np.array([0.0, 0.1, 0.2]), np.array([3.0, 1.0, -0.5]))
-    'changes its sign before t = 0.2 s: a follower that is pressed against a cam lifts off there'
-    """
-    known = np.isfinite(forces)
-    times, sign = time[known], np.sign(forces[known])
-    sign[np.abs(forces[known]) <= ROUNDING * np.max(np.abs(forces[known]), initial=0.0)] = 0.0
-    times, sign = times[sign != 0], sign[sign != 0]
-    changes = times[1:][sign[1:] != sign[:-1]]
-    if not changes.size:
-        return ""
-    where = ", ".join(f"{t:.4g} s" for t in changes[:MOST_SHOWN]) + (", ..." if len(changes) > MOST_SHOWN else "")
-    return f"changes its sign before t = {where}: a follower that is pressed against a cam lifts off there"
+        if isinstance(getattr(motion.mechanism.drivers[self.driver], "motion", None), FollowingMotion):
+            return lift_off_words(motion.time, values[:, 0])
+        return signal_words(following(motion.mechanism, self.driver))
 
 
 class DriverForceOutput(_DriverOutput):
@@ -127,30 +115,6 @@ class _Reaction(AbstractForceOutput):
     def is_vector(self, mechanism: Mechanism) -> bool:
         """Tell whether the reaction has components: a torque has in space."""
         return self.unit == "N" or mechanism.space == "spatial"
-
-
-def slack_words(time: np.ndarray, tensions: np.ndarray) -> str:
-    """Say at which instants a rope would have to push, where it is slack; nothing where it pulls.
-
-    Examples
-    --------
-    >>> slack_words(np.array([0.0, 0.1, 0.2]), np.array([3.0, 1.0, -0.5]))
-    'is below zero at t = 0.2 s: the rope is slack there, and holds nothing'
-    >>> slack_words(np.array([0.0, 0.1, 0.2, 0.3]), np.array([-3.0, -1.0, 0.5, -1.0]))
-    'is below zero from t = 0 s to 0.1 s, at 0.3 s: the rope is slack there, and holds nothing'
-    """
-    known = np.isfinite(tensions)
-    times, pushes = time[known], tensions[known] < -ROUNDING * np.max(np.abs(tensions[known]), initial=0.0)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], pushes, [False]]).astype(int)))
-    parts = []
-    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
-        alone = first == last
-        parts.append(f"at {times[first]:.4g} s" if alone else f"from {times[first]:.4g} s to {times[last]:.4g} s")
-    if not parts:
-        return ""
-    parts[0] = parts[0].replace(" ", " t = ", 1)
-    more = ", ..." if len(parts) > MOST_SHOWN else ""
-    return f"is below zero {', '.join(parts[:MOST_SHOWN])}{more}: the rope is slack there, and holds nothing"
 
 
 class _JointOutput(_Reaction):
@@ -200,24 +164,6 @@ class _JointOutput(_Reaction):
             return forces.reaction(self.joint, index(body), None if frame is None else index(frame), about)[part]
 
         return values_of(forces) if isinstance(element, AbstractForce) else forces.unique(values_of, size)
-
-
-def ratio_words(names: Sequence[str]) -> str:
-    """Say of joints that are given by a ratio alone what their reactions leave out; nothing where there are none."""
-    verb = "is" if len(names) == 1 else "are"
-    return f"{', '.join(names)} {verb} given by a ratio alone: bearings show no tooth forces" if names else ""
-
-
-def cam_words(names: Sequence[str]) -> str:
-    """Say of cams what the reactions of bearings leave out; nothing where there are none."""
-    verb = "is a law" if len(names) == 1 else "are laws"
-    return f"{', '.join(names)} {verb} between coordinates: bearings show no contact force" if names else ""
-
-
-def belt_words(names: Sequence[str]) -> str:
-    """Say of belts what the reactions of bearings leave out; nothing where there are none."""
-    words = "bearings show the difference of the pulls of its strands, not the tension with which it is put on"
-    return f"{', '.join(names)}: {words}" if names else ""
 
 
 def _exerting(mechanism: Mechanism, name: str) -> Any:

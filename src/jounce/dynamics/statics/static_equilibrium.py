@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from jounce.constraints import Rope
 from jounce.display import Displayed
 from jounce.dynamics.forward.initial_state import TOLERANCE
+from jounce.dynamics.inverse.outputs import JointForceOutput
 from jounce.dynamics.masses import check_loads
 from jounce.dynamics.statics.equilibrium_search import SearchResult, check_forces, remains, rest_point, search
 from jounce.dynamics.statics.independent_coordinates import OperatingPoint, Reduction, reduced
@@ -28,6 +30,7 @@ from jounce.robot.closed_loops.closures import GivenCoordinates
 from jounce.shapes import Real, Refused
 
 METHODS = ("settle", "newton")
+SLIGHT = 1e-9  # of the largest tension of a rope: less is rounding
 SINGULAR = "the position is singular, joints can move there that cannot elsewhere; what is near is not told"
 
 
@@ -106,7 +109,19 @@ class Equilibrium(Displayed):
             if self.degrees_of_freedom and not self.singular
             else []
         )
-        return (*kinks, *((SINGULAR,) if self.singular else ()))
+        return (*kinks, *((SINGULAR,) if self.singular else ()), *self._slack)
+
+    @cached_property
+    def _slack(self) -> tuple[str, ...]:
+        """Which ropes would have to push, which none does."""
+        ropes = [name for name, joint in self.mechanism.joints.items() if isinstance(joint, Rope)]
+        tensions = {name: float(JointForceOutput(name).coefficients(self.motion)[0, 0, 0]) for name in ropes}
+        size = max(map(abs, tensions.values()), default=0.0)
+        return tuple(
+            f"joints.{name} is slack, as it would have to push with {-tension:.4g} N: nothing stands there so"
+            for name, tension in tensions.items()
+            if tension < -SLIGHT * size
+        )
 
     @cached_property
     def _reduction(self) -> Reduction:
@@ -116,6 +131,8 @@ class Equilibrium(Displayed):
     def _verdict(self) -> Verdict:
         if self.singular:
             return Verdict("undetermined", SINGULAR)
+        if self._slack:
+            return Verdict("undetermined", "; ".join(self._slack))
         if not self.degrees_of_freedom:
             return Verdict("held", "nothing can move")
         r = self._reduction

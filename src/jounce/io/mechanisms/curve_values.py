@@ -10,6 +10,7 @@ from jounce.io.mechanisms.values import ANY_VALUE, Checked, defined, list_schema
 from jounce.trajectory import ParametricCurve
 
 EXPRESSION_KEYS, SAMPLE_KEYS = ("expressions", "range", "closed"), ("samples", "closed", "degree")
+CAM_KEYS = ("cam",)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,6 +20,13 @@ class CurvePoints:
     file: str
     closed: bool
     degree: int
+
+
+@dataclasses.dataclass(frozen=True)
+class CurveOfCam:
+    """The path of the roller, or of the edge, round a plate cam of a file that was not read yet."""
+
+    cam: str
 
 
 class _Reader:
@@ -31,6 +39,8 @@ class _Reader:
         """Return a curve, or the points of one that are in a file."""
         if not isinstance(raw, dict):
             return ParametricCurve(self._expressions(raw, info))
+        if "cam" in raw and self.size == 2:
+            return self._of_cam(raw)
         sampled = "samples" in raw and len(self.names) == 1
         valid = SAMPLE_KEYS if sampled else EXPRESSION_KEYS
         for key in raw.keys() - set(valid):
@@ -39,6 +49,13 @@ class _Reader:
         if not isinstance(closed, bool):
             raise problem("must be true or false", "closed", value=closed)
         return _points(raw, closed) if sampled else self._formula(raw, closed, info)
+
+    def _of_cam(self, raw: dict[str, Any]) -> CurveOfCam:
+        for key in raw.keys() - set(CAM_KEYS):
+            raise problem(unknown(f"key {show_value(key)}", key, CAM_KEYS), key, value=UNSET)
+        if not isinstance(raw["cam"], str):
+            raise problem("must be the name of a file of a cam", "cam", value=raw["cam"])
+        return CurveOfCam(raw["cam"])
 
     def _formula(self, raw: dict[str, Any], closed: bool, info: Any) -> ParametricCurve:
         if "expressions" not in raw:
@@ -90,5 +107,6 @@ def curve(names: tuple[str, ...], size: int) -> Any:
     ranged = object_schema({"expressions": whole, "range": pair, "closed": flag}, ("expressions",))
     degree = {"type": "integer", "minimum": 1, "maximum": 11}
     points = object_schema({"samples": {"type": "string"}, "closed": flag, "degree": degree}, ("samples",))
+    of_cam = [object_schema({"cam": {"type": "string"}}, CAM_KEYS)] if size == 2 else []
     word = f"curve_of_{size}_coordinates"
-    return Annotated[Any, Checked(_Reader(names, size), defined(word, {"anyOf": [whole, ranged, points]}))]
+    return Annotated[Any, Checked(_Reader(names, size), defined(word, {"anyOf": [whole, ranged, points, *of_cam]}))]

@@ -7,6 +7,7 @@ from typing import Any
 
 from jounce.io.files.located_data import Location
 from jounce.io.files.source import Source
+from jounce.io.mechanisms.curve_values import CurveOfCam
 from jounce.trajectory import (
     AbstractMotion,
     Expression,
@@ -50,6 +51,8 @@ class FileLaws:
             return value
         if hasattr(value, "file"):
             return self._curve(location, value)
+        if isinstance(value, CurveOfCam):
+            return self._curve_of_cam(location, value)
         if hasattr(value, "held"):
             fixed = self.law((*location, "law"), value.held, following)
             return OutputMotion(value.output, fixed if isinstance(fixed, AbstractMotion | Expression) else repr(fixed))
@@ -70,6 +73,21 @@ class FileLaws:
             return SampledCurve(read_points(path)[1], given.closed, given.degree)
 
         return self.source.read_named(given.file, location, through)
+
+    def _curve_of_cam(self, location: Location, given: CurveOfCam) -> SampledCurve:
+        from jounce.io.mechanisms.cam_files import load_cam
+
+        def path_of(file: str) -> SampledCurve:
+            profile = load_cam(file)
+            if profile.follower.is_flat:
+                message = (
+                    "a flat face touches the cam at another of its points all the time, which is no point on a curve: "
+                    "give its law with of: under joints"
+                )
+                raise self.source.error(message, (*location, "cam"), value=given.cam)
+            return SampledCurve(profile.table.pitch.T[:-1], closed=True)
+
+        return self.source.read_named(given.cam, (*location, "cam"), path_of)
 
     def of_cam(self, location: Location, value: Any) -> tuple[Any, str]:
         """Return the law of a cam, of its leader in the place of the time, and the name of the leader."""

@@ -63,11 +63,12 @@ class Samples(BaseModel):
     initial: tuple[Any, ...] = ()
     of: Any = None
     _bases: tuple[str, ...] = PrivateAttr(default=())
+    _free: bool = PrivateAttr(default=False)  # of whatever a class of a user's own calls it with
 
     @property
     def dimensions(self) -> tuple[tuple[Dimension, ...], tuple[Dimension, ...]]:
         """What units in the heading of the file may measure, of the time and of the value; anything where none is."""
-        if self.of is not None:
+        if self.of is not None or self._free:
             return rates(("angle", "length"), 0), () if self.derivative else rates(self._bases, 0)
         return (TIME,), rates(self._bases, self.derivative)
 
@@ -107,11 +108,16 @@ def cam_motion(quantity: str) -> Any:
     return Annotated[Any, Checked(check, plain.schema)]
 
 
-def motion(quantity: str, variables: dict[str, Dimension | None] | None = None) -> Any:
-    """Return the annotation of a law of time, and of other variables where there are some: of motion, or of a force."""
-    variables = {"t": TIME} if variables is None else variables
+def motion(quantity: str, variables: dict[str, Dimension | None] | None = None, *, free: bool = False) -> Any:
+    """Return the annotation of a law of time, and of other variables where there are some: of motion, or of a force.
+
+    A free law is of whatever a class of a user's own calls it with, in any unit.
+    """
+    variables = ({"t": None} if free else {"t": TIME}) if variables is None else variables
 
     def check(raw: object, info: Any) -> Any:
+        if free:
+            info = SimpleNamespace(context={**(info.context or {}), "lapse": "any"}, data=info.data)
         if not isinstance(raw, dict):
             return parse(raw, quantity, info, variables=variables).value
         form = next((key for key in FORMS if key in raw), None)
@@ -204,9 +210,11 @@ def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
     if not isinstance(initial, list | tuple) or len(initial) > derivative:
         message = f"must be a list of at most {derivative} values: the law and its derivatives below the measured one"
         raise problem(message, "initial", value=initial)
-    found = tuple(rate(entry, order, quantity, info, "initial", order) for order, entry in enumerate(initial))
+    lapse = (info.context or {}).get("lapse", "time")
+    orders = enumerate(initial)
+    found = tuple(rate(entry, order, quantity, info, "initial", order, by=lapse) for order, entry in orders)
     samples = Samples.model_validate(raw | {"initial": found, "of": leader(raw, info)})
-    samples._bases = tuple(bases(quantity, info))
+    samples._bases, samples._free = tuple(bases(quantity, info)), lapse == "any"
     return samples
 
 

@@ -37,6 +37,7 @@ from jounce.io.mechanisms.values import (
 )
 from jounce.mechanism.mechanism import NEAREST, SIDES, check_body_name, check_output_name
 from jounce.mechanism.system import POSITION_COMPONENTS
+from jounce.modules import is_ours
 from jounce.units.dimensions import variables_of
 from jounce.units.expression import PARAMETER_NAME, check_parameter_name
 
@@ -170,7 +171,7 @@ def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
         case "laws":
             return laws(size, key.quantity, variables_of(kind))
         case "motion":
-            return motion(key.quantity)
+            return motion(key.quantity, free=_has_free_laws(kind))
         case "scalar" if len(key.fields) == 1:
             return scalar(key.quantity)
         case "scalar":
@@ -191,6 +192,11 @@ def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
     choices = facts_of(kind).choices.get(key.fields[0])
     words = {"enum": list(choices)} if choices else {"type": "string"}
     return Annotated[Any, Checked(_text, words)]
+
+
+def _has_free_laws(kind: type[Any]) -> bool:
+    """Tell whether the laws of a class may be of anything: those of a joint of a user's own, which is no driver."""
+    return kind.role == "joint" and not is_ours(kind)
 
 
 def _values(kind: type[Any], size: int) -> dict[str, tuple[Any, Any]]:

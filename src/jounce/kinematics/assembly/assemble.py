@@ -33,7 +33,7 @@ from jounce.mechanism import Model
 from jounce.mechanism.axis_angles import measures_angle, with_angles, with_datums
 from jounce.mechanism.builder import group_rows, with_reference
 from jounce.mechanism.carriages import ENDING
-from jounce.mechanism.gear_checks import check_gears
+from jounce.mechanism.gear_checks import check_gears, check_wheels
 from jounce.modules import with_fields
 from jounce.trajectory import AbstractMotion
 
@@ -105,7 +105,9 @@ def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, Asse
     A guess in which directions that joints hold parallel are far from it may lead to a part that lies turned over, or
     nowhere: then the directions are drawn together first, in some ways until one does not end in a singular position.
     """
-    check_gears(model.system.groups, [model.rows[place] for place in group_rows(model)])
+    names = [model.rows[place] for place in group_rows(model)]
+    check_gears(model.system.groups, names)
+    check_wheels(model.system.groups, names, model.guess)
     best = _nearby(model, instant, tolerance)
     found = best[1]
     sought = axis_signs_to_try(model, found)

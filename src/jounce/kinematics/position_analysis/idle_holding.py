@@ -48,16 +48,26 @@ def spins_held(mechanism: Mechanism) -> dict[str, SpinHold]:
     return {name: joint for name, joint in mechanism.joints.items() if isinstance(joint, SpinHold)}
 
 
-def idle_words(idle: IdleMotions) -> str:
-    """Say which bodies may spin."""
-    return "; ".join(" and ".join(bodies) + (" as one" if len(bodies) > 1 else "") for bodies, _ in idle.values())
+def idle_words(idle: IdleMotions, *, axes: bool = False) -> str:
+    """Say which bodies may spin, and about which axes, in the frame of the first of each.
+
+    Examples
+    --------
+    >>> idle_words({"rod": (("rod", "cap"), (0.0, 0.6, 0.8))}, axes=True)
+    'rod and cap as one about [0, 0.6, 0.8] of rod'
+    """
+    told = []
+    for first, (bodies, axis) in idle.items():
+        about = f" about [{', '.join(f'{x + 0.0:.4g}' for x in axis)}] of {first}" if axes else ""
+        told.append(" and ".join(bodies) + (" as one" if len(bodies) > 1 else "") + about)
+    return "; ".join(told)
 
 
 def warn_of_idle(idle: IdleMotions) -> None:
     """Tell once which idle motions are held."""
     message = (
         f"nothing keeps these bodies from spinning about an axis of themselves, which moves nothing else: "
-        f"{idle_words(idle)}; they are held by the least motion, and no output depends on it"
+        f"{idle_words(idle, axes=True)}; they are held by the least motion, and no output depends on it"
     )
     warn_caller(IdleMotionWarning(message))
 

@@ -13,7 +13,7 @@ from typing_extensions import TypedDict
 from jounce.constraints import Cam
 from jounce.constraints.base import by_ratio_alone, value_fields
 from jounce.constraints.planar import Belt
-from jounce.dynamics.inverse.outputs import belt_words, cam_words, ratio_words
+from jounce.dynamics.inverse.output_words import belt_words, cam_words, ratio_words
 from jounce.errors import JounceError
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.output_types import OUTPUTS, output_holder

@@ -1,0 +1,96 @@
+"""What is told beside the values of forces: where they change sign, and what they leave out."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from jounce.mechanism import Mechanism
+from jounce.trajectory import FollowingMotion
+
+ROUNDING = 1e-9  # of the largest force
+MOST_SHOWN = 4  # instants
+
+
+def lift_off_words(time: np.ndarray, forces: np.ndarray) -> str:
+    """Say before which instants the force of a cam on its follower changes its sign; nothing where it keeps it.
+
+    Examples
+    --------
+    >>> lift_off_words(np.array([0.0, 0.1, 0.2]), np.array([3.0, 1.0, -0.5]))
+    'changes its sign before t = 0.2 s: a follower that is pressed against a cam lifts off there'
+    """
+    known = np.isfinite(forces)
+    times, sign = time[known], np.sign(forces[known])
+    sign[np.abs(forces[known]) <= ROUNDING * np.max(np.abs(forces[known]), initial=0.0)] = 0.0
+    times, sign = times[sign != 0], sign[sign != 0]
+    changes = times[1:][sign[1:] != sign[:-1]]
+    if not changes.size:
+        return ""
+    where = ", ".join(f"{t:.4g} s" for t in changes[:MOST_SHOWN]) + (", ..." if len(changes) > MOST_SHOWN else "")
+    return f"changes its sign before t = {where}: a follower that is pressed against a cam lifts off there"
+
+
+def following(mechanism: Mechanism, leader: str) -> list[str]:
+    """Return the drivers whose laws are of the coordinate of a driver, by its name, as they have the law of that."""
+    led = {name: getattr(driver, "motion", None) for name, driver in mechanism.drivers.items()}
+    laws = [(name, law.recipe.value[0][1]) for name, law in led.items() if isinstance(law, FollowingMotion)]
+    return [name for name, law in laws if law is led[leader] or repr(law) == repr(led[leader])]
+
+
+def signal_words(names: Sequence[str]) -> str:
+    """Say of drivers that follow another one what it does not feel; nothing where there are none.
+
+    Examples
+    --------
+    >>> signal_words(["cam"])
+    'cam follows it as a signal does, and it feels nothing of that: a cam that presses stands under joints'
+    """
+    if not names:
+        return ""
+    verb, plural = ("follows", "does") if len(names) == 1 else ("follow", "do")
+    return (
+        f"{', '.join(names)} {verb} it as a signal {plural}, and it feels nothing of that: a cam that presses stands "
+        "under joints"
+    )
+
+
+def slack_words(time: np.ndarray, tensions: np.ndarray) -> str:
+    """Say at which instants a rope would have to push, where it is slack; nothing where it pulls.
+
+    Examples
+    --------
+    >>> slack_words(np.array([0.0, 0.1, 0.2]), np.array([3.0, 1.0, -0.5]))
+    'is below zero at t = 0.2 s: the rope is slack there, and holds nothing'
+    >>> slack_words(np.array([0.0, 0.1, 0.2, 0.3]), np.array([-3.0, -1.0, 0.5, -1.0]))
+    'is below zero from t = 0 s to 0.1 s, at 0.3 s: the rope is slack there, and holds nothing'
+    """
+    known = np.isfinite(tensions)
+    times, pushes = time[known], tensions[known] < -ROUNDING * np.max(np.abs(tensions[known]), initial=0.0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], pushes, [False]]).astype(int)))
+    parts = []
+    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+        alone = first == last
+        parts.append(f"at {times[first]:.4g} s" if alone else f"from {times[first]:.4g} s to {times[last]:.4g} s")
+    if not parts:
+        return ""
+    parts[0] = parts[0].replace(" ", " t = ", 1)
+    more = ", ..." if len(parts) > MOST_SHOWN else ""
+    return f"is below zero {', '.join(parts[:MOST_SHOWN])}{more}: the rope is slack there, and holds nothing"
+
+
+def ratio_words(names: Sequence[str]) -> str:
+    """Say of joints that are given by a ratio alone what their reactions leave out; nothing where there are none."""
+    verb = "is" if len(names) == 1 else "are"
+    return f"{', '.join(names)} {verb} given by a ratio alone: bearings show no tooth forces" if names else ""
+
+
+def cam_words(names: Sequence[str]) -> str:
+    """Say of cams what the reactions of bearings leave out; nothing where there are none."""
+    verb = "is a law" if len(names) == 1 else "are laws"
+    return f"{', '.join(names)} {verb} between coordinates: bearings show no contact force" if names else ""
+
+
+def belt_words(names: Sequence[str]) -> str:
+    """Say of belts what the reactions of bearings leave out; nothing where there are none."""
+    words = "bearings show the difference of the pulls of its strands, not the tension with which it is put on"
+    return f"{', '.join(names)}: {words}" if names else ""
