@@ -47,7 +47,7 @@ def strut(**changes):
 
 @pytest.fixture(scope="module")
 def held():
-    with pytest.warns(jn.errors.IdleMotionWarning, match=r"strut about \[-0.0587, -0.2935, 0.9542\] of strut; rod"):
+    with pytest.warns(jn.errors.IdleMotionWarning, match=r"strut about \[-0.05872, -0.2936, 0.9541\] of strut; rod"):
         return jn.solve(strut(), [-1.0, -0.2, 0.4, 1.0])
 
 
