@@ -194,8 +194,8 @@ def test_a_wheel_on_a_plane_of_a_body_that_moves_rolls_as_it_does_seen_from_ther
     """A disc upright on a cart that goes along: driven at w, it goes w r farther than the cart, and does not slip."""
     level = {"mass": 2.0, "inertia": [0.1, 0.1, 0.1]}
     bodies = {"cart": jn.Body(ORIGIN, **level), "wheel": jn.Body([0, 0, 0.7], **level)}
-    turn = [0.0, 0.6, 0.8]  # the plane is on a cart whose frame is drawn askew
-    half = np.array([1 + turn[2], -turn[1], turn[0], 0.0])
+    turn = [0.0, 0.6, 0.8]  # upward in the frame of the cart, which is drawn askew
+    half = np.array([1 + turn[2], turn[1], 0.0, 0.0])
     bodies["cart"] = dataclasses.replace(bodies["cart"], orientation=(half / np.linalg.norm(half)).tolist())
     joints = {
         "rail": spatial.Prismatic(("ground", "cart"), ORIGIN, ORIGIN, X, X, Z, turn),

@@ -417,7 +417,7 @@ def test_an_equilibrium_on_a_rope_that_would_have_to_push_is_told(push, word):
     """2 kg weigh 19.62 N: pushed up with 30 N they do not hang on the rope."""
     joints = {
         "guide": planar.Prismatic(("ground", "load"), [0, 0], [0, 0], [0, 1], [0, 1]),
-        "rope": Rope(("ground", "load"), [[0, 0], [0, 0]], 1.0),
+        "rope": jn.joints.Rope(("ground", "load"), [[0, 0], [0, 0]], 1.0),
     }
     hung = jn.Mechanism(
         space="planar",

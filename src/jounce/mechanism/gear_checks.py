@@ -105,7 +105,7 @@ def _check_cams(cams: Cam, names: Sequence[str]) -> None:
 
 
 def check_wheels(groups: Sequence[Group], names: Sequence[Sequence[str]], guess: Mapping[str, Any]) -> None:
-    """Raise MechanismError where a wheel lies flat on its plane, or behind it, at the starting guess.
+    """Raise MechanismError where a wheel lies flat on its plane, or behind one of the ground, at the guess.
 
     Parameters
     ----------
