@@ -12,7 +12,7 @@ from jounce.execution.store import Store
 from jounce.execution.structure import UndescribedError, program_key
 from jounce.integrate.marching import marching
 from jounce.io import json_schema
-from jounce.jet import operations
+from jounce.jet.programs import operations
 from jounce.kinematics.continuation import continuation_steps, step_control
 
 REVOLUTE = jn.planar.Revolute

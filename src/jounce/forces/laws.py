@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from jounce.jet import Jet, stack
 from jounce.jet.algebra import Quantity
-from jounce.jet.read_methods import ReadObject
+from jounce.jet.programs.read_methods import ReadObject
 from jounce.modules import Module, changes_parts, is_ours
 from jounce.trajectory import AbstractMotion, Expression
 from jounce.trajectory.user_laws import ORDER, is_users

@@ -12,7 +12,6 @@ from jounce.jet.algebra import (
     sqrt as sqrt,
     stacked as stacked,
 )
-from jounce.jet.compose import compose as compose
 from jounce.jet.elementary import (
     absolute as abs,  # noqa: A004 - the name that expressions use
     acos as acos,
@@ -36,6 +35,7 @@ from jounce.jet.elementary import (
     tan as tan,
     tanh as tanh,
 )
+from jounce.jet.programs.composition import compose as compose
 from jounce.jet.turns import wrap as wrap
 from jounce.jet.vectors import (
     matmul as matmul,

@@ -1,7 +1,7 @@
 """Joints, drivers, forces and outputs of users: what their methods compute is read off when a model is built.
 
 An element of a user's class is replaced by one of a class made here, whose methods do what was read off; see
-`jounce.jet.read_methods`. It stays an instance of the user's class, and everything else of it is as it was.
+`jounce.jet.programs.read_methods`. It stays an instance of the user's class, and everything else of it is as it was.
 """
 
 import dataclasses
@@ -23,7 +23,7 @@ from jounce.errors import UnsupportedError
 from jounce.forces import AbstractForce
 from jounce.forces.laws import AbstractLaw, ReadLaw, is_users_law
 from jounce.jet import Jet
-from jounce.jet.read_methods import Reading, Verbatim, read_method
+from jounce.jet.programs.read_methods import Reading, Verbatim, read_method
 from jounce.mechanism.outputs import AbstractOutput
 from jounce.mechanism.resolve import stack_elements
 from jounce.modules import changes_parts, is_ours, unchecked, with_fields

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.jet import Jet
-from jounce.jet.compose import Composed
+from jounce.jet.programs.composition import Composed
 from jounce.trajectory.checks import whole_number
 from jounce.trajectory.composed import FollowingMotion, OutputMotion
 from jounce.trajectory.integrated import IntegratedMotion

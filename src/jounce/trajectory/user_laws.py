@@ -6,8 +6,8 @@ import jax
 import jax.numpy as jnp
 
 from jounce.jet import Jet
-from jounce.jet.compose import Composed
-from jounce.jet.read_methods import ReadObject
+from jounce.jet.programs.composition import Composed
+from jounce.jet.programs.read_methods import ReadObject
 from jounce.modules import changes_parts, is_ours
 from jounce.trajectory.motion import AbstractMotion, FunctionMotion
 

@@ -36,7 +36,7 @@ from jounce.dynamics.forward.saddle_point import (
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.jet import Jet
 from jounce.jet.algebra import total
-from jounce.jet.series import Recursion
+from jounce.jet.programs.series import Recursion
 from jounce.linear_algebra.least_squares import range_basis
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.axis_angles import with_turns

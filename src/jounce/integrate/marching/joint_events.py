@@ -13,7 +13,7 @@ from jounce.errors import RobotError, check_name
 from jounce.execution.chunks import in_chunks
 from jounce.integrate.marching.robot_marching import RobotSteps
 from jounce.integrate.steps.events import EDGE, INTERPOLATION, NODES, WIDTHS, crossings
-from jounce.jet.compose import OfSample
+from jounce.jet.programs.composition import OfSample
 from jounce.robot.model.arguments import whole_number
 from jounce.robot.robot import Robot
 

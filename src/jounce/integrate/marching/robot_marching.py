@@ -14,7 +14,7 @@ from jounce.execution.compilation import compiled
 from jounce.integrate.marching.marching import SHORT as UNUSUAL, Outcome
 from jounce.integrate.steps.lookahead import HARMLESS, NEAR, POINTS, RUN_POINTS, SHORTEST, finest, steps_counted
 from jounce.integrate.steps.methods import MARGIN, NEEDED, ROUNDING, Lanes, furthest
-from jounce.jet.series import Recursion
+from jounce.jet.programs.series import Recursion
 from jounce.modules import Module
 from jounce.robot.algorithms.motion_series import MotionSeries, motion_series
 from jounce.robot.algorithms.wrench_laws import WrenchLaws

@@ -9,8 +9,8 @@ from typing import Any
 
 from jax.extend.core import ClosedJaxpr, Literal
 
-from jounce.jet.operations import ADDITIVE, REARRANGING
-from jounce.jet.programs import inner_program
+from jounce.jet.programs.operations import ADDITIVE, REARRANGING
+from jounce.jet.programs.reader import inner_program
 
 MAX_DEGREE = 8  # of what is moving: a power such as x**40 is flat, and then a wall
 SUMS = (ADDITIVE | REARRANGING | frozenset(["neg", "optimization_barrier"])) - {"select_n", "gather", "dynamic_slice"}

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Int
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet
 from jounce.jet.algebra import total
-from jounce.jet.series import Recursion
+from jounce.jet.programs.series import Recursion
 from jounce.linear_algebra.linear import DenseFactor
 from jounce.mechanism.starting_guess import pose_at
 from jounce.mechanism.system import System

@@ -17,7 +17,7 @@ from jounce.errors import RobotError
 from jounce.integrate import RobotSimulation, simulate
 from jounce.integrate.steps.options import SimulationOptions
 from jounce.jet import Jet
-from jounce.jet.compose import OfSample
+from jounce.jet.programs.composition import OfSample
 from jounce.planning.elastic.driven_systems import robot_drives
 from jounce.planning.elastic.drives import Drive, DriveArrays
 from jounce.planning.elastic.motor_torques import MOTOR, torques_of

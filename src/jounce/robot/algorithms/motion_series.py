@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jounce.jet.series import Recursion
+from jounce.jet.programs.series import Recursion
 from jounce.robot.recursions.tree_equations import TreeEquations, TreeFactor, TreeState, Unknowns, Wrenches
 
 Series = Any

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.errors import RobotError
-from jounce.jet.compose import OfSample
+from jounce.jet.programs.composition import OfSample
 from jounce.modules import Module
 from jounce.robot.algorithms.wrenches import Wrench, check_wrenches
 from jounce.robot.model.arguments import floats

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from jounce.errors import JounceError, RobotError, check_name
 from jounce.jet import Jet
-from jounce.jet.compose import OfSample
+from jounce.jet.programs.composition import OfSample
 from jounce.modules import Module
 from jounce.robot.model.arguments import floats
 from jounce.shapes import ArrayLike, Numbers

@@ -1,7 +1,7 @@
 """The equations of motion of a tree, written once on plain values: what its joints need for given accelerations.
 
-Vectors are in the axes of the base of the scene, and belong to the origins of the bodies. `jounce.jet.series` runs this
-program order after order, and all that is not a sum along branches is done for all bodies side by side.
+Vectors are in the axes of the base of the scene, and belong to the origins of the bodies. `jet.programs.series` runs
+this program order after order, and all that is not a sum along branches is done for all bodies side by side.
 """
 
 import dataclasses

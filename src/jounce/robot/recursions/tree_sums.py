@@ -18,7 +18,7 @@ BaseVector = Float[Numbers, "component batch"]
 def sums_at_parents(tree: Tree, own: BodyVectors, base: BaseVector) -> BodyVectors:
     """Return the sum over all bodies from the base to the parent of each body, that of the base included.
 
-    Only sums and moves are used, so that `jounce.jet.series` runs the loop over the bodies as it is at every order.
+    Only sums and moves are used, so that `jet.programs.series` runs the loop over the bodies as it is at every order.
     """
 
     def outward(state: Any, entry: Any) -> tuple[Any, Any]:

@@ -10,8 +10,8 @@ import numpy as np
 from jax.extend.core import JaxprEqn
 from jaxtyping import Int
 
-from jounce.jet.operations import COMPOSED
-from jounce.jet.programs import ProgramReader
+from jounce.jet.programs.operations import COMPOSED
+from jounce.jet.programs.reader import ProgramReader
 from jounce.written_equations.operations.graph import REAL, TRUTH, WHOLE, Graph
 
 MOST_ENTRIES = 200_000  # of a table

@@ -1,4 +1,4 @@
-"""How the operations of JAX programs act on Taylor series: tables of `jounce.jet.compose` and `jounce.jet.series`."""
+"""How the operations of JAX programs act on Taylor series: tables of `composition` and `series`."""
 
 import math
 from collections.abc import Callable

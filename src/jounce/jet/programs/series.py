@@ -22,8 +22,18 @@ import numpy as np
 from jax.extend.core import JaxprEqn
 
 from jounce.jet.coefficients import minus, plus, total
-from jounce.jet.operations import ADDITIVE, BROADCASTING, COMPOSED, LINEAR, PAIRS, PLAIN, SLOPES, STEPWISE, times
-from jounce.jet.programs import ProgramReader, only_adds
+from jounce.jet.programs.operations import (
+    ADDITIVE,
+    BROADCASTING,
+    COMPOSED,
+    LINEAR,
+    PAIRS,
+    PLAIN,
+    SLOPES,
+    STEPWISE,
+    times,
+)
+from jounce.jet.programs.reader import ProgramReader, only_adds
 
 _BLOCK = 8  # terms of a sum taken at once
 

@@ -1,7 +1,5 @@
 """Composition of jets with JAX functions: against mpmath, or against the same function written on jets."""
 
-import importlib
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,10 +8,10 @@ from mpmath import mp
 
 import jounce as jn
 from jounce import jet
-from jounce.jet.operations import COMPOSED, REARRANGING
+from jounce.jet.programs import composition
+from jounce.jet.programs.operations import COMPOSED, REARRANGING
 from tests.oracles.mp_taylor import DIGITS, composed, worst
 
-composition = importlib.import_module("jounce.jet.compose")  # the package shows the function under this name
 AT = 0.7
 X, Y = jnp.array([0.0, 1.0, 3.0]), jnp.array([0.0, 2.0, -1.0])
 M = jnp.array([[1.0, 2.0], [3.0, 4.0]])

@@ -7,7 +7,7 @@ import numpy as np
 from jax.core import Tracer
 from jax.extend.core import ClosedJaxpr, JaxprEqn
 
-from jounce.jet.captured import Pass, parameters_of, told_array
+from jounce.jet.programs.captured import Pass, parameters_of, told_array
 
 _SPREADING = frozenset("add add_any sub mul div max min pow atan2 select_n".split())  # which take single numbers too
 

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jax.extend.core import JaxprEqn, Literal
 
 from jounce.jax_internals import sizes_of_scan
-from jounce.jet.operations import ADDITIVE, REARRANGING
+from jounce.jet.programs.operations import ADDITIVE, REARRANGING
 
 
 class ProgramReader(abc.ABC):

@@ -9,8 +9,8 @@ from mpmath import mp
 import jounce as jn
 from jounce.execution.compilation import compiler_options
 from jounce.jet import Jet, elementary
-from jounce.jet.operations import COMPOSED, LINEAR, PAIRS, SLOPES, STEPWISE
-from jounce.jet.series import Recursion
+from jounce.jet.programs.operations import COMPOSED, LINEAR, PAIRS, SLOPES, STEPWISE
+from jounce.jet.programs.series import Recursion
 from tests.oracles import mp_taylor
 
 ORDER = 6

@@ -16,10 +16,10 @@ import numpy as np
 from jax.extend.core import JaxprEqn
 
 from jounce.jet.algebra import Jet, bilinear
-from jounce.jet.captured import Program, read_off
 from jounce.jet.elementary import FUNCTIONS, erf, tanh
-from jounce.jet.operations import COMPOSED, REARRANGING, STEPWISE
-from jounce.jet.programs import ProgramReader, inner_program
+from jounce.jet.programs.captured import Program, read_off
+from jounce.jet.programs.operations import COMPOSED, REARRANGING, STEPWISE
+from jounce.jet.programs.reader import ProgramReader, inner_program
 from jounce.modules import Module
 
 
