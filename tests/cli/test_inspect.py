@@ -376,3 +376,33 @@ def test_reactions_that_are_not_unique_are_nan_and_told(run, tmp_path):
         table = {name: [line.split(",")[k] for line in lines] for k, name in enumerate(header.split(","))}
         for name, nan in (("bearing_x", open_), ("bearing_z", False), ("torque", False)):
             assert all((text in ("", "nan", "NaN")) == nan for text in table[name]), name
+
+
+def test_coordinates_as_another_program_numbers_them():
+    path = EXAMPLES / "robots" / "solo12.urdf"
+    status, data, _ = facts("inspect", path, "--as", "pinocchio")
+    other = data["other_reader"]
+    assert status == 0
+    assert (other["positions"], other["velocities"], other["version"]) == (12, 12, "4.1")
+    assert sorted(other["indices"]) == list(range(12))
+    assert [joint["joint"] for joint in other["joints"]] == sorted(joint["joint"] for joint in other["joints"])
+    _, out, _ = run("inspect", path, "--as", "pinocchio")
+    assert f"velocities of pinocchio = ours[{other['indices']}]" in out
+    _, out, _ = run("inspect", EXAMPLES / "robots" / "panda.urdf", "--as", "drake")
+    assert "unless it is welded to the world" in out
+    assert "a constraint holds it there" in out
+
+
+@pytest.mark.parametrize(
+    "arguments, says",
+    [
+        ((EXAMPLES / "robots" / "panda.urdf", "--as", "kdl"), "--as: unknown reader, got 'kdl'"),
+        ((EXAMPLES / "robots" / "five_bar.xml", "--as", "drake"), "has not been looked at"),
+        ((FOUR_BAR, "--as", "drake"), "--as: is for robot files"),
+        ((FOUR_BAR, "--model", "a"), "--model: is for robot files"),
+    ],
+)
+def test_programs_that_are_not_known_are_refused(arguments, says):
+    status, _, err = run("inspect", *arguments)
+    assert status == 2
+    assert says in err

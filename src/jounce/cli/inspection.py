@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -24,6 +24,8 @@ def inspect(
     json: bool = False,
     range_: Annotated[bool, Parameter(name="--range")] = False,
     driver: str | None = None,
+    as_: Annotated[str | None, Parameter(name="--as")] = None,
+    model: str | None = None,
 ) -> int:
     """Tell what is in a mechanism or robot file, and whether it can move.
 
@@ -46,50 +48,91 @@ def inspect(
         Tell how far a driver can go, and the transmission there.
     driver
         Whose range, where there are several.
+    as_
+        Tell how another program numbers the coordinates of a robot file:
+        pinocchio, mujoco, drake, pybullet or yourdfpy.
+    model
+        Which model of an SDF file that holds several.
 
     Examples
     --------
       jounce inspect examples/six_bar_watt.yaml
       jounce inspect examples/four_bar.yaml --range
       jounce inspect examples/robots/panda.urdf --json
+      jounce inspect examples/robots/solo12.urdf --as pinocchio
     """
     from jounce.reporting.text.summaries import start_heading, start_summary
     from jounce.reporting.text.tables import bodies_table, mechanism_tables, robot_tables
 
-    suffix = file.suffix.lower()
     with expecting(file, "mechanism", "robot"):
         check_ending(file, (*DATA_FILES, *ROBOT_FILES))
-    if suffix in ROBOT_FILES:
-        if reading.set_:
-            raise JounceError("is for mechanism files; a robot file has no parameters", name="--set", path=file)
-        if reading.units:
-            raise JounceError("is for mechanism files; results for robots are in SI units", name="--units", path=file)
-        from jounce.reporting.facts.robot_facts import inspected_robot
-
-        facts = inspected_robot(RobotReading(strict=strict, allow=reading.allow).robot(file), file)
+    if file.suffix.lower() in ROBOT_FILES:
+        facts = _robot(file, reading, model, as_, strict=strict)
     else:
-        if strict:
-            raise JounceError("is for robot files; mechanism files are always read so", name="--strict", path=file)
-        from jounce.reporting.facts.mechanism_facts import inspected
-
-        mechanism = reading.mechanism(file)
-        with errors_about(file):
-            facts = inspected(mechanism, file)
-            if range_ and facts["ok"]:
-                from jounce.reporting.facts.range_facts import range_facts
-
-                with options_named():
-                    facts["range"] = range_facts(mechanism, driver)
+        for name, given in (("--strict", strict or None), ("--as", as_), ("--model", model)):
+            if given is not None:
+                raise JounceError("is for robot files", name=name, path=file)
+        facts = _mechanism(file, reading, driver, range_=range_)
     if json:
         say_json("inspect", facts)
     else:
         say(start_heading(facts))
-        robot = facts["kind"] == "robot"
-        for table in robot_tables(facts) if robot else mechanism_tables(facts, bodies_table(facts)):
+        of_robot = facts["kind"] == "robot"
+        for table in robot_tables(facts) if of_robot else mechanism_tables(facts, bodies_table(facts)):
             show_table(table)
+        if "other_reader" in facts:
+            _show_other_reader(facts["other_reader"])
         say(f"\n{start_summary(facts)}")
         if range_found := facts.get("range"):
             from jounce.reporting.facts.range_facts import range_words
 
             say(f"\n{range_words(dict(range_found))}")
     return 0 if facts["ok"] else 1
+
+
+def _robot(
+    file: Path, reading: MechanismReading, model: str | None, reader: str | None, *, strict: bool
+) -> dict[str, Any]:
+    """Return what is in a robot file, and how another program numbers its coordinates."""
+    if reading.set_:
+        raise JounceError("is for mechanism files; a robot file has no parameters", name="--set", path=file)
+    if reading.units:
+        raise JounceError("is for mechanism files; results for robots are in SI units", name="--units", path=file)
+    from jounce.reporting.facts.robot_facts import inspected_robot, other_reader
+
+    robot = RobotReading(strict=strict, allow=reading.allow, model=model).robot(file)
+    facts = inspected_robot(robot, file)
+    if reader is not None:
+        try:
+            facts["other_reader"] = other_reader(reader, file, robot)
+        except JounceError as error:
+            error.name = "--as" if error.name == "reader" else error.name
+            raise
+    return facts
+
+
+def _mechanism(file: Path, reading: MechanismReading, driver: str | None, *, range_: bool) -> dict[str, Any]:
+    """Return what is in a mechanism file, and how far a driver goes."""
+    from jounce.reporting.facts.mechanism_facts import inspected
+
+    mechanism = reading.mechanism(file)
+    with errors_about(file):
+        facts: dict[str, Any] = inspected(mechanism, file)
+        if range_ and facts["ok"]:
+            from jounce.reporting.facts.range_facts import range_facts
+
+            with options_named():
+                facts["range"] = range_facts(mechanism, driver)
+    return facts
+
+
+def _show_other_reader(facts: dict[str, Any]) -> None:
+    from jounce.reporting.text.tables import other_reader_table
+
+    show_table(other_reader_table(facts))
+    if facts["indices"] is not None:
+        plain = all(factor == 1 for factor in facts["factors"])
+        times = "" if plain else f"{[round(x, 12) for x in facts['factors']]} * "
+        say(f"\n  velocities of {facts['name']} = {times}ours[{facts['indices']}]")
+    if facts["note"]:
+        say(f"\n  {facts['note']}")

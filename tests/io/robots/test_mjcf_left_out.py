@@ -170,3 +170,16 @@ def test_of_the_examples_nothing_is_left_out(name):
         found = load_robot(FILES / f"{name}.xml")
     assert told == []
     assert load_robot(FILES / f"{name}.xml", strict=True).joint_names == found.joint_names != ()
+
+
+def test_a_weld_of_bodies_that_are_fixed_already_is_left_out(tmp_path):
+    path = tmp_path / "robot.xml"
+    geom = '<geom size="0.1"/>'
+    path.write_text(
+        f'<mujoco><worldbody><body name="a"><joint/>{geom}<body name="b">{geom}</body></body></worldbody>'
+        '<equality><weld name="w" body1="a" body2="b"/></equality></mujoco>'
+    )
+    with pytest.warns(jn.errors.RobotWarning, match="closures of links that are fixed to one another: w"):
+        assert not jn.load_robot(path).closures
+    with pytest.raises(jn.errors.RobotFileError, match="a and b are fixed to one another, and need no closure"):
+        jn.load_robot(path, strict=True)

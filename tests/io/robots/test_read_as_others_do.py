@@ -26,8 +26,11 @@ def read(tmp_path, text, **options):
 DECLARED = '<?xml version="1.0"?>\n'
 TOLD = {
     "two hyphens": (DECLARED + "<!-- -- a -- -->\n" + arm(), "two hyphens within a comment (line 2)"),
-    "blank line": ("\n" + DECLARED + arm(), "blank lines before the declaration <?xml (line 2)"),
+    "blank line": ("\n" + DECLARED + arm(), "lines before the declaration <?xml (line 2)"),
+    "comment first": ("<!-- a\n-->\n" + DECLARED + arm(), "lines before the declaration <?xml (line 3)"),
+    "macro call": (arm(more="\n<xacro:camera name='c'/>"), "not expanded: <xacro:camera> (line 2)"),
     "zero bytes": (arm() + "\n\0\0", "zero bytes at the end (line 2)"),
+    "closed twice": (arm() + "\n</robot>\n", "text after the end of its root element (line 2)"),
     "unknown": (arm(inside="\n<controller_gains k_p='3'/>"), "<controller_gains> of j (line 2)"),
     "reversed": (arm(limit='<limit lower="1" upper="-1" velocity="2"/>'), "taken for no range: j (line 1)"),
     "no velocity": (arm(limit='<limit lower="-1" upper="1" velocity="-1"/>'), "taken for none: j (line 1)"),
@@ -54,6 +57,20 @@ def test_text_that_no_reader_takes_is_refused_as_before(tmp_path):
         read(tmp_path, "<!-- -- -->" + arm().replace("</joint>", ""))
     with pytest.raises(jn.errors.RobotFileError, match="is not a text file"):
         read(tmp_path, arm().replace("base", "ba\0se"))
+
+
+@pytest.mark.parametrize("tag", ["include", "macro", "property"])
+def test_a_source_of_xacro_is_refused(tmp_path, tag):
+    with pytest.raises(jn.errors.RobotFileError, match=r"is a xacro file.*run: xacro"):
+        read(tmp_path, arm(more=f"<xacro:{tag} name='c'/><xacro:c/>"))
+
+
+def test_a_spherical_joint_is_three_turns(tmp_path):
+    """As MuJoCo and Bullet have it: the torque at rest is the weight on its lever, about the moved axes."""
+    text = arm(limit="").replace('"revolute"', '"spherical"').replace('<axis xyz="0 0 1"/>', "")
+    robot = read(tmp_path, text, strict=True)
+    assert robot.joint_names == ("j_angle_1", "j_angle_2", "j_angle_3")
+    np.testing.assert_allclose(jn.inverse_dynamics(robot, np.zeros((3, 3)))[0], [0, -9.81 * 0.1, 0], atol=1e-15)
 
 
 def test_the_world_need_not_be_a_link(tmp_path):
@@ -88,8 +105,9 @@ def test_rotors_of_drake_seen_through_their_gears(tmp_path):
 def test_links_out_of_gravity(tmp_path):
     off = "<gazebo reference='a'><turnGravityOff>true</turnGravityOff></gazebo>"
     upright = arm(more=off).replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"')
-    torque = np.asarray(jn.inverse_dynamics(read(tmp_path, upright, strict=True), np.zeros((3, 1))))
-    np.testing.assert_allclose(torque, 0, atol=1e-14)
+    with pytest.warns(jn.errors.RobotWarning, match="takes out of gravity, which other readers of URDF count: a"):
+        robot = read(tmp_path, upright)
+    np.testing.assert_allclose(jn.inverse_dynamics(robot, np.zeros((3, 1))), 0, atol=1e-14)
 
 
 def five_bar(loop):

@@ -227,7 +227,9 @@ def test_damping_and_friction_of_joints_of_several_coordinates_are_told_of(tmp_p
     zero = small(tmp_path, f'type="{kind}"><dynamics damping="0" friction="0"/>')
     load_robot(zero, strict=True)
     path = small(tmp_path, f'type="{kind}"><dynamics {key}="0.5"/>')
-    with pytest.warns(jn.errors.RobotWarning, match=rf"{key} of planar and floating joints: j \(line 1\); make"):
+    with pytest.warns(
+        jn.errors.RobotWarning, match=rf"{key} of planar, floating and spherical joints: j \(line 1\); make"
+    ):
         robot = load_robot(path)
     assert not any(joint.damping or joint.friction for joint in robot.joints.values())
     with pytest.raises(RobotFileError, match=rf"line 1, joints\.j\.dynamics\.{key}: .* without {key} of .*, got 0\.5"):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from jounce.errors import RobotFileError, RobotWarning
 from jounce.rigid.inertia import ADVICE, NEGATIVE, TRIANGLE, WITHOUT_MASS, Inertia
 
@@ -21,6 +23,12 @@ HEADINGS = {
     WITHOUT_MASS: "moments of inertia have no mass beside them",
 }
 UNKNOWN = "elements that their formats do not have"
+TWICE = "elements that are given twice, of which the first counts"
+FLUID_MASS = "the mass of the fluid that links move (<fluid_added_mass>)"
+MACROS = "macros of xacro that are not expanded"
+LOOSE = "these links are joined to the base by nothing, and move freely, each by six coordinates"
+RENAMED = "joints have the name of a link, and are called NAME_joint, as the reference library of SDF does"
+FIXED_ALREADY = "closures of links that are fixed to one another"
 NOT_XML = "text that is not XML, read as other readers do"
 JOINT_SPRINGS = "springs of joints"
 BUSHINGS = "<drake:linear_bushing_rpy> between links"
@@ -50,8 +58,8 @@ class Faults:
 
     def __init__(self, path: str, strict: bool = False):
         self.path, self.strict = path, strict
-        self.names: dict[str, list[str]] = {}
-        self.unread: dict[str, list[str]] = {}
+        self.names: dict[str, dict[str, None]] = {}  # what is noted under each heading, each once
+        self.unread: dict[str, dict[str, None]] = {}
 
     def add(self, heading: str, name: str, error: RobotFileError) -> None:
         """Note a fault of a link or joint.
@@ -73,11 +81,11 @@ class Faults:
         """
         self._note(self.unread, heading, name, error)
 
-    def _note(self, names: dict[str, list[str]], heading: str, name: str, error: RobotFileError) -> None:
+    def _note(self, names: dict[str, dict[str, None]], heading: str, name: str, error: RobotFileError) -> None:
         if self.strict:
             raise error
         line = "" if error.line is None else f" (line {error.line})"
-        names.setdefault(heading, []).append(ascii(name)[1:-1] + line)
+        names.setdefault(heading, {})[ascii(name)[1:-1] + line] = None
 
     def check(self, inertia: Inertia, link: str, line: int | None) -> None:
         """Note what is wrong with the inertia of a link."""
@@ -102,6 +110,7 @@ class Faults:
         return RobotWarning(f"{self.path}: {'; '.join(parts)}; {advice} with strict=True (--strict)")
 
 
-def _listed(names: list[str], most: int) -> str:
+def _listed(noted: Iterable[str], most: int) -> str:
+    names = list(noted)
     more = len(names) - most
     return ", ".join(names if more <= 0 else [*names[:most], f"and {more} more"])

@@ -11,7 +11,7 @@ from jounce.errors import RobotFileError
 from jounce.io.files import ROBOT_FILES
 from jounce.io.files.reading import check_allowed
 from jounce.io.robots.closure_files import with_closures
-from jounce.io.robots.faults import Faults
+from jounce.io.robots.faults import MACROS, Faults
 from jounce.io.robots.mjcf import read_mjcf
 from jounce.io.robots.sdf import read_sdf
 from jounce.io.robots.urdf import read_urdf
@@ -20,6 +20,7 @@ from jounce.robot.robot import Robot
 from jounce.settings import under_own_settings
 
 SHAPES = ("visual", "collision")
+XACRO_SOURCE = ("xacro:include", "xacro:macro", "xacro:property", "xacro:arg", "xacro:if", "xacro:unless")
 XACRO = "is a xacro file, from which a URDF has yet to be made; run: xacro FILE.urdf.xacro > FILE.urdf"
 
 
@@ -102,7 +103,7 @@ def load_robot(
     if model is not None and root.tag != "sdf":
         raise root.error("only an SDF file holds models to choose from; leave the name of one out", value=model)
     if root.tag == "robot":
-        _check_expanded(root)
+        _check_expanded(root, faults)
         robot = read_urdf(root, faults, massless)
     elif root.tag == "mujoco":
         if suffix != ".xml":
@@ -122,10 +123,15 @@ def load_robot(
     return _released(robot, "ZYX" if floating_base is True else floating_base, name)
 
 
-def _check_expanded(root: Element) -> None:
-    """Refuse what xacro has yet to work out, where it bears on links and joints."""
+def _check_expanded(root: Element, faults: Faults) -> None:
+    """Refuse what xacro has yet to work out, where it bears on links and joints; calls left in a URDF are noted."""
     used = [root]
+    source = any(child.tag in XACRO_SOURCE for child in root.children) or root.first("link") is None
     for child in root.children:
+        if child.tag.startswith("xacro:") and not source:
+            message = f"{child.tag} is not expanded, and what it stands for is left out; run xacro, or take it out"
+            faults.leave_out(MACROS, f"<{child.tag}>", child.error(message, value=f"<{child.tag}>"))
+            continue
         if child.tag in ("link", "joint"):
             used += [element for part in child.children if part.tag not in SHAPES for element in part.walk()]
         if child.tag in ("link", "joint") or child.tag.startswith("xacro:"):

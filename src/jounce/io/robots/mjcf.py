@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import JounceError, RobotError, RobotFileError
-from jounce.io.robots.faults import Faults, left_out
+from jounce.io.robots.faults import FIXED_ALREADY, Faults, left_out
 from jounce.io.robots.followers import with_room
 from jounce.io.robots.mjcf_drives import Drives
 from jounce.io.robots.mjcf_files import check_assets, check_copies, included, line_of, quiet_mujoco
@@ -237,7 +237,13 @@ class _Reader:
             location = {"path": self.root.path, "line": lines[k], "name": f"equality.{name}" if name else "equality"}
             self.lines[f"closures.{names[k]}"] = lines[k]
             if kind in (int(kinds.mjEQ_CONNECT), int(kinds.mjEQ_WELD)):
-                self.closures.append(self._closure(k, names[k]))
+                closure = self._closure(k, names[k])
+                rigid = [int(model.body_weldid[self.bodies.index(link)]) for link in closure.links]
+                if rigid[0] == rigid[1]:
+                    message = f"{closure.links[0]} and {closure.links[1]} are fixed to one another, and need no closure"
+                    self.faults.leave_out(FIXED_ALREADY, names[k], RobotFileError(message, **location))
+                else:
+                    self.closures.append(closure)
                 continue
             if kind == int(kinds.mjEQ_JOINT):
                 self.ties.add_joints(k, location)

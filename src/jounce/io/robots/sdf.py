@@ -13,13 +13,13 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError
 from jounce.io.robots.closure_files import CLOSED_BY
-from jounce.io.robots.faults import Faults
+from jounce.io.robots.faults import LOOSE, Faults
 from jounce.io.robots.followers import with_room
 from jounce.io.robots.named_elements import NamedElements
-from jounce.io.robots.sdf_joints import AXIS_TAGS, SdfJoint, read_joint
+from jounce.io.robots.sdf_joints import AXIS_TAGS, SdfJoint, pitch_of, read_joint
 from jounce.io.robots.sdf_left_out import note_left_out
 from jounce.io.robots.sdf_links import gravity_of, read_inertia
-from jounce.io.robots.sdf_models import chosen_model, named
+from jounce.io.robots.sdf_models import chosen_model
 from jounce.io.robots.sdf_poses import (
     HERE,
     WORLD,
@@ -31,12 +31,13 @@ from jounce.io.robots.sdf_poses import (
     only,
     text_of,
 )
+from jounce.io.robots.sdf_scopes import named
 from jounce.io.robots.xml_elements import Element
 from jounce.robot.model.floating_base import floating_joints
 from jounce.robot.model.links_and_joints import Closure, Joint, Link, Mimic, leaders
 from jounce.robot.robot import Robot
 
-TREE_FIRST = ("fixed", "revolute", "continuous", "prismatic", "universal", "revolute2", "ball")
+TREE_FIRST = ("fixed", "screw", "revolute", "continuous", "prismatic", "universal", "revolute2", "ball")
 OF_AXIS = ("armature", "damping", "friction", "stiffness", "spring_reference")
 AXIS_TOLERANCE = 1e-5  # files give directions with six digits
 DRAKE_MIMIC = "drake:mimic"
@@ -52,7 +53,7 @@ def read_sdf(
     part of it, their links and joints under names such as ``arm::elbow``. The base is the link ``world`` if a joint
     holds the model there or it is static, else the model's canonical link. Gravity is that of the world in the file, or
     else 9.81 m/s^2 along its -z; links may be out of it.
-    Joints of one axis come into the tree before those of two, and balls last, each kind in the order of the file; what
+    Screws come into the tree first, then joints of one axis, of two, balls last, each in the order of the file; what
     closes a loop then is a closure: a revolute joint a pin, a prismatic one a slider, a ball a point, a fixed one a
     weld. A joint of the tree whose child is nearer the base is taken the other way round, about the opposite axis, so
     that its coordinate stays that of the file. A universal joint becomes two turns, a ball three about moving axes z,
@@ -61,7 +62,9 @@ def read_sdf(
     reads are armature. A link without ``<inertial>`` weighs 1 kg, as
     SDF says; there is a warning of it. Sensors and plugins are left out, and limits of a joint that closes a loop; of
     springs, damping and friction there, and of decaying velocities, which are left out too, there is a warning. So
-    there is of a static model whose joints move: a simulator holds it still, and here its joints have coordinates.
+    there is of a static model whose joints move: a simulator holds it still, and here its joints have coordinates. A
+    screw is a turn and a travel that follows it. Links that nothing joins to the base have six coordinates, which are
+    zero where the file places them; of that there is a warning.
 
     Parameters
     ----------
@@ -149,11 +152,7 @@ class _Reader:
                 group[link] = link = group[group[link]]
             return link
 
-        if fixed and not any(WORLD in (joint.parent, joint.child) for joint in joints):
-            link = self.frames.canonical_link()
-            origin = self.frames.pose(link).position
-            joints = [SdfJoint(self._unused(f"{link}_{WORLD}"), "fixed", WORLD, link, origin, (), self.model), *joints]
-        chosen = set()
+        joints, chosen = list(joints), set()
         for joint in sorted(joints, key=lambda joint: TREE_FIRST.index(joint.kind)):
             first, second = head(joint.parent), head(joint.child)
             if first != second:
@@ -161,8 +160,10 @@ class _Reader:
                 chosen.add(joint.name)
         for link in links:
             if head(link) != head(base):
-                element = self.elements[link]
-                raise element.error(f"is joined to {base} by nothing; give it a joint", "links", link)
+                loose = self._loose(link, base, fixed)
+                joints.append(loose)
+                group[head(link)] = head(base)
+                chosen.add(loose.name)
         tree, reached = [], {base}
         waiting = [joint for joint in joints if joint.name in chosen]
         while waiting:
@@ -176,6 +177,15 @@ class _Reader:
                     later.append(joint)
             waiting = later
         return tree, [joint for joint in joints if joint.name not in chosen]
+
+    def _loose(self, link: str, base: str, fixed: bool) -> SdfJoint:
+        """Return what joins a link to the base where the file does not: nothing moves in a static model."""
+        element, origin = self.elements[link], self.frames.pose(link).position
+        if fixed:
+            return SdfJoint(self._unused(f"{link}_{WORLD}"), "fixed", WORLD, link, origin, (), self.model)
+        message = f"is joined to {base} by nothing; give it a joint, or take it for free without strict"
+        self.faults.add(LOOSE, link, element.error(message, "links", link))
+        return SdfJoint(link, "free", base, link, origin, (), element)
 
     def _unused(self, name: str) -> str:
         while name in self.taken:
@@ -204,7 +214,7 @@ class _Reader:
         self, joint: SdfJoint, child: str, rotation: Float[np.ndarray, "3 3"], mimics: dict[str, Mimic]
     ) -> list[Joint]:
         """Return the joints that one stands for, from its parent to the link given, all at one place."""
-        if joint.kind == "ball":
+        if joint.kind in ("ball", "free"):
             return self._turns(joint, child)
         if joint.kind == "fixed":
             return [Joint(joint.name, joint.parent, child, "fixed")]
@@ -222,11 +232,24 @@ class _Reader:
             arguments: dict[str, Any] = {"axis": direction, "limits": axis.limits, "mimic": mimics.get(name)}
             arguments |= {field: getattr(axis, field) for field in OF_AXIS}
             made.append(Joint(name, start, end, kind, **arguments))
+        if joint.kind == "screw":
+            made = self._screw(joint, made[0], child)
         return made
 
+    def _screw(self, joint: SdfJoint, turn: Joint, child: str) -> list[Joint]:
+        """Return the turn of a screw and the travel along its axis, which follows."""
+        between = self._unused(f"{joint.name}_frame")
+        self.links.append(Link(between))
+        pitch = pitch_of(joint.element, "joints", joint.name)
+        leader = turn.mimic or Mimic(joint.name)
+        travel = Mimic(leader.joint, pitch * leader.multiplier, pitch * leader.offset)
+        slide = Joint(self._unused(f"{joint.name}_travel"), between, child, "prismatic", axis=turn.axis, mimic=travel)
+        return [dataclasses.replace(turn, child=between), slide]
+
     def _turns(self, joint: SdfJoint, child: str) -> list[Joint]:
-        """Return the three turns of a ball, with names that nothing else in the file has."""
-        turns, parent = floating_joints(child, prefix=joint.name)[1][3:], joint.parent
+        """Return the three turns of a ball, or all that a free link does, with names that nothing else has."""
+        turns, parent = floating_joints(child, prefix=joint.name)[1], joint.parent
+        turns = turns[3:] if joint.kind == "ball" else turns
         for k, turn in enumerate(turns):
             end = child if turn is turns[-1] else self._unused(turn.child)
             if end != child:

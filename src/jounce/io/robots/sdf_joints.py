@@ -26,6 +26,7 @@ from jounce.robot.model.links_and_joints import Limits
 
 AXIS_TAGS = ("axis", "axis2")
 AXES = {"revolute": 1, "continuous": 1, "prismatic": 1, "fixed": 0, "universal": 2, "revolute2": 2, "ball": 0}
+AXES |= {"screw": 1}
 UNBOUNDED = 1e16  # SDF writes it for no bound
 JOINT = ("parent", "child", "pose", "axis", "axis2", "physics", "sensor", "plugin", "frame", "thread_pitch")
 JOINT += ("screw_thread_pitch", "gearbox_ratio", "gearbox_reference_body")
@@ -73,9 +74,6 @@ def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, 
     check_known(element, JOINT, *where)
     kind = element.text("type", *where, "type")
     valid = (*AXES, "gearbox")
-    if kind == "screw":
-        message = "a screw joint is no joint of a robot; convert the robot to a mechanism and add a screw there"
-        raise element.error(message, *where, "type", value=kind)
     if kind not in valid:
         raise element.error(no_such("joint", kind, valid, "type"), *where, "type", value=kind)
     ends = []
@@ -89,6 +87,25 @@ def read_joint(name: str, element: Element, frames: Frames, version: tuple[int, 
     armature = rotor_of(element, *where) if len(tags) == 1 else 0.0
     axes = tuple(_axis(needed(element, tag, *where), origin, frames, version, armature, *where, tag) for tag in tags)
     return SdfJoint(name, kind, ends[0], ends[1], origin.position, axes, element)
+
+
+def pitch_of(element: Element, *where: str) -> float:
+    """Return how far a screw joint travels along its axis for a radian, m/rad.
+
+    ``screw_thread_pitch`` is the travel of a turn, right-handed; the older ``thread_pitch`` counts radians for a meter,
+    left-handed. Without both the travel of a turn is 1 m.
+
+    Raises
+    ------
+    RobotFileError
+        A value is no number, or the older one is zero.
+    """
+    if (old := only(element, "thread_pitch", *where)) and not only(element, "screw_thread_pitch", *where):
+        radians = number_of(element, "thread_pitch", *where, default=1.0)
+        if radians == 0:
+            raise old.error("must not be zero: it counts radians for a meter", *where, "thread_pitch", value=radians)
+        return -1.0 / radians
+    return number_of(element, "screw_thread_pitch", *where, default=1.0) / (2 * math.pi)
 
 
 def rotor_of(element: Element, *where: str) -> float:
@@ -112,13 +129,10 @@ def _axis(
     xyz = only(axis, "xyz", *where)
     direction = np.array([0.0, 0.0, 1.0]) if xyz is None else vector_of(xyz, *where, "xyz")
     frame = "" if xyz is None else xyz.attributes.get("expressed_in", "")
-    if frame and frame != MODEL and frame not in frames.elements:
-        message = no_such("link, joint or frame", frame, frames.elements)
-        raise (xyz or axis).error(message, *where, "xyz", value=frame)
     old = version < (1, 7)
     if old and flag_of(axis, "use_parent_model_frame", *where, default=version < (1, 5)):
         frame = MODEL
-    rotation = frames.pose(frame).rotation if frame else pose.rotation
+    rotation = frames.of(frame, xyz or axis, *where, "xyz").rotation if frame else pose.rotation
     limit, dynamics = only(axis, "limit", *where), only(axis, "dynamics", *where)
     for part, known in ((limit, LIMIT), (dynamics, DYNAMICS)):
         if part is not None:

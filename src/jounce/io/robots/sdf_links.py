@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from jounce.io.robots.faults import PARTLY_INERTIAL, WITHOUT_INERTIAL, Faults
+from jounce.io.robots.faults import FLUID_MASS, PARTLY_INERTIAL, WITHOUT_INERTIAL, Faults, left_out
 from jounce.io.robots.sdf_poses import Frames, check_known, number_of, only, pose_of
 from jounce.io.robots.sdf_shapes import inertia_of_shapes
 from jounce.io.robots.xml_elements import Element
@@ -30,7 +30,7 @@ def read_inertia(name: str, element: Element, frames: Frames, faults: Faults) ->
         return Inertia(1.0, tensor=np.eye(3))
     where = (*where, "inertial")
     check_known(inertial, INERTIAL, *where)
-    _check_readable(name, inertial, *where)
+    _check_readable(name, inertial, faults, *where)
     if inertial.attributes.get("auto", "false").strip() in ("true", "1"):
         inertia = inertia_of_shapes(name, element, inertial, frames, faults)
         faults.check(inertia, name, inertial.line)
@@ -53,8 +53,8 @@ def read_inertia(name: str, element: Element, frames: Frames, faults: Faults) ->
     return inertia.moved(*pose_of(inertial, *where))
 
 
-def _check_readable(name: str, inertial: Element, *where: str) -> None:
-    """Refuse what changes the inertia of a link and is not read."""
+def _check_readable(name: str, inertial: Element, faults: Faults, *where: str) -> None:
+    """Refuse an inertia that is placed elsewhere, and note the mass of a fluid, which is left out."""
     pose, added = only(inertial, "pose", *where), only(inertial, "fluid_added_mass", *where)
     given = {} if pose is None else pose.attributes
     frame = given.get("relative_to") or given.get("frame") or name
@@ -62,9 +62,9 @@ def _check_readable(name: str, inertial: Element, *where: str) -> None:
         message = "an inertia is placed in the frame of its link, relative to nothing else"
         raise pose.error(message, *where, "pose", value=frame)
     for entry in [] if added is None else added.children:
-        if entry.content_numbers(1, *where, added.tag if added else "", entry.tag)[0]:
-            message = "the mass of a fluid that a link moves is not read; leave <fluid_added_mass> out"
-            raise entry.error(message, *where, "fluid_added_mass")
+        if value := entry.content_numbers(1, *where, added.tag if added else "", entry.tag)[0]:
+            error = entry.error(left_out(FLUID_MASS), *where, "fluid_added_mass", value=value)
+            faults.leave_out(FLUID_MASS, name, error)
 
 
 def _check_whole(name: str, inertial: Element, moments: Element | None, faults: Faults) -> None:

@@ -12,26 +12,23 @@ import re
 from collections.abc import Iterable, Iterator
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from jounce.errors import RobotFileError, no_such
 from jounce.io.files.reading import named_file
-from jounce.io.robots.faults import Faults
+from jounce.io.robots.faults import RENAMED, Faults
 from jounce.io.robots.sdf_joints import with_named_axes
-from jounce.io.robots.sdf_poses import MODEL, WORLD, FramePose, Frames, check_known, flag_of, only, pose_of
+from jounce.io.robots.sdf_poses import MODEL, WORLD, FramePose, Frames, check_known, flag_of, only
+from jounce.io.robots.sdf_scopes import made, named, placed, reference_pose, scope, scoped
 from jounce.io.robots.xml_elements import Element, read_markup
 
 MODEL_PARTS = ("static", "self_collide", "allow_auto_disable", "enable_wind", "pose", "link", "joint", "frame")
 MODEL_PARTS += ("plugin", "gripper", "include", "model")
 INCLUDE_PARTS = ("uri", "name", "pose", "placement_frame", "static", "plugin", "merge")
-NAMED = ("link", "joint", "frame")
 ROOT = ("model", "world")
 NOT_THERE = "models that the world includes and that are not there"
-REFERENCES = ("relative_to", "expressed_in", "attached_to")  # attributes that name a frame
-TEXTS = ("parent", "child", "gearbox_reference_body", "mimicJoint", "joint")
-TEXTS += ("drake:ball_constraint_body_A", "drake:ball_constraint_body_B")
 NEWEST = (1, 7)  # version of what is made here: axes name their frames
 MOST_NESTED = 50
 MOST_LINKS = 20_000
@@ -101,12 +98,16 @@ def chosen_model(
     joints = [] if world is None else world.every("joint")
     if any(label in _models_of(joint) for joint in joints):
         return ChosenModel(_joined(label, given, joints, reader), FramePose(np.zeros(3), np.eye(3)), world, NEWEST)
-    pose = only(model, "pose")
-    relative = "" if pose is None else pose.attributes.get("relative_to", "")
-    if pose is not None and relative not in ("", WORLD):
-        raise pose.error("a model is placed in the world, relative to nothing else", "pose", value=relative)
     whole = reader.flattened(model, its_version, top=True)
-    return ChosenModel(whole, _placed(whole), world, NEWEST)
+    if reference_pose(whole)[1]:  # relative to another model, or to a frame of the world
+        frames = [] if world is None else world.every("frame")
+        everything = dataclasses.replace(model, attributes={"name": WORLD}, children=[*frames])
+        for other, one in given.items():
+            if one.world is world:
+                everything.children += scope(other, reader.flattened(one.model, one.version, top=True))
+        pose = Frames(everything, named(everything)).of(f"{label}::{MODEL}", model, "pose")
+        return ChosenModel(whole, pose, world, NEWEST)
+    return ChosenModel(whole, placed(whole), world, NEWEST)
 
 
 def version_of(root: Element) -> tuple[int, ...]:
@@ -175,34 +176,14 @@ def _joined(label: str, given: dict[str, _Given], joints: list[Element], reader:
     whole = dataclasses.replace(given[label].model, attributes={"name": label}, children=[])
     for name in (name for name in given if name in members):
         model = reader.flattened(given[name].model, given[name].version, top=True)
-        whole.children += _scoped(model, name, _reference_pose(model), only(model, "pose") or model)
+        whole.children += scope(name, model)
         if _static(model):
             ends = {"parent": WORLD, "child": f"{name}::{Frames(model, named(model)).canonical_link()}"}
-            fixed = [_made(model, tag, text) for tag, text in ends.items()]
+            fixed = [made(model, tag, text) for tag, text in ends.items()]
             attributes = {"name": f"{name}::{WORLD}_fixed", "type": "fixed"}
             whole.children.append(dataclasses.replace(model, tag="joint", attributes=attributes, children=fixed))
     whole.children += [joint for joint in joints if _models_of(joint) & members]
     return whole
-
-
-def named(model: Element) -> dict[str, Element]:
-    """Return links, joints and frames of a model by name."""
-    elements: dict[str, Element] = {}
-    for tag in NAMED:
-        for element in model.every(tag):
-            name = element.text("name", f"{tag}s")
-            if name in elements:
-                message = f"this name is given twice, first in line {elements[name].line}"
-                raise element.error(message, f"{tag}s", value=name)
-            if name == WORLD or (name.startswith("__") and name.endswith("__")):
-                if name == WORLD and tag == "link" and element.first("inertial") is None:
-                    element.leave_out_unknown("SDF keeps this name for itself: leave the link out", "links", name)
-                    continue
-                raise element.error("SDF keeps this name for itself", f"{tag}s", value=name)
-            elements[name] = element
-    if not any(element.tag == "link" for element in elements.values()):
-        raise model.error("a robot needs at least one <link>")
-    return elements
 
 
 class _Models:
@@ -242,11 +223,24 @@ class _Models:
                 self.links += 1
                 if self.links > MOST_LINKS:
                     raise child.error(f"more than {MOST_LINKS} links with all that is included", "links")
-            children.append(with_named_axes(child, version) if child.tag == "joint" else child)
+            children.append(self._newest(child, model, version) if child.tag == "joint" else child)
         whole = dataclasses.replace(model, children=children)
         if not top:
             named(whole)
         return whole
+
+    def _newest(self, joint: Element, model: Element, version: tuple[int, ...]) -> Element:
+        """Return a joint as the newest version has it: axes name their frames, no link has its name."""
+        name = joint.attributes.get("name", "")
+        if version < (1, 7) and any(link.attributes.get("name") == name for link in model.every("link")):
+            taken = {part.attributes.get("name") for part in model.children}
+            new = f"{name}_joint"
+            while new in taken:
+                new += "_"
+            message = f"a link has the name of this joint, which is called {new}; give it another"
+            self.faults.add(RENAMED, name, joint.error(message, "joints", name))
+            joint = dataclasses.replace(joint, attributes={**joint.attributes, "name": new})
+        return with_named_axes(joint, version)
 
     def _nested(self, child: Element, version: tuple[int, ...]) -> list[Element]:
         """Return the parts of a nested or included model, by their names in the one that holds it."""
@@ -265,7 +259,7 @@ class _Models:
         if child.tag == "include":
             self.open.pop()
         name = model.text("name", "models")
-        return _scoped(whole, name, _reference_pose(whole), only(whole, "pose") or child, merged=merged)
+        return scoped(whole, name, reference_pose(whole), only(whole, "pose") or child, merged=merged)
 
     def _included(self, include: Element, path: str) -> tuple[Element, tuple[int, ...]]:
         """Return an included model, with the name, the pose and the flag that the element gives it."""
@@ -326,82 +320,3 @@ def _manifest(folder: Path) -> str:
         if files:
             return str(folder / files[versions.index(max(versions))].content.strip())
     return str(folder / "model.sdf")
-
-
-def _placed(model: Element) -> FramePose:
-    """Return the pose of a model, from that of the frame which it is placed by."""
-    frame, pose = model.attributes.get("placement_frame", "").strip(), pose_of(model)
-    if not frame:
-        return pose
-    elements = named(model)
-    if frame != MODEL and frame not in elements:
-        raise model.error(no_such("link, joint or frame", frame, elements), "placement_frame", value=frame)
-    here = Frames(model, elements).pose(frame)
-    return pose.then(FramePose(np.zeros(3), np.eye(3)).seen_from(here))
-
-
-def _reference_pose(model: Element) -> tuple[FramePose, str]:
-    """Return the pose of a model and the frame that it is relative to, empty for the model that holds it."""
-    pose = only(model, "pose")
-    given = "" if pose is None else pose.attributes.get("relative_to") or pose.attributes.get("frame") or ""
-    return _placed(model), "" if given == WORLD else given
-
-
-def _made(like: Element, tag: str, text: str = "", **attributes: str) -> Element:
-    return Element(tag, attributes, like.path, like.line, pieces=[text], faults=like.faults)
-
-
-def _scoped(
-    model: Element, scope: str, placed: tuple[FramePose, str], at: Element, *, merged: bool = False
-) -> list[Element]:
-    """Return the parts of a model with the names that they have in the one that holds it, and its frame."""
-    from scipy.spatial.transform import Rotation
-
-    frame = f"_merged__{scope}__model__" if merged else f"{scope}::{MODEL}"
-
-    def rename(name: str) -> str:
-        if name in ("", WORLD):
-            return name
-        return frame if name == MODEL else name if merged else f"{scope}::{name}"
-
-    pose, relative = placed
-    canonical = Frames(model, named(model)).canonical_link()
-    numbers = [*pose.position, *Rotation.from_matrix(pose.rotation).as_quat()]
-    where = _made(at, "pose", " ".join(map(repr, map(float, numbers))), relative_to=relative or MODEL)
-    where.attributes["rotation_format"] = "quat_xyzw"
-    own = _made(at, "frame", name=frame, attached_to=rename(canonical))
-    own.children.append(where)
-    parts = [own]
-    for child in model.children:
-        if child.tag in ("pose", "static", "self_collide", "allow_auto_disable", "enable_wind"):
-            continue
-        part = _renamed(child, rename)
-        if child.tag in NAMED:
-            part.attributes["name"] = rename(child.attributes.get("name", ""))
-        if child.tag == "link":
-            _relative(part, frame)
-        elif child.tag == "frame":
-            part.attributes["attached_to"] = part.attributes.get("attached_to") or frame
-        parts.append(part)
-    return parts
-
-
-def _renamed(element: Element, rename: Any) -> Element:
-    """Return an element in which all that names a link, a joint or a frame names it anew."""
-    attributes = {key: rename(x) if key in REFERENCES else x for key, x in element.attributes.items()}
-    if element.tag == "pose" and "frame" in attributes:
-        attributes["frame"] = rename(attributes["frame"])
-    if element.tag in ("mimic", "drake:mimic") and "joint" in attributes:
-        attributes["joint"] = rename(attributes["joint"])
-    pieces = [rename(element.content.strip())] if element.tag in TEXTS and not element.children else element.pieces
-    children = [_renamed(child, rename) for child in element.children]
-    return dataclasses.replace(element, attributes=attributes, pieces=pieces, children=children)
-
-
-def _relative(link: Element, frame: str) -> None:
-    """Place a link relative to a frame unless it names one."""
-    pose = link.first("pose")
-    if pose is None:
-        link.children.append(_made(link, "pose", relative_to=frame))
-    elif not (pose.attributes.get("relative_to") or pose.attributes.get("frame")):
-        pose.attributes["relative_to"] = frame

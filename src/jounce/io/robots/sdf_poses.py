@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import no_such
+from jounce.io.robots.faults import TWICE
 from jounce.io.robots.xml_elements import Element
 
 MODEL = "__model__"
@@ -63,9 +64,7 @@ class Frames:
 
     def of(self, name: str, element: Element, *where: str) -> FramePose:
         """Return where a frame is in the model; `element` names the frame, which must be there."""
-        if name != MODEL:
-            self._check(name, element, *where)
-        return self.pose(name)
+        return self.pose(self._known(name, element, *where))
 
     def link(self, name: str, element: Element, *where: str) -> str:
         """Return the link that a frame is fixed to, or ``world``; `element` names the frame."""
@@ -74,12 +73,14 @@ class Frames:
             name = chain[-1]
             if name == WORLD:
                 return name
-            self._check(name, element, *where)
-            target = self.elements[name]
+            known = self._known(name, element, *where)
+            if known == MODEL:
+                return self.canonical_link()
+            target = self.elements[known]
             if target.tag == "link":
-                return name
+                return known
             following = text_of(target, "child", "joints", name) if target.tag == "joint" else _attachment(target)
-            self._extend(chain, self.canonical_link() if following == MODEL else following, target)
+            self._extend(chain, following, target)
 
     def canonical_link(self) -> str:
         """Return the link that stands for the model: the first one, unless it names another."""
@@ -103,13 +104,15 @@ class Frames:
             if element.tag == "link":
                 return MODEL
             given = _attachment(element) if element.tag == "frame" else text_of(element, "child")
-        if given != MODEL:
-            self._check(given, pose or element)
-        return given
+        return self._known(given, pose or element)
 
-    def _check(self, name: str, element: Element, *where: str) -> None:
-        if name not in self.elements:
-            raise element.error(no_such("link, joint or frame", name, self.elements), *where, value=name)
+    def _known(self, name: str, element: Element, *where: str) -> str:
+        """Return the name of a frame that must be there; that of a nested model stands for its own frame."""
+        if name == MODEL or name in self.elements:
+            return name
+        if (own := f"{name}::{MODEL}") in self.elements:
+            return own
+        raise element.error(no_such("link, joint or frame", name, self.elements), *where, value=name)
 
 
 def _attachment(frame: Element) -> str:
@@ -137,10 +140,11 @@ def pose_of(element: Element, *name: str) -> FramePose:
 
 
 def only(element: Element, tag: str, *name: str) -> Element | None:
-    """Return the one child of a tag, None if there is none."""
+    """Return the first child of a tag, None if there is none; others are noted."""
     elements = element.every(tag)
     if len(elements) > 1:
-        raise elements[1].error(f"<{tag}> is given twice, first in line {elements[0].line}", *name)
+        shown = ".".join(name) or f"<{element.tag}>"
+        elements[1].leave_out(TWICE, shown, f"<{tag}> is given twice, first in line {elements[0].line}", *name)
     return elements[0] if elements else None
 
 

@@ -24,12 +24,12 @@ from jounce.robot.model.tree import axes_with_z_along, ordered
 from jounce.robot.robot import Robot
 
 WORLD = "world"  # which need not be a link of the file
-EXPANDED = ("floating", "planar")
+EXPANDED = ("floating", "planar", "spherical")
 TYPES = ("continuous", "fixed", "prismatic", "revolute", *EXPANDED)
 LINK_PARTS = ("inertial", "visual", "collision", "contact", "material", "sensor")
 INERTIAL_PARTS = ("origin", "mass", "inertia")
 JOINT_PARTS = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller")
-OF_SEVERAL = {key: f"{key} of planar and floating joints" for key in ("damping", "friction", "armature")}
+OF_SEVERAL = {key: f"{key} of planar, floating and spherical joints" for key in ("damping", "friction", "armature")}
 SIZES = ("velocity", "acceleration", "deceleration", "jerk", "effort")
 _Pose = tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -39,7 +39,8 @@ def read_urdf(root: Element, faults: Faults, massless: bool = False) -> Robot:
     """Return the robot that a URDF file describes.
 
     Revolute, continuous, prismatic and fixed joints are taken as they are. A floating joint becomes three slides and
-    three turns, a planar one two slides and a turn, all massless between; what the file says of their limits, damping
+    three turns, a planar one two slides and a turn, a spherical one (of MuJoCo and Bullet) three turns, all massless
+    between; what the file says of their limits, damping
     and friction is left out, since it does not say to which of the coordinates it belongs; of damping and friction
     there is a warning. An ``<inertial>`` of zero mass and zero inertia is a frame. Limits that are zero are not given,
     nor is a range from zero to zero. A joint that follows one which itself follows another follows that one.
@@ -241,10 +242,11 @@ def _joints(
             faults.leave_out(
                 heading, name, dynamics_element.error(left_out(heading), *where, "dynamics", key, value=value)
             )
-    if kind == "floating":
+    if kind in ("floating", "spherical"):
         links, parts = floating_joints(child, prefix=name)
+        links, parts = (links[1:], parts) if kind == "floating" else (links[4:], parts[3:])
         first = dataclasses.replace(parts[0], parent=parent, position=position, rotation=rotation)
-        return links[1:], [first, *parts[1:]]
+        return links, [first, *parts[1:]]
     if math.hypot(*direction) < 1e-9:
         raise (axis or element).error("must have a direction", *where, "axis", value=direction)
     if kind == "planar":

@@ -27,6 +27,7 @@ from jounce.robot.model.links_and_joints import Joint
 from jounce.robot.robot import Robot
 
 IN_GAZEBO = "links and joints that <gazebo> adds"
+WEIGHT = "the weight of links that <gazebo> takes out of gravity, which other readers of URDF count"
 FORCE_ELEMENTS = "<force_element>, which is a force"
 QUATERNIONS = "quat_xyzw, of which the version of this file knows nothing"
 OF_MUJOCO = "what <mujoco> says of gravity and fluids"
@@ -184,6 +185,8 @@ def _of_gazebo(
     on_moving = frame is not None and frame.body >= 0
     table: dict[str, tuple[str, bool, Callable[[Element], bool]]] = {
         **dict.fromkeys(SPRINGS, (JOINT_SPRINGS, moves and len(names.get(about, ())) > 1, _counts)),
+        "gravity": (WEIGHT, on_moving, lambda x: x.content.strip() in NO),
+        "turnGravityOff": (WEIGHT, on_moving, lambda x: x.content.strip() in YES),
         "kinematic": (KINEMATIC, on_moving, lambda x: x.content.strip() in YES),
         "static": (STATIC, moving and not about, lambda x: x.content.strip() in YES),
         "dampingFactor": (DECAY, on_moving, _counts),

@@ -117,18 +117,28 @@ class Element:
         RobotFileError
             If the faults of the file are errors.
         """
+        shown = f"<{self.tag}> of {name[1]}" if len(name) > 1 else f"<{self.tag}>"
+        self.leave_out(UNKNOWN, shown, message, *name)
+
+    def leave_out(self, heading: str, shown: str, message: str, *name: str) -> None:
+        """Note under a heading that the element is left out.
+
+        Raises
+        ------
+        RobotFileError
+            If the faults of the file are errors.
+        """
         error = self.error(message, *name, value=f"<{self.tag}>")
         if self.faults is None:
             raise error
-        shown = f"<{self.tag}> of {name[1]}" if len(name) > 1 else f"<{self.tag}>"
-        self.faults.leave_out(UNKNOWN, shown, error)
+        self.faults.leave_out(heading, shown, error)
 
 
 def read_markup(path: str, faults: Faults | None = None) -> Element:
     """Read an XML file of at most 10 MB.
 
-    What the readers of other programs let pass is read as they do, and noted: a declaration after blank lines, two
-    hyphens within a comment, zero bytes at the end.
+    What the readers of other programs let pass is read as they do, and noted: a declaration after blank lines or
+    comments, two hyphens within a comment, zero bytes or other text at the end.
 
     Parameters
     ----------
@@ -161,13 +171,17 @@ def read_markup(path: str, faults: Faults | None = None) -> Element:
         raise RobotFileError(
             "is not a text file: robots are read from URDF, MJCF and SDF, all XML", path=path, line=line
         )
+    reader = _Reader(path, faults)
     try:
-        root = _Reader(path, faults).read(content)
-    except RobotFileError:
+        root = reader.read(content)
+    except RobotFileError as error:
         tolerated, more = (content, []) if wide else _tolerated(content)
-        if not more:
+        if more:
+            root = _Reader(path, faults).read(tolerated)
+        elif (whole := reader.complete(content)) is not None:
+            root, more = whole, [("text after the end of its root element", error.line or whole.line)]
+        else:
             raise
-        root = _Reader(path, faults).read(tolerated)
         noted += more
     if faults is None:
         return root
@@ -189,11 +203,11 @@ def _tolerated(content: bytes) -> tuple[bytes, list[tuple[str, int]]]:
             noted.append(("two hyphens within a comment", content.count(b"\n", 0, found.start()) + 1))
         return blank(found)
 
+    content = re.sub(rb"<!--(.*?)-->", comment, content, flags=re.DOTALL)
     if late := re.match(rb"(?:\xef\xbb\xbf)?(\s+)<\?xml\s[^>]*\?>", content):
-        noted.append(("blank lines before the declaration <?xml", content.count(b"\n", 0, late.end(1)) + 1))
+        noted.append(("lines before the declaration <?xml", content.count(b"\n", 0, late.end(1)) + 1))
         declaration = content[late.end(1) : late.end()]
         content = declaration.replace(b"\n", b" ") + late[1] + content[late.end() :]
-    content = re.sub(rb"<!--(.*?)-->", comment, content, flags=re.DOTALL)
     return content, noted
 
 
@@ -222,6 +236,11 @@ class _Reader:
             raise RobotFileError(f"is in no encoding that can be read: {error}", path=self.path) from None
         assert self.root is not None  # the parser refuses a file without elements
         return self.root
+
+    def complete(self, content: bytes) -> Element | None:
+        """Return the root where it had ended before the parser stopped, and no other element begins after it."""
+        rest = content[self.parser.ErrorByteIndex :]
+        return None if self.open or re.search(rb"<[^/!?]", rest) else self.root
 
     def unclosed(self) -> str:
         if not self.open:

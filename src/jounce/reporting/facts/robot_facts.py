@@ -9,6 +9,7 @@ from typing import Any, Literal, NotRequired
 from typing_extensions import TypedDict
 
 from jounce.errors import RobotError
+from jounce.io.robots.other_readers import FREE_BASE, READERS, as_read_by, permutation
 from jounce.reporting.text.summaries import freedom_words
 from jounce.robot import Joint, Robot
 from jounce.robot.closed_loops.closures import closure_wrenches
@@ -102,6 +103,33 @@ class RobotFacts(TypedDict):
     closures: list[ClosureFacts]
 
 
+class OtherJoint(TypedDict):
+    """A joint of the file in the vectors of another program; factors of ours give its velocities, None if they vary."""
+
+    joint: str
+    coordinates: list[str]
+    position: int
+    velocity: int
+    positions: list[str]
+    velocities: list[str]
+    factors: list[dict[str, float]] | None
+    offset: float
+    note: str
+
+
+class OtherReader(TypedDict):
+    """How another program numbers the coordinates: its velocities are ``factors * ours[indices]`` where these exist."""
+
+    name: str
+    version: str
+    positions: int
+    velocities: int
+    indices: list[int] | None
+    factors: list[float] | None
+    joints: list[OtherJoint]
+    note: str
+
+
 class InspectedRobot(RobotFacts):
     """What a robot file holds, and how it starts; ``ok`` is whether its loops close."""
 
@@ -109,6 +137,7 @@ class InspectedRobot(RobotFacts):
     freedom: FreedomFacts
     assembly: LoopFacts
     ok: bool
+    other_reader: NotRequired[OtherReader]
 
 
 def robot_facts(robot: Robot) -> dict[str, Any]:
@@ -165,6 +194,45 @@ def inspected_robot(robot: Robot, path: str | PathLike[str] | None = None) -> di
         "freedom": {"coordinates": coordinates, "equations": borne, "left": left, "words": words},
         "assembly": {"status": "open" if message else "assembled", "message": message},
         "ok": message is None,
+    }
+
+
+def other_reader(reader: str, path: str | PathLike[str], robot: Robot) -> OtherReader:
+    """Return how another program numbers the coordinates of a robot file.
+
+    Raises
+    ------
+    RobotError
+        No such program is known, or not for such a file.
+    """
+    joints, position, velocity = as_read_by(reader, path, robot), 0, 0
+    made: list[OtherJoint] = []
+    for joint in joints:
+        made.append(
+            {
+                "joint": joint.joint,
+                "coordinates": list(joint.coordinates),
+                "position": position,
+                "velocity": velocity,
+                "positions": list(joint.positions),
+                "velocities": list(joint.velocities),
+                "factors": None if joint.factors is None else [dict(row) for row in joint.factors],
+                "offset": joint.offset,
+                "note": joint.note,
+            }
+        )
+        position += len(joint.positions)
+        velocity += len(joint.velocities)
+    indices, factors = permutation(joints, robot) or (None, None)
+    return {
+        "name": reader,
+        "version": READERS[reader],
+        "positions": position,
+        "velocities": velocity,
+        "indices": indices,
+        "factors": factors,
+        "joints": made,
+        "note": FREE_BASE.get(reader, ""),
     }
 
 

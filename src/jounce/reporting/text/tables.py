@@ -114,6 +114,32 @@ def robot_tables(facts: Facts) -> list[Table]:
     return [each for each in tables if each.rows]
 
 
+def other_reader_table(facts: Facts) -> Table:
+    """Return the joints of a robot file as another program numbers them."""
+    rows = []
+    for joint in facts["joints"]:
+        single = joint["positions"] == ["value"]
+        places = [
+            span(joint[first], joint[several])
+            for first, several in (("position", "positions"), ("velocity", "velocities"))
+        ]
+        ours = ", ".join(joint["coordinates"])
+        if joint["factors"] is not None:
+            sums = [" + ".join(f"{x:.6g} {name}" for name, x in row.items()) for row in joint["factors"]]
+            ours = "; ".join(sums).replace("+ -", "- ")
+            ours += f" + {joint['offset']:g}" if joint["offset"] else ""
+        forms = "" if single else f"{' '.join(joint['positions'])} | {' '.join(joint['velocities'])}"
+        rows.append([joint["joint"], *places, ours, forms, joint["note"]])
+    headings = ("joint", "position", "velocity", "in ours", "holds", "note")
+    return table(f"As {facts['name']} {facts['version']} has it", headings, rows, (1, 2))
+
+
+def span(first: int, parts: Sequence[str]) -> str:
+    """Return the numbers of the entries that parts have from a first one on."""
+    last = first + len(parts) - 1
+    return "-" if not parts else str(first) if last == first else f"{first}..{last}"
+
+
 def _count(closure: Facts, key: str) -> str:
     value = closure.get(key, "")
     return "-" if value is None else str(value)
