@@ -148,11 +148,12 @@ def falling():
 
 
 def loop():
-    """A robot of rods on hinges whose loop is closed, as a mechanism."""
+    """A robot of rods on hinges with springs whose loop is closed, one half out of gravity, as a mechanism."""
     rod = jn.Inertia(1.0, center_of_mass=[0.5, 0, 0], tensor=[0.01, 1 / 12, 1 / 12])
-    links = [jn.Link("base"), *(jn.Link(name, rod) for name in ("crank", "rod", "rocker"))]
-    joints = [jn.Joint("A", "base", "crank"), jn.Joint("B", "crank", "rod", position=[1, 0, 0])]
-    joints.append(jn.Joint("D", "base", "rocker", position=[1, 1, 0]))
+    links = [jn.Link("base"), *(jn.Link(name, rod) for name in ("crank", "rod")), jn.Link("rocker", rod, gravity=0.4)]
+    held = {"stiffness": 3.0, "spring_reference": 0.2, "damping": 0.3}
+    joints = [jn.Joint("A", "base", "crank", **held), jn.Joint("B", "crank", "rod", position=[1, 0, 0], **held)]
+    joints.append(jn.Joint("D", "base", "rocker", position=[1, 1, 0], **held))
     tip = jn.robot.Closure("C", ("rod", "rocker"), points=[[1, 0, 0], [1, 0, 0]])
     robot = jn.Robot("four-bar", links, joints, gravity=[1.0, -9.0, -2.0], closures=[tip])
     spring = forces.Spring(("ground", "rod"), [0, 2, 0.3], [0.4, 0.1, 0], 20.0, 1.0, 0.5)

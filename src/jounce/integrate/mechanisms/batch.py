@@ -4,7 +4,7 @@ import dataclasses
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, Unpack
 
 import jax
 import numpy as np
@@ -13,11 +13,15 @@ from jaxtyping import Float, Int
 from jounce.display import Displayed
 from jounce.dynamics.forward.accelerations import Equations, State
 from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
+from jounce.errors import MechanismError
 from jounce.execution.threads import in_callers_context
 from jounce.integrate.marching.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
 from jounce.integrate.marching.user_methods import integrator
 from jounce.integrate.mechanisms.batch_equations import BatchStart, ParametricMechanism, Turns
+from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.results.simulation import expanded
+from jounce.integrate.robot_batch import simulate_robots
+from jounce.integrate.simulate_robot import RobotOptions
 from jounce.integrate.steps.events import pose_coordinates
 from jounce.integrate.steps.methods import AbstractMethod
 from jounce.integrate.steps.options import checked_options, instants_of
@@ -34,6 +38,7 @@ from jounce.mechanism.carriages import check_without_ends
 from jounce.mechanism.law_checks import check_laws
 from jounce.mechanism.preconditions import concrete
 from jounce.mechanism.turn_counting import counted_along
+from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike
 
 LANES = 64  # runs marched together: more fall out of the cache
@@ -51,8 +56,9 @@ class Batch(Displayed):
     parameters : dict of str to numpy.ndarray of shape (runs,)
         What the runs differ in.
     outputs : dict of str to numpy.ndarray
-        Outputs of the mechanism with derivatives, (runs, time, order + 1) or (runs, time, order + 1, component), SI;
-        NaN where a run did not get so far. Forces and energies, which follow from a whole motion, are left out.
+        Outputs of the mechanism, or coordinates of the robot by joint, with derivatives, (runs, time, order + 1) or
+        (runs, time, order + 1, component), SI; NaN where a run did not get so far. Forces and energies, which follow
+        from a whole motion, are left out.
     status : numpy.ndarray of int, shape (runs, time)
         See `Status`.
     steps : numpy.ndarray of int, shape (runs,)
@@ -72,7 +78,7 @@ class Batch(Displayed):
 
 @concrete
 def simulate_batch(
-    mechanism: Mechanism,
+    mechanism: Mechanism | Robot,
     parameters: Mapping[str, ArrayLike],
     time: ArrayLike | TimeGrid | None = None,
     order: int = 4,
@@ -80,19 +86,25 @@ def simulate_batch(
     method: AbstractMethod | None = None,
     tolerance: float = 1e-15,
     longest_step: float = np.inf,
+    **robot: Unpack[RobotOptions],
 ) -> Batch:
-    """Return many simulations of a mechanism that differ in its parameters, computed side by side.
+    """Return many simulations of a mechanism that differ in its parameters, or of a robot, computed side by side.
 
     Initial conditions differ where their laws have parameters. What is compiled serves all runs.
 
     Parameters
     ----------
-    mechanism : Mechanism
+    mechanism : Mechanism or Robot
         As for `simulate`.
     parameters : dict of str to array_like of shape (runs,)
-        Values of some parameters in each run, SI.
+        Values of some parameters in each run, SI. Runs of a robot differ in coordinates at the start, by the name of
+        the joint, in velocities there, ``JOINT.rate``, and in masses, ``LINK.mass``, which leave the moments about the
+        center of mass as they are.
     time, order, method, tolerance, longest_step
         As for `simulate`; each run has steps of its own.
+    **robot
+        Of a robot only, and alike in all runs: as for `simulate`, but for ``base``. What ``state`` gives holds for
+        joints that the runs do not differ in.
 
     Returns
     -------
@@ -101,7 +113,7 @@ def simulate_batch(
 
     Raises
     ------
-    MechanismError
+    JounceError
         If a parameter does not exist, or values are not finite or of unequal number; and as `simulate`.
 
     Examples
@@ -119,6 +131,16 @@ def simulate_batch(
     >>> jn.simulate_batch(pendulum, {"lift": [0.1, 0.2, 0.3]}, [0.0, 0.5]).outputs["angle"].shape
     (3, 2, 5)
     """
+    if isinstance(mechanism, Robot):
+        order, method = checked_options(order, method, tolerance, longest_step)
+        options: dict[str, Any] = {"method": method, "tolerance": float(tolerance), **robot}
+        instants = instants_of(time, {})
+        return _of_robot(
+            *simulate_robots(mechanism, parameters, instants, order, longest_step=float(longest_step), **options)
+        )
+    for name in robot:
+        message = "belongs to simulations of robots in joint coordinates; a mechanism has forces and `initial`"
+        raise MechanismError(message, name=name)
     check_mechanism(mechanism)
     check_without_ends(mechanism, "a batch of simulations")
     values = checked_values(mechanism, parameters, "run")
@@ -153,6 +175,14 @@ def simulate_batch(
     for run, reason in starts.failed.items():
         status[run, 0] = int(reason)
     return Batch(instants, values, runs.outputs, status, runs.steps)
+
+
+def _of_robot(values: dict[str, np.ndarray], runs: list[RobotSimulation]) -> Batch:
+    """Return the runs of a robot, its joints as outputs."""
+    q = np.stack([run.q for run in runs])
+    outputs = {name: q[..., k] for k, name in enumerate(runs[0].robot.joint_names)}
+    steps = np.array([len(run.steps.start) for run in runs])
+    return Batch(runs[0].time, values, outputs, np.stack([run.status for run in runs]), steps)
 
 
 class _Runs:

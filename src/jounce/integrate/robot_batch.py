@@ -1,0 +1,91 @@
+"""Many simulations of one robot in joint coordinates that differ in where they begin and in masses of links."""
+
+import os
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import JounceError, RobotError, no_such
+from jounce.execution.threads import in_callers_context
+from jounce.integrate.results.robot_simulation import RobotSimulation
+from jounce.integrate.simulate_robot import simulate_robot
+from jounce.robot.model.arguments import checked_state
+from jounce.robot.robot import Robot
+from jounce.shapes import real_numbers
+
+RATE, MASS = ".rate", ".mass"
+
+
+def simulate_robots(
+    robot: Robot, parameters: Mapping[str, Any], instants: np.ndarray, order: int, **options: Any
+) -> tuple[dict[str, np.ndarray], list[RobotSimulation]]:
+    """Return what runs differ in, by name, and each run; see `jounce.simulate_batch`.
+
+    Raises
+    ------
+    RobotError
+        A name is none of those that runs may differ in, values are not finite or of unequal number, or a mass is none.
+    """
+    if options.get("base") is not None:
+        message = "a batch has no free base by quaternions; give the robot one by robot.with_floating_base()"
+        raise RobotError(message, name="base")
+    values = _checked(robot, parameters)
+    start = _nominal(robot, options.pop("state", None))
+
+    def run(k: int) -> RobotSimulation:
+        state, changed = start.copy(), robot
+        for name, given in values.items():
+            joint, level = (name.removesuffix(RATE), 1) if name not in robot.joint_names else (name, 0)
+            if joint in robot.joint_names:
+                state[level, robot.joint_names.index(joint)] = given[k]
+            else:
+                changed = changed.with_inertia(name.removesuffix(MASS), mass=float(given[k]))
+        return simulate_robot(changed, instants, order, state=state, strict=False, **options)
+
+    def located(k: int) -> RobotSimulation:
+        try:
+            return run(k)
+        except JounceError as error:
+            error.name = f"runs.{k}" if error.name is None else f"runs.{k}.{error.name}"
+            raise
+
+    count = len(next(iter(values.values())))
+    first = located(0)  # compiles, once for all threads
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:  # XLA works outside of Python's lock
+        return values, [first, *pool.map(in_callers_context(located), range(1, count))]
+
+
+def _nominal(robot: Robot, state: Any) -> np.ndarray:
+    """Return the coordinates and rates that all runs begin with unless they differ in them, (2, n)."""
+    n = len(robot.joint_names)
+    if state is None:
+        return np.zeros((2, n))
+    if isinstance(state, Mapping):
+        return np.array([robot.coordinates(**state), np.zeros(n)])
+    levels = np.array(checked_state(robot, np.asarray(state, float)))
+    if levels.shape != (2, n):
+        raise RobotError(f"must hold q and q', the shape (2, {n})", name="state", value=list(levels.shape))
+    return levels
+
+
+def _checked(robot: Robot, parameters: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Return what runs differ in, by name, each of shape (runs,)."""
+    if not parameters:
+        raise RobotError("a batch differs in at least one value", name="parameters", value=dict(parameters))
+    massive = [name for name, link in robot.links.items() if link.inertia is not None]
+    valid = [*robot.joint_names, *(x + RATE for x in robot.joint_names), *(x + MASS for x in massive)]
+    values: dict[str, np.ndarray] = {}
+    for name, given in parameters.items():
+        if name not in valid:
+            message = no_such("joint, JOINT.rate or LINK.mass", name, valid)
+            raise RobotError(message, name="parameters", value=name)
+        array = real_numbers(f"parameters.{name}", given, RobotError, "finite numbers, one for each run")
+        if array.ndim != 1 or not array.size or not np.isfinite(array).all():
+            raise RobotError("must be finite numbers, one for each run", name=f"parameters.{name}", value=given)
+        if values and array.size != (count := len(next(iter(values.values())))):
+            message = f"must have one value for each run, {count} as those before"
+            raise RobotError(message, name=f"parameters.{name}", value=array.size)
+        values[name] = array
+    return values
