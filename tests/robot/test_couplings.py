@@ -32,7 +32,15 @@ def robot(*, smooth=False, followers=True):
     ]
     couplings = [
         BallDrive("ball", ("z", "y", "x"), armature=0.05, damping=0.2 * lossy, friction=0.01 * lossy),
-        Tendon("line", {"j": 0.3, "x": -0.2, "s": 1.0}, 11.0, rest=0.1, damping=0.5 * lossy, friction=0.02 * lossy),
+        Tendon(
+            "line",
+            {"j": 0.3, "x": -0.2, "s": 1.0},
+            11.0,
+            rest=0.1,
+            damping=0.5 * lossy,
+            friction=0.02 * lossy,
+            armature=0.7,
+        ),
     ]
     return jn.Robot("all", links, joints, couplings=couplings)
 

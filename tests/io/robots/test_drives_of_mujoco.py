@@ -16,7 +16,7 @@ ARM = f"""<mujoco><option gravity="0.3 -1 -9.7"/><worldbody>
 <joint name="s" type="slide" axis="1 0 0" stiffness="40"/>{GEOM}
 <body name="c" pos="0.1 0 0" gravcomp="1"><joint name="k" axis="0 0 1" damping="0.1"/>{GEOM}</body></body></body>
 </worldbody>
-<tendon><fixed name="line" stiffness="30" damping="0.7" springlength="0.2">
+<tendon><fixed name="line" stiffness="30" damping="0.7" springlength="0.2" armature="0.6">
 <joint joint="h" coef="0.4"/><joint joint="s" coef="-1.5"/><joint joint="k" coef="0.2"/></fixed>
 <fixed stiffness="3"><joint joint="h" coef="1"/><joint joint="k" coef="1"/></fixed></tendon></mujoco>"""
 BALL = f"""<mujoco><worldbody>
@@ -95,9 +95,8 @@ def test_a_free_body_with_damping_and_armature(tmp_path):
     np.testing.assert_allclose(jn.inverse_dynamics(robot, q)[0], expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("slack", ['springlength="0.1 0.3"', 'armature="0.1"'])
-def test_what_of_a_tendon_is_not_linear_is_told(tmp_path, slack):
+def test_what_of_a_tendon_is_not_linear_is_told(tmp_path):
     path = tmp_path / "robot.xml"
-    path.write_text(ARM.replace('springlength="0.2"', slack))
+    path.write_text(ARM.replace('springlength="0.2"', 'springlength="0.1 0.3"'))
     with pytest.warns(jn.errors.RobotWarning, match=r"of tendons: line \(line 9\)"):
         jn.load_robot(path)

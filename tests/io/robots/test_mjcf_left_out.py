@@ -43,7 +43,7 @@ CASES = {  # what the option, the lower body, its joint and the end of the file 
     ),
     "a damped cord": ("", "", "", TENDON.format('damping="4"'), None),
     "a cord that rubs": ("", "", "", TENDON.format('frictionloss="4"'), None),
-    "a heavy cord": ("", "", "", TENDON.format('armature="4"'), r"armature of tendons: cord \(line 7\); make"),
+    "a heavy cord": ("", "", "", TENDON.format('armature="4"'), None),
     "a winch": (
         *("", "", ""),
         DRIVE.format('name="winch" tendon="cord"', 2, 0),
@@ -125,7 +125,6 @@ def test_it_is_told_of_where_mujoco_computes_other_forces(tmp_path, case):
         "a progressive spring": r"leg\.xml, line 5, joints\.knee\.stiffness: .* without springs of joints, got \[",
         "a weight that one drive carries": r"line 4, links\.shank\.gravcomp: .* of bodies, got 1\.0;",
         "water": r"line 2, option\.density: .* without forces of the fluid around, got 1000\.0;",
-        "a heavy cord": r"line 7, tendons\.cord\.armature: .* without armature of tendons, got 4\.0;",
         "a winch": r"line 7, actuators\.winch\.armature: .* without armature of actuators .*, got 2\.0;",
     }.items(),
 )

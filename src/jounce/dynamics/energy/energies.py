@@ -30,7 +30,7 @@ from jounce.robot.model.arguments import checked_coordinates
 from jounce.robot.model.couplings import BallDrive
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.batches import Batched
-from jounce.robot.recursions.drive_forces import ball_spin
+from jounce.robot.recursions.drive_forces import ball_spin, tendon_energy
 from jounce.robot.recursions.kinematics import body_frames
 from jounce.robot.recursions.tree_scan import Series
 from jounce.robot.robot import Robot
@@ -238,12 +238,20 @@ def energies_of(
     return *parts, system.moving_links, order
 
 
-def rotors_of(robot: Robot, *, drives: bool) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Return the bodies with whose rotation rotors count: those that coordinates move, and the links of balls."""
+def rotors_of(robot: Robot, *, drives: bool) -> tuple[tuple[int, ...], tuple[int, ...], tuple[tuple[int, int], ...]]:
+    """Return the bodies with whose rotation rotors count: those that coordinates move, and the links of balls.
+
+    Last come the tendons with armature, by number, each with the body that the first of its coordinates moves.
+    """
+    if not drives:
+        return (), (), ()
     names = [joint.name for joint in robot.moving_joints]
-    leading = tuple(names.index(name) for name in robot.joint_names) if drives else ()
-    balls = [x for x in robot.couplings.values() if isinstance(x, BallDrive)] if drives else []
-    return leading, tuple(names.index(ball.joints[-1]) for ball in balls)
+    leading = tuple(names.index(name) for name in robot.joint_names)
+    balls = [x for x in robot.couplings.values() if isinstance(x, BallDrive)]
+    tendons = robot.tree.tendons
+    heavy = np.flatnonzero(tendons.armature).tolist()
+    lined = tuple((k, leading[int(np.flatnonzero(tendons.weights[k])[0])]) for k in heavy)
+    return leading, tuple(names.index(ball.joints[-1]) for ball in balls), lined
 
 
 def kinetic_energy(system: Robot | Motion, q: ArrayLike | None = None, *, drives: bool = True) -> Energy:
@@ -278,6 +286,7 @@ def energies_of_tree(
     function: EnergyFunction,
     leading: tuple[int, ...],
     turned: tuple[int, ...],
+    lined: tuple[tuple[int, int], ...],
 ) -> tuple[Float[Numbers, "levels body batch"], ...]:
     """Return energies of all bodies of a robot, with those of rotors, on Taylor coefficients."""
     frames = body_frames(tree, arrays[0]).without_base()
@@ -290,6 +299,10 @@ def energies_of_tree(
         spin = differentiated(ball_spin(tree, coordinates, coordinates.differentiate()), order)
         rotors = dot(spin, spin) * (0.5 * jnp.asarray(tree.balls.armature)[:, None])
         last = last.at[:, np.array(turned)].add(stacked(rotors.truncate(len(last) - 1)))
+    if lined:  # the bodies that the first coordinates of tendons move
+        tendons, places = (np.array(x) for x in zip(*lined, strict=True))
+        energy = stacked(tendon_energy(tree, differentiated(Jet(tuple(arrays[0])), order + 1)))
+        last = last.at[:, places].add(energy[: len(last), tendons])
     return *parts, last
 
 

@@ -93,6 +93,7 @@ class Drives:
                 "stiffness": float(model.tendon_stiffness[k]) if springs else 0.0,
                 "damping": float(model.tendon_damping[k]) if self.works("DAMPER") else 0.0,
                 "friction": float(model.tendon_frictionloss[k]) if self.works("FRICTIONLOSS") else 0.0,
+                "armature": float(model.tendon_armature[k]),
             }
             if any(given.values()) and not set(weights) <= set(fixed):
                 name = model.tendon(k).name or f"tendon_{k}"

@@ -60,7 +60,8 @@ def _read_of(tendon: Any, mujoco: Any) -> tuple[str, ...]:
         return ()
     lengths = np.ravel(tendon.springlength)
     slack = len(set(lengths.tolist())) > 1 and lengths[0] != -1 and lengths[1] != -1
-    return ("damping", "frictionloss") if slack else ("stiffness", "damping", "frictionloss")
+    read = ("damping", "frictionloss", "armature")
+    return read if slack else ("stiffness", *read)
 
 
 def left_out_of_model(

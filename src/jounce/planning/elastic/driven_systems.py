@@ -104,7 +104,7 @@ def robot_drives(robot: Robot, drives: object, losses: bool) -> DriveArrays:
         message = "friction that differs by direction is not known to elastic joints; give one value for both"
         raise RobotError(message, name=f"joints.{names[int(np.flatnonzero(tree.friction_skew)[0])]}.friction")
     if tree.shape.armed:
-        message = "a ball with armature is not known to elastic joints; set its armature to zero"
+        message = "balls and tendons with armature are not known to elastic joints; set their armature to zero"
         raise RobotError(message, name="couplings")
     turning = [robot.joints[name].turning for name in names]
     friction = np.asarray(tree.friction) if losses else np.zeros(len(names))

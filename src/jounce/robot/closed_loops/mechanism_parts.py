@@ -273,13 +273,13 @@ def _check_couplings(robot: AbstractRobot) -> None:
     Raises
     ------
     RobotError
-        A tendon has a spring, damping or friction, or a ball with armature is carried by a link that turns.
+        A tendon has a spring, damping, friction or armature, or a ball with armature is carried by a link that turns.
     """
-    advice = "leave it out with drives=False, or take its stiffness, damping and friction from the robot"
+    advice = "leave it out with drives=False, or take all that it has from the robot"
     for coupling in robot.couplings.values():
         where = f"couplings.{coupling.name}"
         if isinstance(coupling, Tendon):
-            if coupling.stiffness or coupling.damping or coupling.friction:
+            if any((coupling.stiffness, coupling.damping, coupling.friction, coupling.armature)):
                 raise RobotError(f"a tendon along joints has no counterpart in a mechanism; {advice}", name=where)
             continue
         body = robot.frames[robot.joints[coupling.joints[0]].parent].body

@@ -12,7 +12,7 @@ import numpy as np
 from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import finite_numbers
 
-OF_TENDON = ("stiffness", "rest", "damping", "friction")
+OF_TENDON = ("stiffness", "rest", "damping", "friction", "armature")
 OF_BALL = ("armature", "damping", "friction")
 
 
@@ -28,7 +28,7 @@ def _check_numbers(coupling: Any, fields: Sequence[str]) -> None:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Tendon:
-    """A line along joints, whose length is a weighted sum of their coordinates, with a spring, a damper and friction.
+    """A line along joints, of a length that sums up their coordinates, with spring, damper, friction and inertia.
 
     Parameters
     ----------
@@ -44,6 +44,8 @@ class Tendon:
         Viscous friction.
     friction : float, default 0
         Coulomb friction, N.
+    armature : float, default 0
+        Inertia against the second derivative of the length, kg by the square of its unit over m.
 
     Raises
     ------
@@ -67,6 +69,7 @@ class Tendon:
     rest: float = 0.0
     damping: float = 0.0
     friction: float = 0.0
+    armature: float = 0.0
 
     def __post_init__(self) -> None:
         _check_numbers(self, OF_TENDON)

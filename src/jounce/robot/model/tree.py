@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from jounce.errors import RobotError, check_name
 from jounce.rigid.inertia import Inertia
-from jounce.robot.model.couplings import OF_BALL, BallDrive, Coupling, Tendon
+from jounce.robot.model.couplings import OF_BALL, OF_TENDON, BallDrive, Coupling, Tendon
 from jounce.robot.model.links_and_joints import Joint, Link, Mimic
 
 MASSLESS = Inertia(0.0, strict=False)
@@ -34,7 +34,7 @@ class Shape:
     tendons, balls : int
         Springs and tendons; balls with drives.
     armed, lifted : bool
-        Whether drives of balls have armature; whether some bodies feel less than all of gravity.
+        Whether drives of balls, or tendons, have armature; whether some bodies feel less than all of gravity.
     """
 
     bodies: int
@@ -57,7 +57,7 @@ class Tendons:
     Parameters
     ----------
     weights : array of shape (tendons, coordinates)
-    stiffness, rest, damping, friction : array of shape (tendons,)
+    stiffness, rest, damping, friction, armature : array of shape (tendons,)
     """
 
     weights: Any
@@ -65,6 +65,7 @@ class Tendons:
     rest: Any
     damping: Any
     friction: Any
+    armature: Any
 
 
 @jax.tree_util.register_dataclass
@@ -264,7 +265,7 @@ def arrange(
             direct=len(order) == bodies,
             tendons=len(tendons.weights),
             balls=balls.select.shape[1],
-            armed=bool(balls.armature.any()),
+            armed=bool(balls.armature.any() or tendons.armature.any()),
             lifted=bool(lifted),
         ),
     )
@@ -283,10 +284,12 @@ def _lift(lifted: dict[int, list[tuple[Any, Any]]], frame: Frame, link: Link) ->
 def _tendons(moving: Sequence[Joint], order: Sequence[str], couplings: Sequence[Coupling]) -> Tendons:
     """Return springs of joints and tendons; a joint that follows counts through the one that it follows."""
     rows = [
-        ({joint.name: 1.0}, joint.stiffness, joint.spring_reference, 0.0, 0.0) for joint in moving if joint.stiffness
+        ({joint.name: 1.0}, joint.stiffness, joint.spring_reference, 0.0, 0.0, 0.0)
+        for joint in moving
+        if joint.stiffness
     ]
     lines = [line for line in couplings if isinstance(line, Tendon)]
-    rows += [(line.weights, line.stiffness, line.rest, line.damping, line.friction) for line in lines]
+    rows += [(line.weights, *(getattr(line, field) for field in OF_TENDON)) for line in lines]
     by_name = {joint.name: joint for joint in moving}
     weights, numbers = np.zeros((len(rows), len(order))), []
     for k, (given, stiffness, rest, *others) in enumerate(rows):
@@ -295,7 +298,7 @@ def _tendons(moving: Sequence[Joint], order: Sequence[str], couplings: Sequence[
             weights[k, order.index(mimic.joint)] += weight * mimic.multiplier
             rest -= weight * mimic.offset
         numbers.append((stiffness, rest, *others))
-    return Tendons(weights, *np.array(numbers, float).reshape(-1, 4).T)
+    return Tendons(weights, *np.array(numbers, float).reshape(-1, len(OF_TENDON)).T)
 
 
 def _balls(order: Sequence[str], couplings: Sequence[Coupling]) -> Balls:

@@ -50,6 +50,11 @@ def inertial_forces(tree: Tree, q: Jet, rate: Jet, acceleration: Jet) -> Jet:
     forces = acceleration * jnp.asarray(tree.armature)[:, None]
     if not tree.shape.armed:
         return forces
+    if tree.shape.tendons:
+        weights, inertia = jnp.asarray(tree.tendons.weights), jnp.asarray(tree.tendons.armature)[:, None]
+        forces = forces + acceleration.map(lambda x: weights.T @ (inertia * (weights @ x)))
+    if not tree.shape.balls:
+        return forces
     order = acceleration.order
     q, rate = q.truncate(order), rate.truncate(order)
     angle = _turns_of(tree, q)[1]
@@ -66,9 +71,13 @@ def inertial_forces(tree: Tree, q: Jet, rate: Jet, acceleration: Jet) -> Jet:
 
 def armature_matrix(tree: Tree, q: Jet) -> Float[Numbers, "order coordinate coordinate batch"]:
     """Return what armatures add to the mass matrix, as Taylor coefficients."""
-    diagonal = jnp.diag(jnp.asarray(tree.armature))[:, :, None]
-    constant = Jet.constant(jnp.broadcast_to(diagonal, (*diagonal.shape[:2], q.shape[-1])), q.order)
-    if not tree.shape.armed:
+    inertia_of_joints = jnp.diag(jnp.asarray(tree.armature))
+    if tree.shape.armed and tree.shape.tendons:
+        weights = jnp.asarray(tree.tendons.weights)
+        inertia_of_joints = inertia_of_joints + weights.T @ (jnp.asarray(tree.tendons.armature)[:, None] * weights)
+    inertia_of_joints = inertia_of_joints[:, :, None]
+    constant = Jet.constant(jnp.broadcast_to(inertia_of_joints, (*inertia_of_joints.shape[:2], q.shape[-1])), q.order)
+    if not (tree.shape.armed and tree.shape.balls):
         return stacked(constant)
     select, inertia = jnp.asarray(tree.balls.select), jnp.asarray(tree.balls.armature)
     same = jnp.einsum("kbi,kbj,b->ij", select, select, inertia)[:, :, None]
@@ -83,6 +92,13 @@ def spring_energy(tree: Tree, q: Float[Numbers, "coordinate batch"]) -> Float[Nu
     line = tree.tendons
     length = jnp.asarray(line.weights) @ q - jnp.asarray(line.rest)[:, None]
     return 0.5 * jnp.sum(jnp.asarray(line.stiffness)[:, None] * length * length, axis=0)
+
+
+def tendon_energy(tree: Tree, rate: Jet) -> Jet:
+    """Return the kinetic energy of each tendon from the rates of coordinates, (tendons, batch), J."""
+    weights = jnp.asarray(tree.tendons.weights)
+    lengthening = rate.map(lambda x: weights @ x)
+    return lengthening * lengthening * (0.5 * jnp.asarray(tree.tendons.armature)[:, None])
 
 
 def ball_spin(tree: Tree, q: Jet, rate: Jet) -> Jet:

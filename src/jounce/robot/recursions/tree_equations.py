@@ -19,7 +19,13 @@ from jounce.modules import Module
 from jounce.rigid.spatial import body_axes, quaternion_spins
 from jounce.robot.model.tree import Frame, Tree
 from jounce.robot.recursions.articulated_bodies import ArticulatedBodies, RigidInertia
-from jounce.robot.recursions.drive_forces import ball_spin, inertial_forces, passive_forces, spring_energy
+from jounce.robot.recursions.drive_forces import (
+    ball_spin,
+    inertial_forces,
+    passive_forces,
+    spring_energy,
+    tendon_energy,
+)
 from jounce.robot.recursions.newton_euler import Turn
 from jounce.robot.recursions.tree_scan import fill_slots, of_one_body, read_slot, to_coordinates, write_slot
 from jounce.robot.recursions.tree_sums import sums_at_parents, totals
@@ -273,6 +279,7 @@ class TreeEquations(Module):
                 kinetic = kinetic + 0.5 * jnp.sum(inertia * spin * spin, axis=(0, 1))
             if tree.shape.tendons:
                 potential = potential + spring_energy(tree, motion.coordinates)
+                kinetic = kinetic + jnp.sum(tendon_energy(tree, Jet([motion.rates])).coefficients[0], axis=0)
         return kinetic, potential
 
     def _at_joints(self, values: Coordinates) -> Float[Numbers, "body batch"]:
