@@ -378,7 +378,7 @@ def test_reactions_that_are_not_unique_are_nan_and_told(run, tmp_path):
             assert all((text in ("", "nan", "NaN")) == nan for text in table[name]), name
 
 
-def test_coordinates_as_another_program_numbers_them():
+def test_coordinates_as_another_program_numbers_them(run, facts):
     path = EXAMPLES / "robots" / "solo12.urdf"
     status, data, _ = facts("inspect", path, "--as", "pinocchio")
     other = data["other_reader"]
@@ -402,7 +402,7 @@ def test_coordinates_as_another_program_numbers_them():
         ((FOUR_BAR, "--model", "a"), "--model: is for robot files"),
     ],
 )
-def test_programs_that_are_not_known_are_refused(arguments, says):
+def test_programs_that_are_not_known_are_refused(run, arguments, says):
     status, _, err = run("inspect", *arguments)
     assert status == 2
     assert says in err

@@ -22,6 +22,7 @@ def arm():
     return jn.Robot("arm", links, joints)
 
 
+@pytest.mark.slow
 def test_each_run_is_what_it_is_alone():
     one = arm()
     given = {"k": [0.1, 0.5, -0.4], "j.rate": [0.0, 1.0, 2.0], "b.mass": [2.0, 1.0, 3.0]}
@@ -47,6 +48,7 @@ def test_masses_and_springs_swing_in_closed_form():
     np.testing.assert_allclose(batch.outputs["x"][..., 2], -4.0 / masses[:, None] * np.cos(phase), rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_leaves_the_others():
     rail = jn.Joint("x", "base", "a", "prismatic", axis=[1, 0, 0])
     one = jn.Robot("cart", [jn.Link("base"), jn.Link("a", jn.Inertia(1.0))], [rail])

@@ -34,7 +34,7 @@ def simulate_robots(
     values = _checked(robot, parameters)
     start = _nominal(robot, options.pop("state", None))
 
-    def run(k: int) -> RobotSimulation:
+    def begun(k: int) -> tuple[Robot, np.ndarray]:
         state, changed = start.copy(), robot
         for name, given in values.items():
             joint, level = (name.removesuffix(RATE), 1) if name not in robot.joint_names else (name, 0)
@@ -42,19 +42,22 @@ def simulate_robots(
                 state[level, robot.joint_names.index(joint)] = given[k]
             else:
                 changed = changed.with_inertia(name.removesuffix(MASS), mass=float(given[k]))
-        return simulate_robot(changed, instants, order, state=state, strict=False, **options)
+        return changed, state
 
-    def located(k: int) -> RobotSimulation:
+    starts = []
+    for k in range(len(next(iter(values.values())))):
         try:
-            return run(k)
+            starts.append(begun(k))
         except JounceError as error:
             error.name = f"runs.{k}" if error.name is None else f"runs.{k}.{error.name}"
             raise
 
-    count = len(next(iter(values.values())))
-    first = located(0)  # compiles, once for all threads
+    def run(at: tuple[Robot, np.ndarray]) -> RobotSimulation:
+        return simulate_robot(at[0], instants, order, state=at[1], strict=False, **options)
+
+    first = run(starts[0])  # compiles, once for all threads
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:  # XLA works outside of Python's lock
-        return values, [first, *pool.map(in_callers_context(located), range(1, count))]
+        return values, [first, *pool.map(in_callers_context(run), starts[1:])]
 
 
 def _nominal(robot: Robot, state: Any) -> np.ndarray:

@@ -116,6 +116,35 @@ def five_bar(loop):
     return arm(more=second + loop).replace("<robot ", '<robot xmlns:drake="d" ')
 
 
+GAZEBO_LOOP = "<gazebo><joint name='tip' type='{}'><pose>0.1 0 0 0 0.2 0</pose>{}{}</joint></gazebo>"
+ENDS = "<parent>a</parent><child>b</child>"
+
+
+@pytest.mark.parametrize("kind, made", [("revolute", "pin"), ("ball", "connect"), ("prismatic", "slider")])
+def test_a_joint_that_gazebo_adds_closes_a_loop(tmp_path, kind, made):
+    """Its frame is that of the child, and the links are joined as they are at coordinates zero."""
+    axis = "" if kind == "ball" else "<axis><xyz>1 0 0</xyz></axis>"
+    robot = read(tmp_path, five_bar(GAZEBO_LOOP.format(kind, ENDS, axis)), strict=True)
+    closure = robot.closures["tip"]
+    assert (closure.type, closure.links) == (made, ("b", "a"))
+    np.testing.assert_allclose(closure.points, [[0.1, 0, 0], [0.2, 0, 0]], atol=1e-15)
+    if kind != "ball":
+        np.testing.assert_allclose(closure.axis, [np.cos(0.2), 0, -np.sin(0.2)], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "kind, inside",
+    [
+        ("universal", ENDS),
+        ("revolute", "<parent>a</parent><child>c</child>"),
+        ("revolute", ENDS + "<axis><xyz expressed_in='a'>1 0 0</xyz></axis>"),
+    ],
+)
+def test_other_joints_that_gazebo_adds_are_told(tmp_path, kind, inside):
+    with pytest.warns(jn.errors.RobotWarning, match="links and joints that <gazebo> adds: tip"):
+        assert not read(tmp_path, five_bar(GAZEBO_LOOP.format(kind, inside, ""))).closures
+
+
 def test_a_loop_joint_is_a_pin_between_two_frames(tmp_path):
     ends = '<link1 link="a" xyz="0.2 0 0" rpy="0 0 0.3"/><link2 link="b" xyz="0.1 0 0"/>'
     robot = read(

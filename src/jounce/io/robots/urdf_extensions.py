@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from jounce.errors import RobotError, no_such
 from jounce.io.robots.closure_files import CLOSED_BY, loop_closure
+from jounce.io.robots.sdf_poses import pose_of
 from jounce.io.robots.xml_elements import Element
 from jounce.robot.model.links_and_joints import Closure
 
@@ -72,7 +73,7 @@ def urdf_closures(root: Element, links: Collection[str]) -> list[Loop]:
     """Return the loops of a file: ``<loop_joint>``, and the ball constraints of Drake.
 
     A ``<loop_joint>`` holds two frames together, each placed in its link by ``xyz`` and ``rpy``; its axis is in the
-    first.
+    first. A joint of SDF within ``<gazebo>`` joins two links of the file as they are at coordinates zero.
 
     Raises
     ------
@@ -106,7 +107,41 @@ def urdf_closures(root: Element, links: Collection[str]) -> list[Loop]:
                 raise at.error(f"<{at.tag}> has no attribute value", *where)
             frames.append((_known(named, "name", links, *where, named.tag), place, [0.0] * 3))
         loops.append(_made(element, name, "ball", frames, None))
-    return loops
+    return loops + [loop for element in gazebo_joints(root) if (loop := gazebo_loop(element, links)) is not None]
+
+
+def gazebo_joints(root: Element) -> list[Element]:
+    """Return the joints that ``<gazebo>`` adds to a file."""
+    holders = [gazebo for gazebo in root.every("gazebo") if not gazebo.attributes.get("reference", "").strip()]
+    return [joint for gazebo in holders for joint in gazebo.every("joint")]
+
+
+def gazebo_loop(element: Element, links: Collection[str]) -> Loop | None:
+    """Return the loop that a joint of SDF closes between two links of a file; None if it is of another kind.
+
+    Its frame is that of the child, moved by its ``<pose>``; the axis is in that frame.
+
+    Raises
+    ------
+    RobotFileError
+        A number is missing or none.
+    """
+    name, kind = element.attributes.get("name", ""), element.attributes.get("type", "")
+    ends = [part.content.strip() for role in ("child", "parent") for part in element.every(role)]
+    axis = element.first("axis")
+    xyz = None if axis is None else axis.first("xyz")
+    elsewhere = (xyz is not None and bool(xyz.attributes)) or (axis is not None and axis.first("use_parent_model_frame"))
+    relative = any(pose.attributes for pose in element.every("pose"))
+    if not name or kind not in CLOSED_BY or len(ends) != 2 or not set(ends) <= set(links) or elsewhere or relative:
+        return None
+    pose, direction = pose_of(element, "closures", name), [0.0, 0.0, 1.0]
+    if xyz is not None:
+        direction = xyz.content_numbers(3, "closures", name, "axis")
+    along = None if CLOSED_BY[kind] in ("connect", "weld") else pose.rotation @ direction
+    try:
+        return Loop(Closure(name, ends, CLOSED_BY[kind], pose.position, along), element)
+    except RobotError as error:
+        raise element.error(error.message, "closures", name, value=error.value) from None
 
 
 def _made(

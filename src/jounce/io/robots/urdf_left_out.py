@@ -191,7 +191,7 @@ def _of_gazebo(
         "static": (STATIC, moving and not about, lambda x: x.content.strip() in YES),
         "dampingFactor": (DECAY, on_moving, _counts),
         "velocity_decay": (DECAY, on_moving, lambda x: any(map(_counts, x.children))),
-        "joint": (IN_GAZEBO, not about, lambda _: True),
+        "joint": (IN_GAZEBO, not about, lambda x: x.attributes.get("name") not in robot.closures),
         "link": (IN_GAZEBO, not about, lambda _: True),
         "plugin": (PLUGINS, True, lambda x: _followed(x, joints)),
     }
