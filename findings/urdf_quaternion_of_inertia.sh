@@ -2,8 +2,8 @@
 # URDF 1.1: the quaternion of an <origin> turns an inertia in Pinocchio 4.1.0, and not in MuJoCo 4.0.0 and Drake 1.51.1.
 #
 # The reference parser, urdfdom, reads quat_xyzw from version 1.1 of the format on, and Pinocchio uses it. MuJoCo and
-# Drake leave the attribute out without a message, whatever the version, and take the identity: the same file has other
-# moments of inertia there. Output seen: "torque for 1 rad/s^2: Pinocchio 0.1, MuJoCo 0.2, Drake 0.2" for moments of
+# Drake leave the attribute out, whatever the version, and take the identity: the same file has other moments of inertia
+# there. MuJoCo says nothing; Drake says that it ignores the version, and nothing of the quaternion. Output seen: "torque for 1 rad/s^2: Pinocchio 0.1, MuJoCo 0.2, Drake 0.2" for moments of
 # 0.1, 0.2, 0.25 kg m^2 about x, y, z that the quaternion turns by 90 degrees about z, and a joint about y. Exits with 1
 # if that is no longer so.
 set -euo pipefail
