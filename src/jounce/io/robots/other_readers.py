@@ -212,11 +212,11 @@ def _of_mjcf(path: str | PathLike[str], robot: Robot) -> Iterator[TheirJoint]:
 
     with quiet_mujoco(mujoco):
         spec = mujoco.MjSpec.from_file(fspath(path))
-    waiting = [joint for joint in robot.joints.values() if joint.moving or joint.name in {x.name for x in spec.joints}]
-    for number, joint in enumerate(spec.joints):
+    names = [joint.name or f"joint_{number}" for number, joint in enumerate(spec.joints)]
+    waiting = [joint for joint in robot.joints.values() if joint.moving or joint.name in names]
+    for name, joint in zip(names, spec.joints, strict=True):
         count = {mujoco.mjtJoint.mjJNT_FREE: 6, mujoco.mjtJoint.mjJNT_BALL: 3}.get(joint.type, 1)
         made, waiting = waiting[:count], waiting[count:]
-        name = joint.name or f"joint_{number}"
         if len(made) < count:
             raise RobotFileError("MuJoCo has more joints than were read", path=fspath(path), name=name)
         ours = tuple(part.name for part in made)

@@ -130,7 +130,9 @@ def gazebo_loop(element: Element, links: Collection[str]) -> Loop | None:
     ends = [part.content.strip() for role in ("child", "parent") for part in element.every(role)]
     axis = element.first("axis")
     xyz = None if axis is None else axis.first("xyz")
-    elsewhere = (xyz is not None and bool(xyz.attributes)) or (axis is not None and axis.first("use_parent_model_frame"))
+    elsewhere = (xyz is not None and bool(xyz.attributes)) or (
+        axis is not None and axis.first("use_parent_model_frame")
+    )
     relative = any(pose.attributes for pose in element.every("pose"))
     if not name or kind not in CLOSED_BY or len(ends) != 2 or not set(ends) <= set(links) or elsewhere or relative:
         return None
