@@ -249,7 +249,7 @@ def rotors_of(robot: Robot, *, drives: bool) -> tuple[tuple[int, ...], tuple[int
     leading = tuple(names.index(name) for name in robot.joint_names)
     balls = [x for x in robot.couplings.values() if isinstance(x, BallDrive)]
     tendons = robot.tree.tendons
-    heavy = np.flatnonzero(tendons.armature).tolist()
+    heavy = np.flatnonzero(tendons.armature * tendons.weights.any(axis=1)).tolist()
     lined = tuple((k, leading[int(np.flatnonzero(tendons.weights[k])[0])]) for k in heavy)
     return leading, tuple(names.index(ball.joints[-1]) for ball in balls), lined
 
