@@ -95,6 +95,7 @@ def test_robots_and_quantities(run, tmp_path):
     for options, words in (
         ((robot, "--set", "a=1"), "--set: is for mechanism files"),
         ((robot, "--format", "table"), "--format: is for mechanisms"),
+        ((pendulum, "--no-drives"), "--no-drives: is for robots"),
         ((pendulum, "--format", "table", "--quantity", "forces"), "--quantity: is for code"),
     ):
         status, _, message = run(*options)

@@ -82,11 +82,13 @@ def equations(
     with expecting(file, "mechanism", "robot"):
         check_ending(file, (*DATA_FILES, *ROBOT_FILES))
     model = _robot(reading, file) if file.suffix.lower() in ROBOT_FILES else reading.mechanism(file)
-    if format == "table" and not isinstance(model, Mechanism):
-        raise JounceError("is for mechanisms; jounce torques has those of a robot", name="--format", value=format)
+    if no_drives and isinstance(model, Mechanism):
+        raise JounceError("is for robots", name="--no-drives", value=True)
     if format == "table" and quantity is not None:
         raise JounceError("is for code; a table has all of them", name="--quantity", value=quantity)
     if format == "table":
+        if not isinstance(model, Mechanism):
+            raise JounceError("is for mechanisms; jounce torques has those of a robot", name="--format", value=format)
         return _table(model, file, joint, order, out, overwrite=overwrite)
     if out is not None:
         check_target(out, (ending_of(format),), "code", overwrite=overwrite)

@@ -227,7 +227,8 @@ class NamingReader(GraphReader):
         """Return what an operation makes of values; what is rounded is how many whole turns an angle has."""
         if equation.primitive.name == "round":
             zero = self.graph.constant(0.0)
-            return [Entries(np.full(v.aval.shape, zero), v.aval.dtype) for v in equation.outvars]
+            made: list[Any] = [v.aval for v in equation.outvars]
+            return [Entries(np.full(aval.shape, zero), aval.dtype) for aval in made]
         return super().applied(equation, operands)
 
     def _is_of_fields(self, number: int) -> bool:

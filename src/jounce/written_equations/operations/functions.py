@@ -95,7 +95,7 @@ def stages(function: Function) -> Iterator[Stage]:
         yield Stage(whole + [(x, k) for x in tables for k in range(len(x.labels))], function.results)
         return
     for k, results in enumerate(function.results):
-        rows = [(x, n) for x in tables for n in range(0 if k == 0 else x.lead + k - 1, x.lead + k)]
+        rows: list[Row] = [(x, n) for x in tables for n in range(0 if k == 0 else x.lead + k - 1, x.lead + k)]
         yield Stage(whole + rows if k == 0 else rows, results)
 
 
