@@ -19,7 +19,10 @@ from jounce.written_equations.joint_forms.symbolic_joint import Expansion, Given
 from jounce.written_equations.operations.graph import Graph
 from jounce.written_equations.operations.reading import Entries, NotWrittenError
 
-PREMISE = r"For bodies that turn against each other about $\hat{\mathbf{u}}$ alone, as their bearing holds them."
+PREMISE = (
+    r"For bodies that turn against each other about $\hat{\mathbf{u}}$ alone, the axis with unit length, as their bearing "
+    r"holds them; $e_0$, $\mathbf{e}$ are the Euler parameters of that turn."
+)
 _AXIS = r"\hat{\mathbf{u}}^T"
 _NAMES: dict[Atom, str] = {
     ("e", "j", 0, 0): "e_{0}",
