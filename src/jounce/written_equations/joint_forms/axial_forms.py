@@ -20,8 +20,8 @@ from jounce.written_equations.operations.graph import Graph
 from jounce.written_equations.operations.reading import Entries, NotWrittenError
 
 PREMISE = (
-    r"For bodies that turn against each other about $\hat{\mathbf{u}}$ alone, the axis with unit length, as their bearing "
-    r"holds them; $e_0$, $\mathbf{e}$ are the Euler parameters of that turn."
+    r"For bodies that turn against each other about $\hat{\mathbf{u}}$ alone, the axis with unit length, as their "
+    r"bearing holds them; $e_0$, $\mathbf{e}$ are the Euler parameters of that turn."
 )
 _AXIS = r"\hat{\mathbf{u}}^T"
 _NAMES: dict[Atom, str] = {
