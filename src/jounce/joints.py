@@ -12,6 +12,7 @@ from jounce.constraints import (
     rows as rows,
     spatial as spatial,
 )
+from jounce.constraints.friction import Friction as Friction
 from jounce.trajectory import (
     ParametricCurve as ParametricCurve,
     SampledCurve as SampledCurve,

@@ -1,6 +1,7 @@
 """Laws of frames: how the frames of the bodies are drawn changes nothing that can be seen of a mechanism."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -370,6 +371,67 @@ def lines():
     )
 
 
+def rubbing():
+    """A slider-crank, and a block that a pin of the rod takes along in a slot, with friction in all joints."""
+    o, x, y = [0.0, 0.0], [1.0, 0.0], [0.0, 1.0]
+    massive = {"mass": 1.3, "inertia": 0.2, "center_of_mass": [0.1, -0.05]}
+    pin, guide = jn.joints.Friction(0.2, 0.03, 0.05), jn.joints.Friction(0.15, 0.02)
+    return jn.Mechanism(
+        space="planar",
+        gravity=[0.3, -9.81],
+        bodies={
+            "crank": jn.Body(o, 0.5, **massive),
+            "rod": jn.Body([0.35, 0.19], -0.2, **massive),
+            "piston": jn.Body([1.35, 0.0], **massive),
+            "block": jn.Body([0.85, -1.0], **massive),
+        },
+        joints={
+            "O": planar.Revolute(("ground", "crank"), o, o, friction=pin),
+            "A": planar.Revolute(("crank", "rod"), [0.4, 0], o, friction=pin),
+            "B": planar.Revolute(("piston", "rod"), o, x, friction=pin),
+            "guide": planar.Prismatic(("ground", "piston"), o, o, x, x, friction=guide),
+            "track": planar.Prismatic(("ground", "block"), [0, -1], o, x, x, friction=guide),
+            "slot": planar.Parallel2(("block", "rod"), o, [0.5, 0.1], y, friction=guide),
+        },
+        drivers={"turn": drivers.CoordinateDriver(("ground", "crank"), "angle", LAW)},
+    )
+
+
+def rubbing_in_space():
+    """A chain of bodies, each driven in all that its joint leaves it, with friction in all joints."""
+    turning, sliding = jn.joints.Friction(0.2, 0.03, 0.05), jn.joints.Friction(0.15, 0.02)
+    x, y, up = [1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]
+    chain = ("ground", "hinge", "tube", "sled", "nut", "plate", "ball")
+    pairs = dict(zip(chain[1:], itertools.pairwise(chain), strict=True))
+    places = {name: [0.3 * k, 0.1 * k, 0.05 * k] for k, name in enumerate(chain) if k}
+    step, turn = [0.3, 0.1, 0.05], wave(0.1, 0.5, 0.2, 2.0)
+    return in_space(
+        9,
+        places,
+        joints={
+            "hinge": spatial.Revolute(pairs["hinge"], step, ZERO, Z, Z, friction=turning),
+            "sleeve": spatial.Cylindrical(pairs["tube"], step, ZERO, B, B, friction=turning),
+            "guide": spatial.Prismatic(pairs["sled"], step, ZERO, A, A, up, up, friction=sliding),
+            "thread": spatial.Screw(pairs["nut"], step, ZERO, B, B, 0.3, friction=turning),
+            "table": spatial.PlaneOnPlane(pairs["plate"], step, ZERO, up, up, friction=sliding),
+            "socket": spatial.Spherical(pairs["ball"], step, ZERO, friction=turning),
+            "level": spatial.Dot1(pairs["ball"], x, up),
+            "square": spatial.Dot1(pairs["ball"], y, up),
+        },
+        drivers={
+            "turn": drivers.RotationDriver(pairs["hinge"], Z, turn),
+            "roll": drivers.RotationDriver(pairs["tube"], B, turn),
+            "extend": drivers.SpatialSlideDriver(pairs["tube"], step, ZERO, B, wave(0.0, 0.2, 0.05, 3.0)),
+            "slide": drivers.SpatialSlideDriver(pairs["sled"], step, ZERO, A, wave(0.0, 0.2, 0.05, 3.0)),
+            "screw": drivers.RotationDriver(pairs["nut"], B, turn),
+            "along": drivers.SpatialSlideDriver(pairs["plate"], step, ZERO, x, wave(0.0, 0.2, 0.05, 3.0)),
+            "across": drivers.SpatialSlideDriver(pairs["plate"], step, ZERO, y, wave(0.0, 0.1, 0.05, 2.0)),
+            "twist": drivers.RotationDriver(pairs["plate"], up, turn),
+            "spin": drivers.RotationDriver(pairs["ball"], up, turn),
+        },
+    )
+
+
 def ropes():
     """A lever in space that lifts a weight by a rope through two rings of the ground."""
     return in_space(
@@ -510,7 +572,14 @@ MECHANISMS = {
     "couplings": couplings,
     "tracks": tracks,
 }
-MECHANISMS |= {"shafts": shafts, "teeth": teeth, "lines": lines, "ropes": ropes}
+MECHANISMS |= {
+    "shafts": shafts,
+    "teeth": teeth,
+    "lines": lines,
+    "ropes": ropes,
+    "rubbing": rubbing,
+    "rubbing_in_space": rubbing_in_space,
+}
 
 
 @pytest.mark.slow

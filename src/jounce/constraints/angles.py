@@ -162,3 +162,9 @@ def angle_of(
     along, e0 = (axis * attitude[1:]).sum(axis=0), attitude[0]
     namespace = jnp if isinstance(along, jax.Array) else np
     return principal(2.0 * namespace.arctan2(along, e0)), namespace.hypot(along, e0) > SMALLEST_COSINE
+
+
+def parallel_rows(body_i: SpatialPose, body_j: SpatialPose, axis_i: Vectors, axis_j: Vectors) -> list[Jet]:
+    """Return the two rows that keep an axis of each body parallel."""
+    axis = body_j.direction(axis_j)
+    return [body_i.direction(side).dot(axis) for side in perpendiculars(axis_i)]

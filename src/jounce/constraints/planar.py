@@ -11,7 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.constraints.base import AbstractConstraint, Curve, Flag, Scalar, Vector, rows
+from jounce.constraints.base import AbstractConstraint, Curve, Flag, Nested, Scalar, Vector, rows
+from jounce.constraints.friction import Velocities, check_friction, relative_turn, relative_velocity
 from jounce.errors import MechanismError
 from jounce.jet import Jet, atan2, cross, dot, sqrt, wrap
 from jounce.jet.turns import brought_near
@@ -35,6 +36,12 @@ def slide(body_i: Pose, body_j: Pose, point_i: Vectors, point_j: Vectors, vector
     return body_i.direction(vector_i).dot(d) / length_of(vector_i)
 
 
+def sliding(bodies: tuple[Any, ...], moving: Velocities, point_j: Vectors, vector_i: Vectors) -> Jet:
+    """Return the velocity, in m/s, of a point of body j relative to body i, along a direction fixed in that."""
+    velocity = relative_velocity(bodies, moving, point_j)
+    return bodies[0].direction(vector_i).dot(velocity) / length_of(vector_i)
+
+
 def coordinate_of(body: PlanarPose, coordinate: str) -> Jet:
     """Return the angle, x or y of a planar body."""
     return body.angle if coordinate == "angle" else body.position[0 if coordinate == "x" else 1]
@@ -45,12 +52,20 @@ class Revolute(AbstractConstraint, type="revolute", space="planar"):
 
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
+    friction: Nested = None
 
     symbol = "revolute"
     pair = "revolute"
 
+    def __check_init__(self):
+        check_friction(self, turns=True)
+
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         return body_j.point(self.point_j) - body_i.point(self.point_i)
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how the pin slips in its bore, m/s."""
+        return rows(relative_turn(moving) * self.friction.radius)
 
 
 class DoubleRevolute(AbstractConstraint, type="double_revolute", space="planar"):
@@ -88,12 +103,20 @@ class Parallel2(AbstractConstraint, type="parallel2", space="planar"):
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
     vector_i: Vector  # along the slot
+    friction: Nested = None
 
     symbol = "slot"
+
+    def __check_init__(self):
+        check_friction(self, turns=False)
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         return cross(body_i.direction(self.vector_i), d)
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how fast the point slides along the slot, m/s; that the pin turns in it does not count."""
+        return rows(sliding(bodies, moving, self.point_j, self.vector_i))
 
 
 class Prismatic(AbstractConstraint, type="prismatic", space="planar"):
@@ -103,6 +126,7 @@ class Prismatic(AbstractConstraint, type="prismatic", space="planar"):
     point_j: Vector
     vector_i: Vector  # along the slide, in each frame
     vector_j: Vector
+    friction: Nested = None
 
     held_parallel = (("vector_i", "vector_j"),)
     symbol = "prismatic"
@@ -112,6 +136,13 @@ class Prismatic(AbstractConstraint, type="prismatic", space="planar"):
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         along = body_i.direction(self.vector_i)
         return rows(cross(along, body_j.direction(self.vector_j)), cross(along, d))
+
+    def __check_init__(self):
+        check_friction(self, turns=False)
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how fast body j slides in its guide, m/s."""
+        return rows(sliding(bodies, moving, self.point_j, self.vector_i))
 
 
 class Fixed(AbstractConstraint, type="fixed", space="planar"):

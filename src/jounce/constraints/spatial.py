@@ -9,11 +9,17 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jounce.constraints.angles import Datum, Vectors, coaxial, perpendiculars, relative_angle
-from jounce.constraints.base import AbstractConstraint, Curve, Scalar, Vector, rows
+from jounce.constraints.angles import Datum, Vectors, coaxial, parallel_rows, perpendiculars, relative_angle
+from jounce.constraints.base import AbstractConstraint, Curve, Nested, Scalar, Vector, rows
+from jounce.constraints.couplings import (
+    ConstantVelocity as ConstantVelocity,
+    Oldham as Oldham,
+    Tripod as Tripod,
+)
+from jounce.constraints.friction import Velocities, check_friction, relative_turn, relative_velocity
 from jounce.constraints.planar import length_of, slide
 from jounce.constraints.wheels import Wheel as Wheel
-from jounce.jet import Jet, cross, dot, wrap
+from jounce.jet import Jet, cross, sqrt, wrap
 from jounce.rigid import SpatialPose
 
 
@@ -22,11 +28,19 @@ class Spherical(AbstractConstraint, type="spherical", space="spatial"):
 
     point_i: Vector  # m, in the frame of body i
     point_j: Vector
+    friction: Nested = None
 
     symbol = "spherical"
 
+    def __check_init__(self):
+        check_friction(self, turns=True)
+
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return body_j.point(self.point_j) - body_i.point(self.point_i)
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how the ball slips in its socket, m/s, across the axis about which it turns, global."""
+        return relative_turn(moving) * self.friction.radius
 
 
 class DoubleSpherical(AbstractConstraint, type="double_spherical", space="spatial"):
@@ -92,13 +106,21 @@ class Revolute(AbstractConstraint, type="revolute", space="spatial"):
     point_j: Vector
     axis_i: Vector
     axis_j: Vector
+    friction: Nested = None
 
     held_parallel = (("axis_i", "axis_j"),)
     symbol = "revolute"
 
+    def __check_init__(self):
+        check_friction(self, turns=True)
+
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
-        return rows(d, *_parallel(body_i, body_j, self.axis_i, self.axis_j))
+        return rows(d, *parallel_rows(body_i, body_j, self.axis_i, self.axis_j))
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how the pin slips in its bore, m/s."""
+        return rows(_turning(bodies, moving, self.axis_i) * self.friction.radius)
 
 
 class Cylindrical(AbstractConstraint, type="cylindrical", space="spatial"):
@@ -108,12 +130,21 @@ class Cylindrical(AbstractConstraint, type="cylindrical", space="spatial"):
     point_j: Vector
     axis_i: Vector
     axis_j: Vector
+    friction: Nested = None
 
     held_parallel = (("axis_i", "axis_j"),)
     symbol = "cylindrical"
 
+    def __check_init__(self):
+        check_friction(self, turns=True)
+
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return rows(*_collinear(self, body_i, body_j))
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how the shaft slips in its bore along the axis and around it, m/s."""
+        around = _turning(bodies, moving, self.axis_i) * self.friction.radius
+        return rows(_sliding(bodies, moving, self), around)
 
 
 class Prismatic(AbstractConstraint, type="prismatic", space="spatial"):
@@ -125,14 +156,22 @@ class Prismatic(AbstractConstraint, type="prismatic", space="spatial"):
     axis_j: Vector
     normal_i: Vector  # a perpendicular to the axis on each body that stays parallel
     normal_j: Vector
+    friction: Nested = None
 
     held_parallel = (("axis_i", "axis_j"), ("normal_i", "normal_j"))
     never_parallel = (("normal_i", "axis_i"), ("normal_j", "axis_j"))
     symbol = "prismatic"
 
+    def __check_init__(self):
+        check_friction(self, turns=False)
+
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         side = body_i.direction(cross(self.axis_i, self.normal_i) / length_of(self.axis_i)[None])
         return rows(*_collinear(self, body_i, body_j), side.dot(body_j.direction(self.normal_j)))
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how fast body j slides in its guide, m/s."""
+        return rows(_sliding(bodies, moving, self))
 
 
 class PlaneOnPlane(AbstractConstraint, type="planar", space="spatial"):
@@ -142,13 +181,22 @@ class PlaneOnPlane(AbstractConstraint, type="planar", space="spatial"):
     point_j: Vector
     axis_i: Vector  # normal of the plane
     axis_j: Vector
+    friction: Nested = None
 
     held_parallel = (("axis_i", "axis_j"),)
     symbol = "plane"
 
+    def __check_init__(self):
+        check_friction(self, turns=False)
+
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         apart = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
-        return rows(apart, *_parallel(body_i, body_j, self.axis_i, self.axis_j))
+        return rows(apart, *parallel_rows(body_i, body_j, self.axis_i, self.axis_j))
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how the point of body j slides on the plane, m/s, along two directions of it; turns do not count."""
+        velocity = relative_velocity(bodies, moving, self.point_j)
+        return rows(*[bodies[0].direction(side).dot(velocity) for side in perpendiculars(self.axis_i)])
 
 
 class Fixed(AbstractConstraint, type="fixed", space="spatial"):
@@ -168,7 +216,7 @@ class Fixed(AbstractConstraint, type="fixed", space="spatial"):
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
         side = body_i.direction(cross(self.axis_i, self.normal_i) / length_of(self.axis_i)[None])
         level = side.dot(body_j.direction(self.normal_j))
-        return rows(d, *_parallel(body_i, body_j, self.axis_i, self.axis_j), level)
+        return rows(d, *parallel_rows(body_i, body_j, self.axis_i, self.axis_j), level)
 
 
 class SpatialCurve(AbstractConstraint, type="curve", space="spatial"):
@@ -228,16 +276,37 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
     axis_j: Vector
     lead: Scalar  # m per turn of j about the axis of i; negative for a left-hand thread
     offset: Scalar = None  # m
+    friction: Nested = None
 
     dimensions = {"offset": "length"}
     held_parallel = (("axis_i", "axis_j"),)
     symbol = "screw"
+
+    def __check_init__(self):
+        check_friction(self, turns=True)
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         advance = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
         angle = relative_angle(body_i, body_j, self.axis_i, datum=coaxial(self.axis_i, self.axis_j))
         excess = advance - self.lead / (2 * jnp.pi) * angle - self.offset
         return rows(*_collinear(self, body_i, body_j), wrap(excess, self.lead))
+
+    def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
+        """Return how the nut slips along the thread at its mean radius, m/s."""
+        cosine, sine = self._helix()
+        around = _turning(bodies, moving, self.axis_i) * self.friction.radius
+        return rows(around * cosine + _sliding(bodies, moving, self) * sine)
+
+    def pressing(self, bodies: tuple[Any, ...], force: Jet) -> Jet:
+        """Return what presses the flanks of the thread, N: across the helix, of which the axis has a part."""
+        along = bodies[0].direction(self.axis_i).dot(force) / length_of(self.axis_i)
+        return rows(along / self._helix()[0])
+
+    def _helix(self) -> tuple[Any, Any]:
+        """Return cosine and sine of the lead angle."""
+        rise = self.lead / (2 * jnp.pi * self.friction.radius)
+        cosine = 1 / sqrt(1 + rise * rise)
+        return cosine, rise * cosine
 
 
 class Gear(AbstractConstraint, type="gear", space="spatial"):
@@ -272,80 +341,15 @@ class Gear(AbstractConstraint, type="gear", space="spatial"):
         return excess if self.whole is None else wrap(excess, 2 * jnp.pi / self.whole)
 
 
-class ConstantVelocity(AbstractConstraint, type="constant_velocity", space="spatial"):
-    """Homokinetic joint, such as a Rzeppa joint: the centers coincide, and both shafts turn about their axes alike.
-
-    What is left of the relative attitude after the shortest tilt of the axis is no turn about it, but for the offset:
-    so the balls of such a joint lie in the plane that bisects the angle of the shafts. Hunt, Constant-velocity shaft
-    couplings: a general theory, 1973.
-    """
-
-    point_i: Vector  # m, center, in the frame of body i
-    point_j: Vector
-    axis_i: Vector  # of each shaft, in its frame, both from one end of the drive to the other
-    axis_j: Vector
-    offset: Scalar = None  # rad, by which shaft j is turned about its axis
-
-    dimensions = {"offset": "angle"}
-    symbol = "spherical"
-
-    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
-        d = body_j.point(self.point_j) - body_i.point(self.point_i)
-        twist = relative_angle(body_i, body_j, self.axis_i, datum=coaxial(self.axis_i, self.axis_j))
-        return rows(body_i.to_body(d), wrap(twist - self.offset))
+def _turning(bodies: tuple[Any, ...], moving: Velocities, axis_i: Vectors) -> Jet:
+    """Return how fast body j turns about an axis of body i, relative to that, rad/s."""
+    return bodies[0].direction(axis_i).dot(relative_turn(moving)) / length_of(axis_i)
 
 
-class Tripod(AbstractConstraint, type="tripod", space="spatial"):
-    """Plunging joint: three rollers on the arms of spider j, each in the middle plane of a track of tulip i.
-
-    The tracks hold the axis of the tulip, 120 degrees from one another, and so do the arms at the spider: its center
-    may slide along the tulip, and goes round a small circle three times a turn where the shafts are at an angle.
-    """
-
-    point_i: Vector  # m, on the axis of the tulip, in the frame of body i
-    point_j: Vector  # m, center of the spider, in the frame of body j
-    axis_i: Vector  # of each shaft, in its frame, both from one end of the drive to the other
-    axis_j: Vector
-    normal_i: Vector  # across the axis, toward the first track
-    normal_j: Vector  # across the axis, along the first arm
-    radius: Scalar  # m, of the rollers' centers
-
-    never_parallel = (("normal_i", "axis_i"), ("normal_j", "axis_j"))
-    symbol = "spherical"
-
-    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
-        first, second = _frame_of(self.axis_i, self.normal_i)
-        arm, side = _frame_of(self.axis_j, self.normal_j)
-        held = []
-        for c, s in ((1.0, 0.0), (-0.5, 0.75**0.5), (-0.5, -(0.75**0.5))):
-            roller = body_j.point(self.point_j + self.radius[None] * (c * arm + s * side))
-            held.append(body_i.direction(c * second - s * first).dot(roller - body_i.point(self.point_i)))
-        return rows(*held)
-
-
-class Oldham(AbstractConstraint, type="oldham", space="spatial"):
-    """Coupling of parallel shafts: a disc with two slots at right angles, in which a tongue of each hub slides.
-
-    The disc has no mass here. The hubs may move to each other in the plane across the axes, and neither turn nor tilt.
-    """
-
-    point_i: Vector  # m, in the plane of the disc, in the frame of body i
-    point_j: Vector
-    axis_i: Vector
-    axis_j: Vector
-    vector_i: Vector  # the tongue on each hub
-    vector_j: Vector
-
-    held_parallel = (("axis_i", "axis_j"),)
-    never_parallel = (("vector_i", "axis_i"), ("vector_j", "axis_j"))
-    symbol = "universal"
-
-    def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
-        apart = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
-        first, _ = _frame_of(self.axis_i, self.vector_i)
-        second, _ = _frame_of(self.axis_j, self.vector_j)
-        turned = body_i.direction(first).dot(body_j.direction(second))
-        return rows(apart, *_parallel(body_i, body_j, self.axis_i, self.axis_j), turned)
+def _sliding(bodies: tuple[Any, ...], moving: Velocities, joint: Any) -> Jet:
+    """Return how fast the point of a joint on body j slides along the axis of body i, m/s."""
+    velocity = relative_velocity(bodies, moving, joint.point_j)
+    return bodies[0].direction(joint.axis_i).dot(velocity) / length_of(joint.axis_i)
 
 
 def _upright(body: SpatialPose) -> list[Jet]:
@@ -354,22 +358,8 @@ def _upright(body: SpatialPose) -> list[Jet]:
     return [x[1], x[2], y[2]]
 
 
-def _parallel(body_i: SpatialPose, body_j: SpatialPose, axis_i: Vectors, axis_j: Vectors) -> list[Jet]:
-    """Return the two rows that keep an axis of each body parallel."""
-    axis = body_j.direction(axis_j)
-    return [body_i.direction(side).dot(axis) for side in perpendiculars(axis_i)]
-
-
 def _collinear(joint: Any, body_i: SpatialPose, body_j: SpatialPose) -> list[Jet]:
     """Return the four rows that keep the axes of a joint on one line."""
     d = body_j.point(joint.point_j) - body_i.point(joint.point_i)
     on_line = [body_i.direction(side).dot(d) for side in perpendiculars(joint.axis_i)]
-    return [*_parallel(body_i, body_j, joint.axis_i, joint.axis_j), *on_line]
-
-
-def _frame_of(axis: Vectors, normal: Vectors) -> tuple[Any, Any]:
-    """Return the unit vector across a constant axis toward another one, and the vector a quarter turn on."""
-    along = axis / length_of(axis)[None]
-    across = normal - dot(along, normal)[None] * along
-    across = across / length_of(across)[None]
-    return across, cross(along, across)
+    return [*parallel_rows(body_i, body_j, joint.axis_i, joint.axis_j), *on_line]

@@ -240,8 +240,10 @@ def resolve_element(element: Element, parameters: Mapping[str, Any], components:
             elif kind == "wrenches":
                 value = _wrenches(resolve(value, parameters))
             elif kind == "nested" and value is not None:  # the bodies are those of the whole
-                found = resolve_element(value, parameters, components, name)
-                value = unchecked(type(value), {**vars(value), **found, "bodies": ()})
+                of_bodies = hasattr(value, "bodies")
+                place = name if of_bodies else f"{name}.{field_name}"
+                found = resolve_element(value, parameters, components, place)
+                value = unchecked(type(value), {**vars(value), **found} | ({"bodies": ()} if of_bodies else {}))
         except JounceError as error:
             raise error.located(name=f"{name}.{field_name}") from None
         values[field_name] = value

@@ -32,8 +32,8 @@ LINES = {
     "forces": ORANGE,
     "total": "#000000",
 }
-WORDS = {"drivers": "put in by drivers", "forces": "put in by forces", "kinetic": "gain of kinetic energy",
-         "potential": "gain of potential energy"}  # fmt: skip
+WORDS = {"drivers": "put in by drivers", "forces": "put in by forces", "friction": "put in by friction",
+         "kinetic": "gain of kinetic energy", "potential": "gain of potential energy"}  # fmt: skip
 PANEL = (6.4, 1.9)  # inches
 
 

@@ -71,7 +71,9 @@ def acting(
     coordinates = {name: np.stack(jet.dense().coefficients) for name, jet in pose.coordinates().items()}
     motion = Motion(mechanism, model, np.array([INSTANT]), rates + 2, (coordinates, ()), np.zeros(1, int), {})
     found = MotionForces(motion)
-    found.__dict__["multipliers"] = random.normal(size=(rates + 1, len(model.rows), 1))
+    rows = len(model.rows)
+    balancing = random.normal(size=(1, rates + 1, rows + len(found.with_friction), 1))
+    found.__dict__ |= {"_balancing": balancing, "multipliers": balancing[0, :, :rows]}
     return pose, found
 
 
@@ -121,7 +123,11 @@ def worked(found: MotionForces, name: str, element: Any, pose: Any) -> np.ndarra
     place, frozen = found.indices[name], Jet.constant(clock.coefficients[0], pose.order)
     rate = found.model.system.groups[place.group].residual(pose, frozen).differentiate()
     rates = np.stack(rate.dense().coefficients)[:, :, place.instance]
-    return -convolved(scalar, found.multipliers[:, list(place.own_rows)], rates)
+    power = -convolved(scalar, found.multipliers[:, list(place.own_rows)], rates)
+    if name in found.with_friction:
+        taken = np.asarray(found.resisted(place.group, np.zeros(1, int)))[:, place.instance]
+        power = power - convolved(scalar, found.normal_force(name), taken[:, None])
+    return power
 
 
 def convolved(product: Callable[..., Any], a: Any, b: Any) -> np.ndarray:

@@ -149,7 +149,7 @@ def balanced(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray"
     required_masses(motion.mechanism)
     if motion.order < rates + 2:
         raise MechanismError(f"this needs a motion solved to order {rates + 2}", name="order", value=motion.order)
-    forces = MotionForces(motion, gravity=gravity, applied=False)
+    forces = MotionForces(motion, gravity=gravity, applied=False, friction=False)
     values = np.stack([forces.driver_force(name)[: rates + 1, 0] for name in names], axis=1)
     return _of_drivers(motion, values)
 

@@ -1,6 +1,6 @@
 """The power balance of a mechanism in motion: a check of all forces that needs no second solver."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
@@ -31,7 +31,8 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
     """Return where the power in a moving mechanism comes from and goes to, with rates: a check of all its forces.
 
     What drivers and applied forces put in is what the kinetic energy of the bodies, and their potential energy in
-    gravity, gain; the joints do no work. Both sides are computed apart: one from multipliers, one from energies.
+    gravity, gain, and what friction takes; joints do no other work. Both sides are computed apart: one from
+    multipliers, one from energies.
 
     Parameters
     ----------
@@ -42,9 +43,10 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
     -------
     xarray.Dataset
         With dimensions time and derivative, in W, W/s, ...: ``drivers`` and ``forces``, the power that they put in;
-        ``kinetic`` and ``potential``, the rates of the energies; ``residual``, the first two less the others, which is
-        rounding; and ``scale``, the sum of the sizes of all products that enter, by which to judge it at each instant
-        and order: where these cancel, as where the power grows evenly, its rates are rounding and this is not.
+        ``friction``, the power that joints with friction put in, which is negative; ``kinetic`` and ``potential``, the
+        rates of the energies; ``residual``, the first three less the others, which is rounding; and ``scale``, the sum
+        of the sizes of all products that enter, by which to judge it at each instant and order: where these cancel, as
+        where the power grows evenly, its rates are rounding and this is not.
 
     Raises
     ------
@@ -76,15 +78,29 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
     applied, kinetic, potential, sizes = (np.asarray(part) for part in rest)
     forces.check_finite(applied)
     power, size = np.sum(driven, axis=0)
-    terms = {"drivers": power, "forces": applied.sum(axis=1)}
+    taken, rubbed = np.sum([(nothing, nothing), *_friction_powers(forces)], axis=0)
+    size = size + rubbed
+    terms = {"drivers": power, "forces": applied.sum(axis=1), "friction": taken}
     terms |= {"kinetic": kinetic.sum(axis=1), "potential": potential.sum(axis=1)}
     labeled_terms = {name: labeled(motion, part[: motion.order + 1], "W") for name, part in terms.items()}
-    residual = (
-        labeled_terms["drivers"] + labeled_terms["forces"] - labeled_terms["kinetic"] - labeled_terms["potential"]
+    put_in, gained = (
+        sum(labeled_terms[name] for name in names)
+        for names in (("drivers", "forces", "friction"), ("kinetic", "potential"))
     )
+    residual = put_in - gained
     labeled_terms["residual"] = residual.assign_attrs(units="W")
     labeled_terms["scale"] = labeled(motion, (size + sizes.sum(axis=1))[: motion.order + 1], "W")
     return xarray.Dataset(labeled_terms)
+
+
+def _friction_powers(forces: MotionForces) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Give the power of each joint with friction and the size of its products, (levels, time)."""
+    for name in forces.with_friction:
+        place = forces.indices[name]
+        resisted = forces.in_chunks(lambda lanes, place=place: forces.resisted(place.group, lanes))[:, place.instance]
+        factor, normal = Jet(tuple(resisted)), Jet(tuple(forces.normal_force(name)[:, 0]))
+        size = factor.map(np.abs) * normal.map(np.abs)
+        yield np.stack((factor * normal).dense().coefficients) * -1.0, np.stack(size.dense().coefficients)
 
 
 def _driver_power(forces: MotionForces, name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -33,6 +33,8 @@ from jounce.dynamics.forward.saddle_point import (
     in_basis,
     saddle_point,
 )
+from jounce.dynamics.friction.coupling import rubs
+from jounce.dynamics.friction.free_motion import FreeFriction, with_friction
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.jet import Jet
 from jounce.jet.algebra import total
@@ -187,10 +189,15 @@ class Equations(Module):
         inertia = jnp.concatenate([force.coefficients[0], moment.coefficients[0]])[:, 1:]
         now = clock.truncate(0)
 
-        def loosened(change: Any) -> Any:
-            return self.system.variation(at_rest, change, now).coefficients[0]
+        friction = FreeFriction(self.system, moving, now)
 
-        forces = inertia / self.scale + conjugate(loosened, at_rest, multipliers)[:, 1:]
+        def loosened(change: Any) -> Any:
+            return [self.system.variation(at_rest, change, now).coefficients[0], *friction.slips(change)]
+
+        weights = [multipliers]
+        if friction.groups:
+            weights += friction.resisting(friction.normal_forces(multipliers))
+        forces = inertia / self.scale + conjugate(loosened, at_rest, weights)[:, 1:]
         applied = self.system.applied_forces(moving, clock.truncate(1)).coefficients[0]
         forces = forces - applied[:, 1:] / self.scale
         return forces, second, self.attitude_rate(state)
@@ -252,6 +259,31 @@ class Equations(Module):
         solution = -solve(jnp.concatenate([as_column(forces, scale), second]))
         return by_body(solution[:columns], scale), solution[columns:]
 
+    def begun(
+        self, solve: Callable[[Rows], Rows], state: State, time: Instants, forces: ByBody, second: Rows
+    ) -> tuple[ByBody, Rows, Callable[[ByBody, Rows], tuple[ByBody, Rows]]]:
+        """Return accelerations and multipliers of a state, and what solves for their coefficients of higher orders.
+
+        Parameters
+        ----------
+        solve, forces, second
+            As `unknowns` takes them, of no accelerations and no multipliers.
+        state : State
+            Of the bodies.
+        time : array of shape (1, batch)
+            The instant, s.
+        """
+        solved = partial(self.unknowns, solve)
+        found = solved(forces, second)
+        if not any(map(rubs, self.system.groups)):
+            return *found, solved
+        friction = FreeFriction(self.system, self.pose(state), Jet([time]))
+
+        def felt(normal: Any) -> Any:
+            return conjugate(friction.slips, self.pose(state).truncate(0), friction.resisting(normal))[:, 1:]
+
+        return with_friction(solved, found, friction, felt)
+
     def least_change(self, factor: Factor, gap: Rows) -> Column:
         """Return the change of coordinates of least kinetic energy that closes a gap of the scaled rows, scaled."""
         columns = self.system.shape[1]
@@ -297,7 +329,7 @@ def turns_with_ground(moving: Float[Numbers, "*orders 4 body batch"]) -> Float[N
     return with_ground(moving, np.eye(1, math.prod(components)).reshape(*components, 1, 1))
 
 
-def conjugate(variation: Callable[[Pose], Any], pose: Pose, weights: Float[Numbers, "*rows batch"]) -> ByBody:
+def conjugate(variation: Callable[[Pose], Any], pose: Pose, weights: Any) -> ByBody:
     """Return the forces by which weights act on the bodies.
 
     Parameters
@@ -306,8 +338,8 @@ def conjugate(variation: Callable[[Pose], Any], pose: Pose, weights: Float[Numbe
         How what the weights are conjugate to varies with a change of the pose; linear.
     pose : SpatialPose or PlanarPose
         Of order zero.
-    weights : array
-        Of the shape of the variation.
+    weights : array, or list of them
+        Of the shapes of the variation.
     """
     shifts = pose.shifts
     example = jax.ShapeDtypeStruct((shifts + pose.turns, *pose.position.shape[1:]), jnp.float64)
@@ -355,7 +387,6 @@ def expand(
     count, bodies, lanes = equations.coordinates, *state.position.shape[1:]
     known = inverted(equations.factored(state, time)) if inverse is None else inverse
     rows = equations.system.row_scale.shape[0]
-    solved = partial(equations.unknowns, known.solve)
 
     def program(*leaves: Any) -> Any:
         position, attitude, velocity, spin, acceleration, multipliers, clock = leaves
@@ -364,7 +395,7 @@ def expand(
 
     trial = jnp.zeros((count, bodies, lanes)), jnp.zeros((rows, lanes))
     forces, second, _ = program(*state, *trial, time)
-    acceleration, multipliers = solved(forces, second)
+    acceleration, multipliers, solved = equations.begun(known.solve, state, time, forces, second)
     recursion = Recursion(program, (*state, acceleration, multipliers, time), order - 1, reversible=reversible)
     shifts = equations.pose_type.shifts
 

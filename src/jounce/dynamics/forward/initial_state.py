@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float
 from jounce.dynamics.forward.accelerations import Equations, Instants, State
 from jounce.dynamics.forward.saddle_fronts import SaddleFronts
 from jounce.dynamics.forward.saddle_point import even_scale
+from jounce.dynamics.friction.coupling import check_unique_pressing
 from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses
 from jounce.errors import AssemblyError, MechanismError, MobilityError
 from jounce.execution.compilation import compiled
@@ -127,6 +128,7 @@ def consistent_start(
 
 def equations_of(model: Model, masses: Masses, gravity: Gravity) -> Equations:
     """Return the equations of motion of a mechanism."""
+    check_unique_pressing(model, model.system)
     system = with_fields(model.system, outputs=())
     values = {
         "system": system,

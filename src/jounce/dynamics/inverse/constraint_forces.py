@@ -100,8 +100,7 @@ def multipliers(
     """
     if not blocks:
         return jnp.zeros((load.shape[0], 0, load.shape[-1]))
-    scale = jnp.asarray(system.column_scale)
-    solve, count = _solver(system, blocks, mass), len(load)
+    solve, count = load_solver(system, blocks, mass), len(load)
 
     def level(latest: Any, level_and_load: Any) -> tuple[Any, Any]:
         """Find the next coefficient from those found, the latest first and zero before the lowest."""
@@ -112,11 +111,21 @@ def multipliers(
                 needed = [jnp.where(j <= k, slope[j], 0.0) for j in range(1, count)]
                 work = total(jnp.sum(c * f[None], axis=1) for c, f in zip(needed, forces, strict=True))
                 missing -= onto_bodies(work, group.bodies[slot], system.body_count)
-        newest = solve(as_column(missing, scale)) * system.row_scale
+        newest = solve(missing)
         return [newest, *latest[:-1]][: len(latest)], newest
 
     start = [jnp.zeros((system.shape[0], load.shape[-1]))] * (count - 1)
     return jax.lax.scan(level, start, (np.arange(count), load))[1]  # compiled once for all orders
+
+
+def load_solver(
+    system: System, blocks: Slopes, mass: BodyMatrices | None
+) -> Callable[[Float[Numbers, "coordinate body batch"]], Float[Numbers, "row batch"]]:
+    """Return what finds the multipliers, not scaled, that balance a load, all of an order and given as `multipliers`
+    has them.
+    """
+    solve, scale = _solver(system, blocks, mass), jnp.asarray(system.column_scale)
+    return lambda load: solve(as_column(load, scale)) * system.row_scale
 
 
 def _solver(system: System, blocks: Slopes, mass: BodyMatrices | None) -> Callable[[Any], Any]:

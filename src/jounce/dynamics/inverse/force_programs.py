@@ -6,7 +6,6 @@ that all mechanisms share it.
 
 import dataclasses
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import jax
@@ -14,10 +13,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.constraints.friction import slip_velocity
 from jounce.dynamics.forward.accelerations import Lanes
 from jounce.dynamics.forward.loads import loads, mass_matrices
+from jounce.dynamics.friction.coupling import friction_slope, rubs
 from jounce.dynamics.inverse import constraint_forces, redundant_forces
 from jounce.dynamics.inverse.constraint_forces import Multipliers, Slope, Slopes
+from jounce.dynamics.inverse.friction_of_motion import Rubbed, rubbing_of, with_friction
 from jounce.dynamics.inverse.tooth_flanks import with_flanks
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.dynamics.motion_values import Coordinates, in_lots, part_of, pose_of
@@ -47,6 +49,19 @@ def element_slopes(
     return slopes(element, [pose_of(pose, pose_type, levels - 1) for pose in poses], time, slot)
 
 
+@compiled("pose_type", "slot", "levels", brief=True)
+def friction_slopes(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose], slot: int, levels: int) -> Any:
+    """Return what the friction of a normal force of one does to the body in a slot, as `friction_slope` does."""
+    return friction_slope(element, [pose_of(pose, pose_type, levels) for pose in poses], slot)
+
+
+@compiled("pose_type", "levels", brief=True)
+def resisted(element: Any, poses: Sequence[Coordinates], pose_type: type[Pose], levels: int) -> Any:
+    """Return the power that friction takes for a normal force of one, Taylor coefficients, (levels, joints, time)."""
+    slip = slip_velocity(element, [pose_of(pose, pose_type, levels) for pose in poses])
+    return stacked(element.friction.resisting(slip).dot(slip))
+
+
 @compiled("pose_type", brief=True)
 def body_loads(
     system: System, bodies: Coordinates, instants: Lanes, masses: Masses, gravity: Gravity, pose_type: type[Pose]
@@ -66,12 +81,18 @@ def multipliers(
     at_rest: Coordinates | None,
     masses: Masses,
     pose_type: type[Pose],
+    rubbed: Sequence[Rubbed] = (),
 ) -> Any:
-    """Return the multipliers that balance a load, Taylor coefficients, (levels, rows, time)."""
+    """Return the multipliers that balance a load, and normal forces, Taylor coefficients, (levels, rows, time)."""
     mass = None if at_rest is None else mass_matrices(pose_of(at_rest, pose_type, 0), masses)[:, :, 1:]
-    of_lot = partial(constraint_forces.multipliers, system)
+
+    def of_lot(blocks: Slopes, load: Numbers, mass: Any, rubbed: Sequence[Rubbed]) -> Any:
+        if not rubbed:
+            return constraint_forces.multipliers(system, blocks, load, mass)
+        return with_friction(system, blocks, load, mass, rubbing_of(system, blocks, rubbed, pose_type))
+
     dense = mass is not None or system.fronts is None
-    return in_lots(of_lot, LOT, blocks, load, mass) if dense else of_lot(blocks, load, mass)
+    return in_lots(of_lot, LOT, blocks, load, mass, rubbed) if dense else of_lot(blocks, load, mass, rubbed)
 
 
 @Mapped
@@ -103,7 +124,14 @@ def _balanced(shared: Any, lanes: Any, *, pose_type: type[Pose]) -> tuple[Any, A
     if choice is not None:
         return least_multipliers.function(system, blocks, load, *choice), finite
     still = None if system.shape[0] == system.shape[1] else part_of(bodies, None, 1)
-    return multipliers.function(system, blocks, load, still, masses, pose_type)[None], finite
+
+    def rubbed(group: Group) -> Rubbed:
+        moving, placed = ([part_of(bodies, its, n) for its in group.bodies] for n in (levels + 1, levels))
+        slopes = [friction_slopes.function(group.element, moving, pose_type, s, levels) for s in group.moving_slots]
+        return slopes, placed
+
+    rubbing = [rubbed(group) for group in system.groups if rubs(group)]
+    return multipliers.function(system, blocks, load, still, masses, pose_type, rubbing)[None], finite
 
 
 def without_constraints(system: System, forces: tuple[Group, ...]) -> System:

@@ -9,7 +9,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.dynamics.friction.coupling import check_unique_pressing, rubs
 from jounce.dynamics.inverse import force_programs as programs, idle_torques, tooth_flanks as teeth
+from jounce.dynamics.inverse.locked_friction import (
+    check_not_locked,
+    friction_left_out,
+    without_open_rates,
+)
 from jounce.dynamics.inverse.redundant_forces import OPEN, OpenMultipliers
 from jounce.dynamics.masses import check_loads, gravity_of, masses_of
 from jounce.dynamics.motion_values import along_motion, part_of
@@ -37,6 +43,8 @@ class MotionForces:
         Whether the bodies have weight, and whether the applied forces act.
     flanks : bool, default True
         Whether teeth press on their flanks, and so load bearings by their pressure angle.
+    friction : bool, default True
+        Whether joints have the friction that the mechanism has.
 
     Raises
     ------
@@ -44,7 +52,15 @@ class MotionForces:
         If nothing has a mass and no force is applied, the motion has no accelerations, or the masses are not valid.
     """
 
-    def __init__(self, motion: Motion, *, gravity: bool = True, applied: bool = True, flanks: bool = True):
+    def __init__(
+        self,
+        motion: Motion,
+        *,
+        gravity: bool = True,
+        applied: bool = True,
+        flanks: bool = True,
+        friction: bool = True,
+    ):
         check_loads(motion.mechanism)
         self.motion, self.model = motion, motion.model
         self.pose_type, self.coordinates = motion.poses
@@ -57,10 +73,13 @@ class MotionForces:
         self.forces = motion.forces if applied else ()
         self.indices = element_indices(self.model)
         system = self.model.system  # programs without laws serve all of them, also those that a motion has found
-        self._joined = dataclasses.replace(system, groups=tuple(map(law_left_out, system.groups)), outputs=())
+        groups = system.groups if friction else map(friction_left_out, system.groups)
+        self._joined = dataclasses.replace(system, groups=tuple(map(law_left_out, groups)), outputs=())
+        check_unique_pressing(self.model, self._joined)
         self._kept: dict[tuple[Any, ...], Numbers] = {}
         self.flanks: teeth.Flanks = teeth.either_flank(system.groups, len(motion.time)) if flanks else {}
         self._reversals: dict[int, np.ndarray] = {}
+        self.passing: dict[str, np.ndarray] = {}  # instants at which nothing presses a joint with friction
 
     @classmethod
     def of(cls, motion: Motion) -> "MotionForces":
@@ -76,7 +95,7 @@ class MotionForces:
         Where constraints are redundant, those of least norm, or by the stiffnesses that the mechanism has for it. NaN
         at change points, where they are not determined, and next to them where rounding decides them.
         """
-        found = self._balancing[0]
+        found = self._balancing[0][:, : len(self.model.rows)]
         passages, time = self.motion.passages, self.motion.time
         if passages:  # a distance d away they grow as 1 / d, and so does what rounding makes of them
             unknown = [spoiled(passages, time, level + 1) for level in range(len(found))]
@@ -119,11 +138,13 @@ class MotionForces:
             if choice is not None:
                 return programs.least_multipliers(self._joined, blocks, load, *choice)
             still = None if self._joined.shape[0] == self._joined.shape[1] else self.coordinates_at(None, lanes, 1)
-            return programs.multipliers(self._joined, blocks, load, still, self.masses, self.pose_type)[None]
+            rubbed = [self._rubbed(k, lanes) for k in self._rubbing]
+            return programs.multipliers(self._joined, blocks, load, still, self.masses, self.pose_type, rubbed)[None]
 
         found = self.in_chunks(chunk)
+        check_not_locked(self.motion, self._joined, found[0])
         self.check_finite(found[0])
-        return found
+        return without_open_rates(self, found)
 
     def _balancing_code(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
         """Return what `balance_of_instant` does, for a choice among multipliers of redundant rows."""
@@ -203,6 +224,53 @@ class MotionForces:
         mechanism = self.motion.mechanism
         selection = resolved_reactions(mechanism.redundant_reactions, mechanism.parameter_values)
         return OpenMultipliers(model, np.asarray(scaled)[..., 0], selection)
+
+    @property
+    def _rubbing(self) -> dict[int, int]:
+        """Where the normal forces of groups with friction begin, below the multipliers, by the index of the group."""
+        rubbing = [k for k, group in enumerate(self._joined.groups) if rubs(group)]
+        counts = [self._joined.groups[k].instances for k in rubbing]
+        return {k: len(self.model.rows) + sum(counts[:n]) for n, k in enumerate(rubbing)}
+
+    def _rubbed(self, index: int, lanes: np.ndarray) -> programs.Rubbed:
+        """Return what is to be known of the friction of a group at some instants."""
+        group = self._joined.groups[index]
+        moving = [self.coordinates_at(slot, lanes, self.levels + 1) for slot in group.bodies]
+        slots = group.moving_slots
+        slopes = [programs.friction_slopes(group.element, moving, self.pose_type, s, self.levels) for s in slots]
+        return slopes, self._poses(index, lanes)
+
+    @cached_property
+    def rates(self) -> Float[np.ndarray, " time"]:
+        """How fast the motion changes, 1/s."""
+        return teeth.rate_of(self.motion)
+
+    @property
+    def with_friction(self) -> list[str]:
+        """The names of the joints with friction."""
+        return [name for name, place in self.indices.items() if place.group in self._rubbing]
+
+    def resisted(self, index: int, lanes: np.ndarray) -> Float[Numbers, "order instance time"]:
+        """Return the power that friction takes for a normal force of one, of a group at some instants."""
+        group = self._joined.groups[index]
+        moving = [self.coordinates_at(slot, lanes, self.levels + 1) for slot in group.bodies]
+        return programs.resisted(group.element, moving, self.pose_type, self.levels)
+
+    def pressing_force(
+        self, name: str, multipliers: Numbers, lanes: np.ndarray
+    ) -> Float[Numbers, "order component time"]:
+        """Return what multipliers of all rows exert in a joint on one of its bodies, as Taylor coefficients."""
+        place = self.indices[name]
+        group = self._joined.groups[place.group]
+        own = multipliers[:, place.rows].reshape(len(multipliers), -1, group.instances, len(lanes))
+        works = programs.wrenches(self._slopes(place.group, group.moving_slots[-1], lanes), own)
+        return np.asarray(works)[:, : self.pose_type.shifts, place.instance]
+
+    def normal_force(self, name: str) -> Float[Numbers, "order 1 time"]:
+        """Return what presses the surfaces of a joint with friction together, N, as Taylor coefficients."""
+        place = self.indices[name]
+        row = self._rubbing[place.group] + place.instance
+        return self._balancing[0][:, row : row + 1]
 
     def _blocks(self, lanes: np.ndarray) -> list[list[Any]]:
         """Return the slopes of all groups by the bodies of their moving slots."""
@@ -287,9 +355,15 @@ class MotionForces:
         Force, global, and moment about the origin of the body, in its axes.
         """
         if place := self.indices.get(name):
+            first, group = self._rubbing.get(place.group), self._joined.groups[place.group]
 
             def of_constraint(lanes: np.ndarray) -> Any:
-                return programs.wrenches(self._slopes(place.group, slot, lanes), self._of_group(place)[..., lanes])
+                held = programs.wrenches(self._slopes(place.group, slot, lanes), self._of_group(place)[..., lanes])
+                if first is None:
+                    return held
+                slopes, _ = self._rubbed(place.group, lanes)
+                pressing = self._balancing[0][:, None, first : first + group.instances, lanes]
+                return held + programs.wrenches(slopes[group.moving_slots.index(slot)], pressing)
 
             found = self._once(of_constraint, "joint", place.group, slot)[:, :, place.instance]
             return teeth.told(found, self._reversals.get(place.group), place.instance)

@@ -9,6 +9,7 @@ import numpy as np
 from jounce.constraints import Cam, Rope
 from jounce.constraints.base import Vector, by_ratio_alone
 from jounce.constraints.planar import Belt
+from jounce.dynamics.inverse.locked_friction import passing_words
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.inverse.output_words import (
     belt_words,
@@ -62,8 +63,10 @@ class AbstractForceOutput(AbstractMotionOutput):
         """Return why values are NaN at instants that were solved: redundant constraints leave them open."""
         forces = MotionForces.of(motion)
         solved = motion.status == Status.OK
-        if forces.loose is None or np.isfinite(values[solved]).all():
+        if np.isfinite(values[solved]).all():
             return ""
+        if forces.loose is None:
+            return passing_words(forces)
         return (
             f"not unique, as constraints are redundant: {forces.open.words}; redundant_reactions chooses by least "
             "norm or by stiffnesses"

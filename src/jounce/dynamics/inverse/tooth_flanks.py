@@ -87,7 +87,7 @@ def settled(
     if motion.traced:
         flanks = {k: jnp.where(jax.lax.stop_gradient(of_group(found[0], k)[0]) < 0, -1.0, 1.0) for k in flanks}
         return solve(flanks), flanks, {}
-    rate, reversals, unsettled = _rate(motion), {}, []
+    rate, reversals, unsettled = rate_of(motion), {}, []
     for _ in range(MOST_CHANGES):
         told = {k: _signs(of_group(found[0], k), found[0], rate) for k in flanks}
         now, reversals = ({k: pair[part] for k, pair in told.items()} for part in (0, 1))
@@ -112,7 +112,7 @@ def told(work: Numbers, first: Numbers | None, instance: int) -> Numbers:
     return work if first is None else np.where(np.arange(len(work))[:, None, None] >= first[instance], np.nan, work)
 
 
-def _rate(motion: Motion) -> Float[np.ndarray, " time"]:
+def rate_of(motion: Motion) -> Float[np.ndarray, " time"]:
     """Return how fast a motion changes, 1/s: the largest root of a Taylor term, in rad or sizes of the mechanism."""
     found = np.full(len(motion.time), SLOWEST)
     for name, series in motion.poses[1].items():
@@ -151,13 +151,14 @@ def _reversal_words(name: str, forces: Numbers, motion: Motion) -> str:
     sign[np.abs(forces[solved]) <= NONE * np.max(np.abs(forces[solved]), initial=0.0)] = 0.0
     zero = times[sign == 0] if sign.any() else times[:0]
     if zero.size:
-        where = _listed(zero)
+        where = listed(zero)
         return f"the load of {name} changes flanks at t = {where}: rates of what it presses apart are not determined"
     changes = times[1:][sign[1:] != sign[:-1]]
-    return f"the load of {name} changes flanks before t = {_listed(changes)}" if changes.size else ""
+    return f"the load of {name} changes flanks before t = {listed(changes)}" if changes.size else ""
 
 
-def _listed(times: Float[np.ndarray, " time"]) -> str:
+def listed(times: Float[np.ndarray, " time"]) -> str:
+    """List the first of some instants."""
     return ", ".join(f"{t:.4g} s" for t in times[:MOST_TOLD]) + (", ..." if len(times) > MOST_TOLD else "")
 
 

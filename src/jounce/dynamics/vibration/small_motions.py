@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from jounce.dynamics.forward.accelerations import Equations
+from jounce.dynamics.friction.coupling import check_no_friction
 from jounce.dynamics.masses import gravity_of, masses_of, required_masses
 from jounce.dynamics.motion_values import cut
 from jounce.dynamics.statics.equilibrium_search import BALANCED, SearchResult, remains
@@ -145,6 +146,7 @@ def point_along(motion: Motion, time: Real | None) -> OperatingPoint:
     lanes, mechanism = np.array([lane]), motion.mechanism
     at_lane = {name: np.asarray(x)[..., lanes] for name, x in cut(coordinates, 2).items()}
     system = with_fields(motion.model.system, outputs=(), forces=at_lanes(motion.forces, lanes))
+    check_no_friction(system.groups, "small motions")
     equations = Equations(system, masses_of(mechanism), gravity_of(mechanism), 1.0, pose_type)
     point = OperatingPoint(
         mechanism, motion.model, equations, at_lane, clock_at(float(motion.time[lane]), stopped=False)

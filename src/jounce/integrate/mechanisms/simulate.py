@@ -11,6 +11,7 @@ from jaxtyping import Bool
 from jounce.constraints import AbstractConstraint
 from jounce.dynamics.forward.accelerations import Equations, Instants, State, with_ground
 from jounce.dynamics.forward.initial_state import ConsistentStart, consistent_start
+from jounce.dynamics.friction.coupling import joints_with_friction
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of
 from jounce.errors import JounceError, MechanismError, SolveError, did_you_mean
 from jounce.execution.backends import backend_of, joined
@@ -390,9 +391,12 @@ class _Run:
         if current.short.item() >= STUCK and kink >= 0:
             words = "switches without end, as dry friction does at rest: smooth it, as by tanh(v/v0)"
             return Status.COLLAPSED, f"{watched_names(self.start.model)[kink]} at t = {time:g} s {words}"
+        acceleration = np.abs(np.asarray(current.expansion.acceleration[0])[..., 0])
+        rubbing = joints_with_friction(self.start.model, self.start.model.system)
+        if rubbing and not np.isfinite(acceleration).all():
+            return Status.COLLAPSED, f"friction locks at t = {time:g} s: {', '.join(rubbing)}"
         if (blocked := current.blocked.item()) >= 0:
             return Status.COLLAPSED, f"{watched_names(self.start.model)[blocked]} at t = {time:g} s"
-        acceleration = np.abs(np.asarray(current.expansion.acceleration[0])[..., 0])
         scale = np.asarray(self.start.equations.system.column_scale)[:, None]
         sizes = np.nan_to_num(acceleration / scale, nan=np.inf).max(axis=0)
         return Status.COLLAPSED, f"body {self.start.model.bodies[int(np.argmax(sizes))]}"

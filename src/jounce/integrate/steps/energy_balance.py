@@ -13,6 +13,7 @@ import numpy as np
 
 from jounce.dynamics.energy.energies import body_energy
 from jounce.dynamics.forward.accelerations import Equations, Flags, Instants, Lanes, State
+from jounce.dynamics.friction.coupling import rubs
 from jounce.forces.base import AbstractForce
 from jounce.integrate.steps.exact_programs import uses
 from jounce.integrate.steps.lookahead import hiding
@@ -78,7 +79,11 @@ def is_balanced(equations: Equations, state: State, time: Instants) -> bool:
     """
     at_rest, pose = equations.pose_at_rest(state.position, state.attitude), equations.pose(state)
     groups, forces = equations.system.groups, equations.system.forces
-    if not hiding(equations, state, time) or any(_is_moved(group, at_rest, time) for group in groups):
+    if (
+        any(map(rubs, groups))
+        or not hiding(equations, state, time)
+        or any(_is_moved(group, at_rest, time) for group in groups)
+    ):
         return False
 
     def power(group: Group) -> Callable[[Instants], Numbers]:

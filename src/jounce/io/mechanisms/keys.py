@@ -7,17 +7,21 @@ readable from files as soon as its class exists.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, dataclass
 from typing import Any
 
 from jounce.constraints import catalogue
 from jounce.constraints.facts import facts_of, field_kind, value_fields
+from jounce.constraints.friction import Friction
 from jounce.io.files.located_data import Location
 from jounce.modules import is_ours
 
 ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
 """The sections of a file that hold what is told apart by ``type``, and the role of each."""
+
+NESTED: Mapping[str, type[Any]] = {"friction": Friction}
+"""What a field of this name has, in a file a mapping of the fields of its class."""
 
 _PLURALS = {"point": "points", "vector": "vectors", "axis": "axes", "normal": "normals", "radius": "radii"}
 
@@ -34,7 +38,7 @@ class FileKey:
         Fields of the class that it fills; more than one when the key holds a list with an entry for each body.
     kind : str
         ``scalar``, ``vector``, ``motion``, ``law``, ``laws``, ``wrenches``, ``whole``, ``flag``, ``points``, ``curve``,
-        ``text`` or ``parts``.
+        ``text``, ``parts`` or ``nested``.
     quantity : str
         Kind of unit that the class states: one of ``units.KINDS``; or ``direction`` (any unit, the same in all
         components), or ``of coordinate`` and ``per angle``, which follow the key ``coordinate`` beside it.

@@ -19,11 +19,12 @@ from jounce.constraints.facts import facts_of
 from jounce.errors import JounceError, MechanismFileError, no_such
 from jounce.io.mechanisms.curve_values import curve
 from jounce.io.mechanisms.inertia_forms import inertia
-from jounce.io.mechanisms.keys import FileKey, cam_types, file_keys, is_cam
+from jounce.io.mechanisms.keys import NESTED, FileKey, cam_types, file_keys, is_cam
 from jounce.io.mechanisms.motion_values import cam_motion, laws, motion
 from jounce.io.mechanisms.output_types import HOLDERS, output_holder, output_tag, output_types
 from jounce.io.mechanisms.values import (
     Checked,
+    nested,
     orientation,
     parts,
     points,
@@ -187,8 +188,8 @@ def _annotation(kind: type[Any], key: FileKey, size: int) -> Any:
             return parts(kinds, size)
         case "points":
             return points(size, key.quantity)
-        case "flag" | "whole" | "wrenches":
-            return _PLAIN[key.kind]
+        case "flag" | "whole" | "wrenches" | "nested":
+            return nested(NESTED[key.key]) if key.kind == "nested" else _PLAIN[key.kind]
     choices = facts_of(kind).choices.get(key.fields[0])
     words = {"enum": list(choices)} if choices else {"type": "string"}
     return Annotated[Any, Checked(_text, words)]

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterable
+from dataclasses import MISSING
 from typing import Annotated, Any
 
 from pydantic_core import PydanticCustomError, core_schema
 
-from jounce.constraints.facts import at_coordinate
-from jounce.errors import UNSET, JounceError, MechanismError
+from jounce.constraints.facts import at_coordinate, facts_of, value_fields
+from jounce.errors import UNSET, JounceError, MechanismError, no_such
 from jounce.io.files.located_data import shows_value
 from jounce.mechanism.redundant_reactions import CHOICES, STIFFNESSES
 from jounce.rigid.euler_parameters import form_of
@@ -172,6 +173,27 @@ def parts(kinds: dict[str, str], size: int) -> Any:
         "additionalProperties": False,
     }
     return Annotated[Any, Checked(check, schema)]
+
+
+def nested(kind: type[Any]) -> Any:
+    """Return the annotation of a mapping of the scalar fields of a class, of which it makes an instance."""
+    fields, quantities = value_fields(kind), facts_of(kind).dimensions
+    needed = [name for name, field in fields.items() if field.default is MISSING]
+    words = f"{{{', '.join(f'{name}: ...' for name in needed)}}}"
+
+    def check(raw: object, info: Any) -> Any:
+        if not isinstance(raw, dict):
+            raise problem(f"must be a mapping, as {words}")
+        for name in raw:
+            if name not in fields:
+                raise problem(no_such("key", name, fields), value=name)
+        for name in needed:
+            if raw.get(name) is None:
+                raise problem(f"is missing: give {words}", name, value=UNSET)
+        given = {name: x for name, x in raw.items() if x is not None}
+        return kind(**{name: parse(x, quantities[name], info, name).value for name, x in given.items()})
+
+    return Annotated[Any, Checked(check, object_schema({n: scalar_schema(quantities[n]) for n in fields}, needed))]
 
 
 def points(size: int, quantity: str) -> Any:

@@ -208,6 +208,8 @@ class _Writer:
                 written: list[Any] = [self.laws.written(where, x, element) for x in values]
             elif key.kind == "curve":
                 written = [self.laws.curve(where, x) for x in values]
+            elif key.kind == "nested":
+                written = [self._values(where, x) for x in values]
             else:
                 written = [plain(value, where) for value in values]
             whole = dict(zip(key.names, written, strict=True)) if key.names else written

@@ -1,0 +1,197 @@
+"""Friction of joints in the equations of motion: forces in proportion to reactions, which they change.
+
+The normal force N of each joint with friction counts among the unknowns beside the multipliers, and the friction of a
+normal force of one is known from the motion: bodies feel it as they feel a residual held by a multiplier. So
+
+    J^T lambda + V N = load,    N = |R(lambda)|,
+
+where R is the reaction force of the joint. What solves for multipliers without friction, lambda = S load, leaves for
+the normal forces a system of their number, ``N = |R(S load - S V N)|``: a few unknowns, solved by Newton's method from
+those without friction; and for their higher Taylor coefficients a linear one, with the same matrix at every order.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from jounce.constraints.friction import displacements, normal_force, slip_velocity
+from jounce.errors import UnsupportedError
+from jounce.jet import Jet
+from jounce.jet.algebra import stacked
+from jounce.kinematics.sensitivity.jacobian_series import Slope, along_displacements
+from jounce.linear_algebra.linear import DenseFactor
+from jounce.mechanism.builder import Model, group_rows
+from jounce.mechanism.system import Group, System, movable
+from jounce.modules import Module
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+SHARES = (0.25, 0.5, 0.75, 1.0)  # of friction, at which its matrix is looked at
+STEPS = 30  # of Newton's method, which takes four or five where friction is far from locking
+CLOSE = 1e-15  # of the largest normal force: a smaller change is rounding
+
+NormalForces = Float[Numbers, "joint batch"]
+
+
+def rubs(group: Group) -> bool:
+    """Tell whether joints of a group have friction."""
+    return getattr(group.element, "friction", None) is not None
+
+
+def joints_with_friction(model: Model, system: System) -> list[str]:
+    """Return the names of the joints with friction."""
+    pairs = zip(system.groups, group_rows(model), strict=True)
+    return [name for group, rows in pairs if rubs(group) for name in model.rows[rows][: group.instances]]
+
+
+def check_unique_pressing(model: Model, system: System) -> None:
+    """Raise UnsupportedError where joints have friction and redundant constraints leave open what presses them."""
+    if system.rank is not None and (names := joints_with_friction(model, system)):
+        message = (
+            "friction follows reactions, and redundant constraints leave these open: free the mechanism of constraints "
+            "that repeat others (a ball in the place of a pin, a rod in the place of a coupler), or leave friction out"
+        )
+        raise UnsupportedError(message, name=f"{names[0]}.friction")
+
+
+def check_no_friction(groups: Sequence[Group], what: str) -> None:
+    """Raise UnsupportedError where joints have friction, which something cannot have yet."""
+    if any(map(rubs, groups)):
+        raise UnsupportedError(
+            f"{what} of a mechanism whose joints have friction cannot be computed yet", name="joints"
+        )
+
+
+def friction_slope(element: Any, poses: Sequence[Pose], slot: int) -> Slope:
+    """Return what the friction of a normal force of one does along displacements of the body in a slot, as jets.
+
+    Parameters
+    ----------
+    element : AbstractConstraint
+        With friction; its values have shape (..., instances, 1).
+    poses : sequence of SpatialPose or PlanarPose
+        Of the bodies in each slot, shape (..., instances, batch), with one order more than the result.
+    slot : int
+        Which of the bodies is displaced.
+
+    Returns
+    -------
+    array of shape (order, coordinates, 1, instances, batch)
+        As `slopes` of a residual of one row, whose multiplier is the normal force.
+    """
+    resisting = element.friction.resisting(slip_velocity(element, poses))
+    bodies = tuple(pose.truncate(pose.order - 1) for pose in poses)
+    body = movable(bodies[slot])
+
+    def resisted(change: Any) -> Any:
+        changes = [None] * slot + [change] + [None] * (len(bodies) - slot - 1)
+        slip = element.slip(bodies, displacements([*bodies[:slot], body, *bodies[slot + 1 :]], changes))
+        return stacked(slip.dot(resisting))[:, None]
+
+    return along_displacements(body, resisted)
+
+
+def pressed(element: Any, poses: Sequence[Pose], force: Float[Jet, "component *batch"]) -> Jet:
+    """Return the normal force of joints, (instances, batch), from what they exert on their second body, global."""
+    return normal_force(element, tuple(pose.truncate(force.order) for pose in poses), force)
+
+
+class Coupling(Module):
+    """How normal forces follow from loads of order zero, and what that leaves of the equations of higher orders.
+
+    Parameters
+    ----------
+    response : array of shape (joints, rows, batch)
+        By how much multipliers are less for a normal force of one in each joint.
+    factor : DenseFactor
+        Of the matrix of the normal forces, ``1 + dN/dlambda S V``.
+    """
+
+    response: Float[Numbers, "joint row batch"]
+    factor: DenseFactor
+
+    @classmethod
+    def of(
+        cls,
+        normal: Callable[[Any], Any],
+        free: Float[Numbers, "row batch"],
+        response: Float[Numbers, "joint row batch"],
+    ) -> tuple["Coupling", Float[Numbers, "row batch"], NormalForces]:
+        """Solve for the normal forces.
+
+        Parameters
+        ----------
+        normal : callable
+            Returns normal forces, (joints, batch), from multipliers, (rows, batch).
+        free : array of shape (rows, batch)
+            The multipliers without friction.
+        response : array of shape (joints, rows, batch)
+            Of the multipliers.
+
+        Returns
+        -------
+        coupling : Coupling
+        multipliers : array of shape (rows, batch)
+        forces : array of shape (joints, batch)
+            NaN, as the multipliers are, where friction locks: where no normal forces fulfill the equations, or the
+            matrix has passed a singular one on the way from no friction.
+        """
+
+        def with_friction(forces: Any, free: Any, response: Any) -> Any:
+            return free - jnp.sum(response * forces[:, None], axis=0)
+
+        def matrix(normal: Callable[[Any], Any], multipliers: Any, response: Any) -> Any:
+            along = jax.vmap(lambda column: jax.jvp(normal, (multipliers,), (column,))[1])(response)
+            return jnp.eye(len(response))[..., None] + jnp.swapaxes(along, 0, 1)
+
+        plain, held = jax.closure_convert(normal, free)
+        held = [jax.lax.stop_gradient(x) for x in held]
+        fixed = [jax.lax.stop_gradient(x) for x in (free, response)]
+
+        def normal_now(multipliers: Any) -> Any:
+            return plain(multipliers, *held)
+
+        def improved(carry: Any) -> Any:
+            forces, _, step = carry
+            multipliers = with_friction(forces, *fixed)
+            gap = normal_now(multipliers) - forces
+            change = DenseFactor.of(matrix(normal_now, multipliers, fixed[1])).solve(gap, refined=False)
+            size = jnp.max(jnp.abs(forces), axis=0)
+            return forces + change, jnp.max(jnp.abs(change), axis=0) > CLOSE * size, step + 1
+
+        first = normal_now(fixed[0])
+        start = first, jnp.ones(first.shape[-1], bool), jnp.zeros((), jnp.int32)
+        forces, _, _ = jax.lax.while_loop(lambda carry: jnp.any(carry[1]) & (carry[2] < STEPS), improved, start)
+        forces = jax.lax.stop_gradient(forces)
+        multipliers = with_friction(forces, free, response)
+        whole = matrix(normal, multipliers, response)
+        factor = DenseFactor.of(whole)
+        gap = normal(multipliers) - forces
+        size = jnp.max(jnp.abs(first), axis=0) + jnp.max(jnp.abs(forces), axis=0)
+        found = (jnp.max(jnp.abs(gap), axis=0) <= 1e-9 * size) & _is_regular_from_none(jax.lax.stop_gradient(whole))
+        forces = jnp.where(found, forces + factor.solve(gap), jnp.nan)  # the last step has the derivatives of all
+        return cls(response, factor), with_friction(forces, free, response), forces
+
+    def solved(self, free: Float[Numbers, "row batch"], lower: NormalForces) -> tuple[Any, NormalForces]:
+        """Return coefficients of multipliers and normal forces of an order.
+
+        Parameters
+        ----------
+        free : array of shape (rows, batch)
+            Of the multipliers, without the normal forces of this order.
+        lower : array of shape (joints, batch)
+            Of the normal forces that these multipliers have.
+        """
+        forces = self.factor.solve(lower)
+        return free - jnp.sum(self.response * forces[:, None], axis=0), forces
+
+
+def _is_regular_from_none(matrix: Float[Numbers, "joint joint batch"]) -> Any:
+    """Tell where the matrix of normal forces keeps its sign as friction grows from none, (batch,)."""
+    size, _, lanes = matrix.shape
+    unit = jnp.eye(size)[..., None]
+    shares = jnp.concatenate([unit + share * (matrix - unit) for share in SHARES], axis=-1)
+    return (DenseFactor.of(shares).sign().reshape(len(SHARES), lanes) > 0).all(axis=0)

@@ -1,0 +1,122 @@
+"""Friction where a motion follows from forces: what it adds to the equations of motion, and their solution with it."""
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from jounce.constraints.friction import displacements, slip_velocity
+from jounce.dynamics.friction.coupling import Coupling, pressed, rubs
+from jounce.jet import Jet
+from jounce.mechanism.system import Group, System, movable, with_rows
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+Rows = Float[Numbers, "row batch"]
+
+
+class FreeFriction:
+    """The friction of a mechanism at an instant.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    pose : SpatialPose or PlanarPose
+        Of all bodies, the ground first, of order one.
+    time : Jet
+        Of order zero, shape (1, batch).
+    """
+
+    def __init__(self, system: System, pose: Pose, time: Jet):
+        self.system, self.pose, self.time = system, pose, time
+        self.groups = [group for group in system.groups if rubs(group)]
+
+    @cached_property
+    def _at_rest(self) -> Pose:
+        return movable(self.pose.truncate(0))
+
+    def normal_forces(self, multipliers: Rows) -> Float[Numbers, "joint batch"]:
+        """Return what presses the surfaces of all joints with friction together, from multipliers of scaled rows."""
+        unscaled, found, first = multipliers * self.system.row_scale, [], 0
+        for group in self.system.groups:
+            bodies = tuple(self._at_rest.take(indices) for indices in group.bodies)
+            shape = jax.eval_shape(lambda g=group: g.residual(self.pose.truncate(0), self.time).coefficients[0]).shape
+            count = shape[0] * shape[1]
+            if rubs(group):
+                own = unscaled[first : first + count].reshape(shape[0], shape[1], -1)
+                found.append(self._pressed(group, bodies, own))
+            first += count
+        return jnp.concatenate(found)
+
+    def _pressed(self, group: Group, bodies: tuple[Pose, ...], own: Any) -> Any:
+        body = bodies[1]
+        still = jnp.zeros((body.turns, *body.position.shape[1:]))
+
+        def moved(shift: Any) -> Any:
+            change = movable(body.varied(Jet([shift]), Jet([still])))
+            return with_rows(group.element.variation(bodies, (None, change), self.time)).coefficients[0]
+
+        force = -jax.linear_transpose(moved, jax.ShapeDtypeStruct(body.position.shape, jnp.float64))(own)[0]
+        return pressed(group.element, bodies, Jet([force])).coefficients[0]
+
+    def slips(self, change: Pose) -> list[Any]:
+        """Return by how much the surfaces of each group slip on each other as all bodies are displaced by a change."""
+        found = []
+        for group in self.groups:
+            bodies, changes = ([p.take(its) for its in group.bodies] for p in (self._at_rest, change))
+            found.append(group.element.slip(tuple(bodies), displacements(bodies, changes)).coefficients[0])
+        return found
+
+    def resisting(self, normal: Float[Numbers, "joint batch"]) -> list[Any]:
+        """Return what resists the slip of each group, conjugate to `slips`, for normal forces of all joints."""
+        found, first = [], 0
+        for group in self.groups:
+            poses = [movable(self.pose.take(indices)) for indices in group.bodies]
+            factor = group.element.friction.resisting(slip_velocity(group.element, poses)).coefficients[0]
+            found.append(factor * normal[first : first + group.instances][None])
+            first += group.instances
+        return found
+
+
+def with_friction(
+    unknowns: Callable[[Any, Any], tuple[Any, Any]],
+    free: tuple[Any, Any],
+    friction: FreeFriction,
+    felt: Callable[[Any], Any],
+) -> tuple[Any, Any, Callable[[Any, Any], tuple[Any, Any]]]:
+    """Return accelerations and multipliers with friction, and what solves for those of higher orders.
+
+    Parameters
+    ----------
+    unknowns : callable
+        Solves the equations without friction for what `Equations.balance` returns.
+    free : tuple of array
+        Accelerations and multipliers without friction.
+    friction : FreeFriction
+        Of the mechanism.
+    felt : callable
+        Returns what bodies feel of normal forces, as `Equations.balance` has forces.
+    """
+    acceleration, multipliers = free
+    joints, lanes = sum(group.instances for group in friction.groups), multipliers.shape[-1]
+    unit = jnp.broadcast_to(jnp.eye(joints)[..., None], (joints, joints, lanes))
+    moved, held = jax.vmap(lambda forces: unknowns(felt(forces), jnp.zeros_like(multipliers)))(unit)
+    coupling, multipliers, normal = Coupling.of(friction.normal_forces, multipliers, -held)
+    acceleration = acceleration + _along(moved, normal)
+
+    def solved(forces: Any, second: Any) -> tuple[Any, Any]:
+        bare, missing = unknowns(forces, second)
+        pressing = jax.jvp(friction.normal_forces, (multipliers,), (missing,))[1]
+        missing, normal = coupling.solved(missing, pressing)
+        return bare + _along(moved, normal), missing
+
+    return acceleration, multipliers, solved
+
+
+def _along(columns: Any, weights: Any) -> Any:
+    """Return the sum of columns, (joints, ..., batch), by weights, (joints, batch)."""
+    return jnp.sum(columns * weights.reshape(len(weights), *[1] * (columns.ndim - 2), -1), axis=0)

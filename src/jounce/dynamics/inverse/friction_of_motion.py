@@ -1,0 +1,139 @@
+"""Friction in a motion that is known: multipliers and normal forces together, order after order."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from jounce.dynamics.friction.coupling import Coupling, pressed, rubs
+from jounce.dynamics.inverse.constraint_forces import BodyMatrices, Slopes, load_solver, onto_bodies
+from jounce.dynamics.motion_values import Coordinates, pose_of
+from jounce.jet import Jet
+from jounce.jet.algebra import stacked, total
+from jounce.kinematics.sensitivity.jacobian_series import Slope
+from jounce.mechanism.system import Group, System
+from jounce.modules import Module
+from jounce.rigid.pose import Pose
+from jounce.shapes import Numbers
+
+Rubbed = tuple[Sequence[Float[Numbers, "order coordinate _ _ batch"]], Sequence[Coordinates]]
+"""Of a group of joints with friction: `friction_slope` for each moving slot, and where the bodies are."""
+
+
+class Rubbing(Module):
+    """A group of joints with friction, in a motion.
+
+    Parameters
+    ----------
+    group : Group
+        Of the joints.
+    poses : sequence of SpatialPose or PlanarPose
+        Of their bodies, (..., instances, batch).
+    slopes : sequence of array
+        Of their residuals, for each moving slot.
+    friction : sequence of array
+        As `friction_slope` gives it, for each moving slot.
+    first : int
+        The first row of the group.
+    """
+
+    group: Group
+    poses: Sequence[Pose]
+    slopes: Sequence[Any]  # as `Slope`; of other rows than those of friction
+    friction: Sequence[Any]
+    first: int = eqx.field(static=True)
+
+    def normal_forces(self, multipliers: Sequence[Any]) -> Float[Numbers, "order instance batch"]:
+        """Return the normal forces of multipliers of all rows, given by Taylor coefficients, (rows, batch)."""
+        sign = -1.0 if self.group.moving_slots[-1] else 1.0
+        slope = self.slopes[-1][:, : self.poses[0].shifts]
+        _, _, rows, instances, lanes = slope.shape
+        own = [m[self.first : self.first + rows * instances].reshape(rows, instances, lanes) for m in multipliers]
+        force = [
+            sign * total(jnp.sum(slope[j] * own[k - j][None], axis=1) for j in range(k + 1)) for k in range(len(own))
+        ]
+        return stacked(pressed(self.group.element, self.poses, Jet(tuple(force))))
+
+
+def rubbing_of(system: System, blocks: Slopes, rubbed: Sequence[Rubbed], pose_type: type[Pose]) -> list[Rubbing]:
+    """Return the groups of joints with friction; what is told of each is in the order of the groups."""
+    found, first, left = [], 0, iter(rubbed)
+    for group, slopes in zip(system.groups, blocks, strict=True):
+        if rubs(group):
+            friction, bodies = next(left)
+            poses = [pose_of(body, pose_type, len(slopes[0]) - 1) for body in bodies]
+            found.append(Rubbing(group, poses, slopes, friction, first))
+        first += slopes[0].shape[2] * group.instances
+    return found
+
+
+def with_friction(
+    system: System,
+    blocks: Slopes,
+    load: Float[Numbers, "levels coordinate body batch"],
+    mass: BodyMatrices | None,
+    rubbing: Sequence[Rubbing],
+) -> Float[Numbers, "levels row batch"]:
+    """Return the multipliers of all rows, not scaled, and below them the normal forces, as Taylor coefficients.
+
+    Parameters
+    ----------
+    system, blocks, load, mass
+        As `constraint_forces.multipliers` takes them.
+    rubbing : sequence of Rubbing
+        All joints with friction.
+    """
+    solve, rows, levels = load_solver(system, blocks, mass), system.shape[0], len(load)
+    felt = [_felt(slopes, group) for group, slopes in zip(system.groups, blocks, strict=True)]
+    resisted = [_felt(its.friction, its.group) for its in rubbing]
+    joints = [its.group.instances for its in rubbing]
+
+    def on_bodies(level: Callable[[Any], Any], parts: Sequence[Any], forces: Any) -> Any:
+        """Return what forces of all rows do to bodies, by what a level of slopes makes of them."""
+        done, first = 0.0, 0
+        for by_slot in parts:
+            for slope, bodies in by_slot:
+                _, _, count, instances, lanes = slope.shape
+                its = forces[..., first : first + count * instances, :]
+                its = its.reshape(*its.shape[:-2], count, instances, lanes)
+                done = done + onto_bodies(level(slope, its), bodies, system.body_count)
+            first += count * instances
+        return done
+
+    def now(slope: Slope, forces: Any) -> Any:
+        return jnp.sum(slope[0] * forces[None], axis=1)
+
+    def normal(multipliers: Any) -> Any:
+        return jnp.concatenate([its.normal_forces([multipliers])[0] for its in rubbing])
+
+    unit = jnp.broadcast_to(jnp.eye(sum(joints))[..., None], (sum(joints), sum(joints), load.shape[-1]))
+    response = jax.vmap(lambda forces: solve(on_bodies(now, resisted, forces)))(unit)
+    coupling, multipliers, forces = Coupling.of(normal, solve(load[0]), response)
+    if levels == 1:
+        return jnp.concatenate([multipliers, forces])[None]
+    below = np.arange(1, levels)
+
+    def level(found: Any, order_and_load: Any) -> tuple[Any, None]:
+        k, missing = order_and_load
+        earlier = found[(k - below) % levels]  # those not found yet are zero, also where the index runs round
+
+        def lower(slope: Slope, forces: Any) -> Any:
+            needed = jnp.where((below <= k).reshape(-1, 1, 1, 1, 1), slope[1:], 0.0)  # others may not be finite
+            return jnp.sum(needed * forces[:, None], axis=(0, 2))
+
+        missing = missing - on_bodies(lower, felt, earlier[:, :rows]) - on_bodies(lower, resisted, earlier[:, rows:])
+        trial = found.at[k, :rows].set(solve(missing))
+        pressing = jnp.concatenate([its.normal_forces(list(trial[:, :rows])) for its in rubbing], axis=1)
+        newest = coupling.solved(trial[k, :rows], pressing[k])
+        return found.at[k].set(jnp.concatenate(newest)), None
+
+    start = jnp.zeros((levels, rows + sum(joints), load.shape[-1])).at[0].set(jnp.concatenate([multipliers, forces]))
+    return jax.lax.scan(level, start, (np.arange(1, levels), load[1:]))[0]
+
+
+def _felt(slopes: Sequence[Slope], group: Group) -> list[tuple[Slope, tuple[int, ...]]]:
+    return [(slope, group.bodies[slot]) for slot, slope in zip(group.moving_slots, slopes, strict=True)]

@@ -1,0 +1,80 @@
+"""Friction that follows reactions, in simulations: closed forms, and balances by hand at what was simulated."""
+
+import numpy as np
+import pytest
+
+import jounce as jn
+from tests.dynamics.inverse.test_friction import slider_crank, vars_of, wedge
+from tests.oracles import mp_friction as by_hand
+
+TIME = np.linspace(0.0, 1.0, 6)
+
+
+def sled(mu=0.3, speed=0.05):
+    return jn.Mechanism(
+        space="planar",
+        gravity=[0, -10.0],
+        parameters={"mu": mu},
+        bodies={"sled": jn.Body([0, 0], mass=2.0, inertia=1.0)},
+        joints={
+            "guide": jn.planar.Prismatic(
+                ("ground", "sled"), [0, 0], [0, 0], [1, 0], [1, 0], friction=jn.joints.Friction("mu", speed)
+            )
+        },
+        initial={"v": jn.drivers.CoordinateDriver(("ground", "sled"), "x", "2*t")},
+        outputs={"place": jn.outputs.PointOutput("sled", [0, 0])},
+    )
+
+
+def velocity(mu=0.3, speed=0.05):
+    """Of ``v' = -mu g tanh(v / speed)``, from 2 m/s."""
+    return speed * np.arcsinh(np.sinh(2 / speed) * np.exp(-mu * 10 * TIME / speed))
+
+
+def test_a_sled_comes_to_rest_as_the_closed_form():
+    simulated = jn.simulate(sled(), TIME)
+    np.testing.assert_allclose(simulated.outputs["place"][:, 1, 0], velocity(), rtol=0, atol=1e-11)
+    assert len(simulated.dense_output.start) < 40  # not held up by the speed, far above it
+
+
+def test_a_batch_and_a_gradient_by_the_coefficient():
+    import jax
+
+    found = jn.simulate_batch(sled(), {"mu": [0.1, 0.3]}, TIME)
+    for k, mu in enumerate((0.1, 0.3)):
+        np.testing.assert_allclose(found.outputs["place"][k, :, 1, 0], velocity(mu), rtol=0, atol=1e-11)
+
+    def last(mu):
+        return jn.simulate(sled().with_parameters(mu=mu), TIME[:3]).outputs["place"][-1, 1, 0]
+
+    assert float(jax.grad(last)(0.3)) == pytest.approx(-10 * TIME[2], rel=1e-6)
+
+
+def test_a_free_slider_crank_fulfills_balances_by_hand_with_rates():
+    driven = slider_crank(0.1)
+    outputs = {"angle": jn.outputs.AngleOutput("crank")}
+    free = jn.Mechanism(
+        **{**vars_of(driven), "drivers": {}, "outputs": outputs},
+        joints=driven.joints,
+        parameters=driven.parameters,
+        forces={"push": jn.forces.Torque(("ground", "crank"), "3.0")},
+        initial={"turn": jn.drivers.CoordinateDriver(("ground", "crank"), "angle", "0.5 + 30*t")},
+    )
+    simulated = jn.simulate(free, [0.0, 0.02, 0.033], order=6)
+    factorials = np.cumprod([1.0, *range(1, 7)])
+    torque = by_hand.torque_of_series(simulated.outputs["angle"][-1] / factorials, 4)
+    gap = np.abs(np.array(torque) - [3.0, 0, 0, 0, 0])
+    np.testing.assert_array_less(gap / (10 * 30.0 ** np.arange(5)), 1e-9)
+    balance = jn.energy.power_balance(simulated)
+    assert (abs(balance["residual"]) <= 1e-11 * balance["scale"]).all()
+    assert (balance["friction"].sel(derivative=0) < 0).all()
+
+
+def test_a_wedge_that_locks_has_no_motion():
+    free = wedge(2.5)
+    start = {"go": jn.drivers.CoordinateDriver(("ground", "wedge"), "x", "-0.3*t")}
+    push = {"push": jn.forces.PointForce("wedge", [0, 0], ["-200", "0"])}
+    parts = vars_of(free) | {"drivers": {}, "outputs": {}}
+    found = jn.simulate(jn.Mechanism(**parts, joints=free.joints, initial=start, forces=push), TIME)
+    assert found.status[1:].all()  # none is OK
+    assert "friction locks at t = 0 s: joints.guide" in "".join(found.faults.values())
