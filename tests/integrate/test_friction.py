@@ -70,11 +70,12 @@ def test_a_free_slider_crank_fulfills_balances_by_hand_with_rates():
     assert (balance["friction"].sel(derivative=0) < 0).all()
 
 
-def test_a_wedge_that_locks_has_no_motion():
+def test_a_wedge_that_jams_stops_though_it_is_pushed_and_creeps_as_the_law_says():
     free = wedge(2.5)
     start = {"go": jn.drivers.CoordinateDriver(("ground", "wedge"), "x", "-0.3*t")}
     push = {"push": jn.forces.PointForce("wedge", [0, 0], ["-200", "0"])}
-    parts = vars_of(free) | {"drivers": {}, "outputs": {}}
-    found = jn.simulate(jn.Mechanism(**parts, joints=free.joints, initial=start, forces=push), TIME)
-    assert found.status[1:].all()  # none is OK
-    assert "friction locks at t = 0 s: joints.guide" in "".join(found.faults.values())
+    parts = vars_of(free) | {"drivers": {}, "outputs": {"lift": jn.outputs.PointOutput("lift", [0, 0])}}
+    found = jn.simulate(jn.Mechanism(**parts, joints=free.joints, initial=start, forces=push), [0.0, 0.005])
+    # 400 N across the slope, per unit of x, lift 30 N and overcome the guide, which bears the half of them
+    creep = 1e-3 * np.arctanh((400 - 30) / (2.5 * 200))
+    assert found.outputs["lift"][-1, 1, 1] == pytest.approx(creep, rel=1e-8)
