@@ -37,6 +37,7 @@ def test_a_sled_comes_to_rest_as_the_closed_form():
     assert len(simulated.dense_output.start) < 40  # not held up by the speed, far above it
 
 
+@pytest.mark.slow
 def test_a_batch_and_a_gradient_by_the_coefficient():
     import jax
 
@@ -50,6 +51,7 @@ def test_a_batch_and_a_gradient_by_the_coefficient():
     assert float(jax.grad(last)(0.3)) == pytest.approx(-10 * TIME[2], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_free_slider_crank_fulfills_balances_by_hand_with_rates():
     driven = slider_crank(0.1)
     outputs = {"angle": jn.outputs.AngleOutput("crank")}
@@ -70,6 +72,7 @@ def test_a_free_slider_crank_fulfills_balances_by_hand_with_rates():
     assert (balance["friction"].sel(derivative=0) < 0).all()
 
 
+@pytest.mark.slow
 def test_a_wedge_that_jams_stops_though_it_is_pushed_and_creeps_as_the_law_says():
     free = wedge(2.5)
     start = {"go": jn.drivers.CoordinateDriver(("ground", "wedge"), "x", "-0.3*t")}

@@ -31,6 +31,7 @@ def slider_crank(mu=None, *, speed=0.02, outputs=None):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("instant", [0.033, 0.21])
 def test_driver_torque_and_rates_against_balances_by_hand(instant):
     motion = jn.solve(slider_crank(0.1), [instant], order=4)
@@ -60,12 +61,14 @@ def test_reactions_show_friction_and_the_whole_is_in_equilibrium():
     np.testing.assert_allclose(momentum, weight - shaking.force.values[0, :3], rtol=1e-9, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_what_the_driver_puts_in_is_gained_or_taken_by_friction():
     balance = jn.energy.power_balance(jn.solve(slider_crank(0.3), np.linspace(0.0, 0.3, 7), order=5))
     assert (abs(balance["residual"]) <= 1e-12 * balance["scale"]).all()
     assert (balance["friction"].sel(derivative=0) < -1.0).all()
 
 
+@pytest.mark.slow
 def test_no_friction_is_none_and_a_little_changes_forces_in_proportion():
     time = np.linspace(0.0, 0.3, 7)
     bare, none, little = (jn.solve(slider_crank(mu), time, order=2).outputs["torque"] for mu in (None, 0.0, 1e-7))
@@ -74,6 +77,7 @@ def test_no_friction_is_none_and_a_little_changes_forces_in_proportion():
     np.testing.assert_allclose((twice - bare)[:, 0], 2 * (little - bare)[:, 0], rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_gradient_by_the_radius_is_a_difference():
     import jax
 
@@ -167,6 +171,7 @@ def test_a_screw_lifts_and_lowers_by_the_formulas_of_the_square_thread(mu):
     assert (lower[:, 0] > 0).all() == (mu > 0.08)  # above, it must be turned down too: it locks itself
 
 
+@pytest.mark.slow
 def test_a_ball_and_a_sleeve_resist_along_their_slip():
     ball = jn.joints.Friction(0.2, 0.5, 0.05)
     x, y = [1.0, 0, 0], [0, 1.0, 0]

@@ -52,7 +52,10 @@ def test_what_is_written_is_read_again(tmp_path, ending):
         ("{coefficient: mu, speed: 1 mm/s}", "radius: is missing: the bodies turn"),
         ("{coefficient: mu, radius: 0, speed: 1 mm/s}", "must be greater than zero"),
         ("{coefficient: mu, radius: r, speed: 0}", "must be greater than zero"),
-        ("{coefficient: mu, radius: r, speed: 1 mm}", "expected a speed, such as 1 mm/s, but it is a length"),
+        (
+            "{coefficient: mu, radius: r, speed: 1 mm}",
+            "expected a speed, such as 1 mm/s, but the unit of '1 mm' is a length",
+        ),
         ("{coefficient: mu, radius: r, speed: 1, viscous: 3}", "no key has this name"),
         ("0.1", r"must be a mapping, as \{coefficient"),
     ],
