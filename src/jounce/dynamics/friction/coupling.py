@@ -23,6 +23,7 @@ from jounce.jet import Jet
 from jounce.jet.algebra import stacked
 from jounce.kinematics.sensitivity.jacobian_series import Slope, along_displacements
 from jounce.linear_algebra.linear import DenseFactor
+from jounce.mechanism import Mechanism
 from jounce.mechanism.builder import Model, group_rows
 from jounce.mechanism.system import Group, System, movable
 from jounce.modules import Module
@@ -57,12 +58,12 @@ def check_unique_pressing(model: Model, system: System) -> None:
         raise UnsupportedError(message, name=f"{names[0]}.friction")
 
 
-def check_no_friction(groups: Sequence[Group], what: str) -> None:
-    """Raise UnsupportedError where joints have friction, which something cannot have yet."""
-    if any(map(rubs, groups)):
-        raise UnsupportedError(
-            f"{what} of a mechanism whose joints have friction cannot be computed yet", name="joints"
-        )
+def check_no_friction(mechanism: Mechanism, what: str) -> None:
+    """Raise UnsupportedError, by name, where a joint has friction, which something cannot have yet."""
+    for name, joint in mechanism.joints.items():
+        if getattr(joint, "friction", None) is not None:
+            message = f"{what} of a mechanism whose joints have friction cannot be computed yet; leave friction out"
+            raise UnsupportedError(message, name=f"joints.{name}.friction")
 
 
 def friction_slope(element: Any, poses: Sequence[Pose], slot: int) -> Slope:

@@ -96,14 +96,17 @@ def linearize(
         raise MechanismError("is for robots; a mechanism has its own guess", name="q")
     if isinstance(subject, Mechanism):
         required_masses(subject, "small motions")
+        check_no_friction(subject, "small motions")
         subject = equilibrium(subject, time)
     elif isinstance(subject, Equilibrium) and time is not None:
         raise MechanismError("an equilibrium has its instant already", name="time", value=time)
     if isinstance(subject, Equilibrium):
         required_masses(subject.mechanism, "small motions")
+        check_no_friction(subject.mechanism, "small motions")
         about, point = subject, subject.point
     elif isinstance(subject, Motion):
         required_masses(subject.mechanism, "small motions")
+        check_no_friction(subject.mechanism, "small motions")
         point = point_along(subject, time)
     else:
         message = "must be a jn.Mechanism, a jn.Motion, an equilibrium or a jn.Robot"
@@ -146,7 +149,6 @@ def point_along(motion: Motion, time: Real | None) -> OperatingPoint:
     lanes, mechanism = np.array([lane]), motion.mechanism
     at_lane = {name: np.asarray(x)[..., lanes] for name, x in cut(coordinates, 2).items()}
     system = with_fields(motion.model.system, outputs=(), forces=at_lanes(motion.forces, lanes))
-    check_no_friction(system.groups, "small motions")
     equations = Equations(system, masses_of(mechanism), gravity_of(mechanism), 1.0, pose_type)
     point = OperatingPoint(
         mechanism, motion.model, equations, at_lane, clock_at(float(motion.time[lane]), stopped=False)
