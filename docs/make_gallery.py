@@ -157,6 +157,7 @@ PICTURES = {
         "Planar arm", "planar_arm.xml", "planar_arm_lift.yaml", "ram", (0.25, 0, 0), view=(-80.0, 12.0)
     ),
     "press": Picture(("ram", "knee_pin"), 0.4, points={"knee_pin": ("upper", (0.4, 0))}),
+    "press_with_friction": Picture(("ram", "knee_pin"), 0.4, points={"knee_pin": ("upper", (0.4, 0))}),
     "quick_return": Picture(("B", "pin"), 0.3, points={"B": ("arm", (0.5, 0)), "pin": ("crank", (0.08, 0))}),
     "rack_pinion": Picture(("spoke",), 0.2),
     "radial_engine": Picture(("knuckle2", "knuckle4"), 0.01),
