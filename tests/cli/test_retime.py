@@ -61,3 +61,76 @@ def test_paths_without_times_are_read(tmp_path):
     )
     values = io.load_path(laws).derivatives(np.array([0.5]), 1)[0]
     np.testing.assert_allclose(values, [[0.8, 1.5], [0.0, -1.0]], atol=1e-14)
+
+
+CART = """<robot name="cart"><link name="base"/><link name="cart"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="slide" type="prismatic">
+<parent link="base"/><child link="cart"/><axis xyz="1 0 0"/><limit lower="-9" upper="9" velocity="1" effort="99"/>
+</joint></robot>"""
+
+
+@pytest.fixture
+def cart(tmp_path):
+    (tmp_path / "cart.urdf").write_text(CART)
+    (tmp_path / "line.csv").write_text("slide\n0\n2\n")
+    (tmp_path / "limits.yaml").write_text("joints: {slide: {velocity: [-0.5 m/s, 1 m/s], acceleration: 2 m/s^2}}\n")
+    return tmp_path / "cart.urdf", tmp_path / "line.csv", "--limits", tmp_path / "limits.yaml"
+
+
+def test_a_duration_is_written_in_whole_periods(run, cart, tmp_path):
+    out, figure = tmp_path / "slow.csv", tmp_path / "slow.png"
+    status, told, _ = run("retime", *cart, "--duration", "4s", "--out", out, "--figure", figure, "--json")
+    assert (status, json.loads(told)["duration"]) == (0, pytest.approx(4.0, rel=1e-12))
+    rows = io.read(out)
+    assert len(rows["time"]) == 4001
+    assert abs(float(rows["slide"].values[-1, 0]) - 2) < 1e-9
+    assert figure.read_bytes()[:4] == b"\x89PNG"
+    status, _, error = run("retime", *cart, "--duration", "2.4s")
+    assert status == 2
+    assert "the least time of this path within these limits is 2.50" in error
+    status, _, error = run("retime", *cart, "--duration", "4.0005s", "--out", tmp_path / "odd.csv")
+    assert status == 2
+    assert "not a number of whole periods" in error
+    assert not (tmp_path / "odd.csv").exists()
+
+
+def test_from_a_running_trajectory(run, cart, tmp_path):
+    running = tmp_path / "running.yaml"
+    running.write_text("joints: {slide: 0.4*t}\ntime: {start: 0, stop: 2, count: 21}\n")
+    back = tmp_path / "back.csv"
+    back.write_text("slide\n0.4\n-1\n")
+    out = tmp_path / "new.csv"
+    robot, _, *limits = cart
+    asked = (robot, back, *limits, "--running", running, "--at", "1s")
+    status, told, _ = run("retime", *asked, "--duration", "5s", "--out", out, "--json")
+    result = json.loads(told)
+    assert (status, result["kept"]) == (0, True)
+    assert "from the running state onto the path" in result["path"]
+    rows = io.read(out)["slide"].values
+    np.testing.assert_allclose(rows[0, :2], [0.4, 0.4], atol=1e-9)
+    assert rows[:, 1].min() >= -0.5 * (1 + 1e-6)  # backward it is slower
+    assert abs(rows[-1, 0] + 1) < 1e-8
+    for more, message in (
+        (("--running", running), "--running: says nothing without --at"),
+        (("--running", running, "--at", "9s"), "goes from 0 s to 2 s"),
+        (("--running", running, "--at", "1s", "--out", tmp_path / "none.csv"), "--duration: the rows of a motion"),
+    ):
+        status, _, error = run("retime", *cart, *more)
+        assert status == 2
+        assert message in error
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("velocity: [1, 2]", "must be the lowest value, below zero, and the highest"),
+        ("velocity: [-1, 2, 3]", "one value, or the lowest and the highest"),
+        ("velocity: [-1 N, 2]", "the unit is that of a force"),
+    ],
+)
+def test_bad_limits_by_direction_are_told_by_line(run, cart, tmp_path, text, message):
+    (tmp_path / "limits.yaml").write_text(f"joints:\n  slide:\n    {text}\n")
+    status, _, error = run("retime", *cart)
+    assert status == 2
+    assert message in error
+    assert "line 3" in error or "limits.yaml:3" in error

@@ -113,6 +113,11 @@ def retime(
         if (running is None) != (at is None):
             name, other = ("--at", "--running") if running is None else ("--running", "--at")
             raise JounceError(f"says nothing without {other}; give both", name=name)
+        if running is not None and output.out is not None and duration is None:
+            message = (
+                "the rows of a motion that begins in motion are not slowed to whole periods; say how many s it takes"
+            )
+            raise JounceError(message, name="--duration")
         if file.suffix.lower() in DATA_FILES:
             if running is not None:
                 raise JounceError("is for robots; a mechanism starts at rest or with rates", name="--running")
