@@ -129,11 +129,11 @@ def check_wheels(groups: Sequence[Group], names: Sequence[Sequence[str]], guess:
         sizes = np.linalg.norm(normal, axis=0) * np.linalg.norm(axis, axis=0)
         flat = np.linalg.norm(np.cross(normal, axis, axis=0), axis=0) <= FLAT * sizes
         height = ((center - on_plane) * normal).sum(axis=0) / np.linalg.norm(normal, axis=0)
-        for k, name in enumerate(members):
+        for k, name in enumerate(members[: group.instances]):  # others name further rows of the same
             if flat[k, 0]:
                 message = "the wheel lies flat on its plane, where no point of its rim touches alone: tilt the body"
                 raise MechanismError(message, name=f"{name}.axis")
-            if height[k, 0] < 0:
+            if height[k, 0] < 0 and not group.bodies[0][k]:  # on the ground, which stands where it is
                 message = (
                     f"the center of the wheel is {-height[k, 0]:.4g} m behind its plane at the starting guess, and "
                     "the normal leads from the plane to the wheel: reverse it, or guess the body on its side"
