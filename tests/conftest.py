@@ -15,6 +15,7 @@ import pytest
 from jax._src import core  # what is private to JAX has no public name
 
 import tests.type_checks  # isort: skip # noqa: F401 - before jounce
+import jounce.forces  # noqa: F401 - or its types would be taken back with those of the test that needs them first
 from jounce.cli import main
 from jounce.cli.compiled_programs import keep_programs
 from jounce.constraints import base
