@@ -80,7 +80,9 @@ def test_the_regressor_is_that_of_pinocchio():
         first = 10 * (model.getJointId(name) - 1)
         for k, word in enumerate(order):
             column = found[columns[:7], places[f"{links[name]}.{word}"]]
-            assert_near(column, wanted[[model.joints[model.getJointId(x)].idx_v for x in names[:7]], first + k], 1e-12)
+            np.testing.assert_allclose(
+                column, wanted[[model.joints[model.getJointId(x)].idx_v for x in names[:7]], first + k], atol=1e-13
+            )
 
 
 def test_options_of_robots():
