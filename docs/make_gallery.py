@@ -239,7 +239,7 @@ def add_outline(figure, moved, picture):
     axes.set_ylim(lower, upper)
     width, height = figure.get_size_inches()
     figure.set_size_inches(max(width, (height - 0.6) * (right - left) / (upper - lower) + 1.2), height)
-    draw_scale(axes)
+    draw_scale(axes, max(right - left, upper - lower))
 
 
 def draw(name):
@@ -248,7 +248,7 @@ def draw(name):
 
     picture = PICTURES[name]
     moved = motion(name, picture)
-    look = {"names": "none", "paths": picture.paths, "order": picture.order, "view": picture.view}
+    look = {"names": "outputs", "paths": picture.paths, "order": picture.order, "view": picture.view}
     figure = plot.sketch(moved, picture.instant, **look)
     if picture.outline:
         add_outline(figure, moved, picture)

@@ -8,6 +8,7 @@ import pytest
 
 import jounce as jn
 from jounce.plot import check_figure, draw, save
+from jounce.plot.figure import stacked
 from jounce.plot.labels import axis_range, rounded_down, scale_of, symbol, unit_label
 from jounce.plot.style import blank_figure, style
 
@@ -62,13 +63,26 @@ def test_components_have_a_legend(four_bar):
 
 
 @pytest.mark.slow
-def test_an_angular_velocity_starts_in_the_row_of_velocities(rsur):
+def test_an_angular_velocity_starts_with_velocities(rsur):
     grid = panels(draw(rsur, ["psi", "coupler_spin"]))
-    assert not grid[0, 1].axison
-    assert grid[1, 1].get_ylabel() == "velocity\n(rad/s)"
+    assert grid[0, 1].get_ylabel() == "velocity\n(rad/s)"
+    assert [axes.axison for axes in grid[:, 1]] == [True, True, True, True, False]
     alone = panels(draw(rsur, ["coupler_spin"]))
     assert alone.shape == (4, 1)
     assert alone[0, 0].get_ylabel() == "velocity\n(rad/s)"
+
+
+def test_columns_leave_few_places_empty():
+    assert [set(stacked(dict.fromkeys("abcde"[:count], 5)).values()) for count in (1, 5)] == [
+        {(0, 0)},
+        {(column, 0) for column in range(5)},
+    ]
+    press = {"ram": 4, "torque": 2, "bearing": 2, "knee": 2, "guide": 2, "blank": 2}
+    for heights in (press, press | {"pin": 4}, press | {"ram": 5}, dict.fromkeys("abcdef", 3)):
+        places = stacked(heights)
+        cells = {(column, row + k) for name, (column, row) in places.items() for k in range(heights[name])}
+        assert len(cells) == sum(heights.values())  # none is used twice
+        assert len(cells) >= 0.8 * (1 + max(c for c, _ in cells)) * (1 + max(r for _, r in cells))
 
 
 def test_large_numbers_are_scaled_in_the_label(four_bar):

@@ -74,13 +74,24 @@ def test_links_and_pins_are_where_the_bodies_are(four_bar):
     np.testing.assert_allclose(curves[0].get_xydata(), four_bar.outputs["C"][:, 0], rtol=0, atol=1e-15)
 
 
+def test_the_scale_is_a_tenth_to_a_fifth_of_the_machine():
+    for name in QUICK:
+        figure = sketch(jn.load(ROOT / "examples" / f"{name}.yaml"), names="none")
+        (bar,) = [line for line in figure.axes[0].lines if line.get_gid() == "scale"]
+        left, right, lower, upper = scene_of(jn.load(ROOT / "examples" / f"{name}.yaml")).limits
+        assert 0.1 <= np.ptp(bar.get_xdata()) / max(right - left, upper - lower) <= 0.2
+
+
 def names_in(figure):
     return [text for text in figure.axes[0].texts if str(text.get_gid()).startswith("name.")]
 
 
 def test_names_are_all_there_and_none_covers_another(four_bar):
     andrews = sketch(jn.load(ROOT / "examples" / "andrews.yaml"))
-    for figure, wanted in ((sketch(four_bar), {"crank", "rocker", "A", "D", "BC"}), (andrews, {"K1", "K7", "O", "P6"})):
+    for figure, wanted in (
+        (sketch(four_bar), {"crank", "rocker", "A", "D", "BC", "C"}),
+        (andrews, {"K1", "K7", "O", "P6"}),
+    ):
         texts = names_in(figure)
         assert wanted <= {text.get_text() for text in texts}
         figure.draw_without_rendering()
@@ -89,6 +100,7 @@ def test_names_are_all_there_and_none_covers_another(four_bar):
             across = min(first.x1, second.x1) - max(first.x0, second.x0)
             upward = min(first.y1, second.y1) - max(first.y0, second.y0)
             assert across < 1.0 or upward < 1.0
+    assert {text.get_text() for text in names_in(sketch(four_bar, names="outputs"))} == {"C"}
     bodies = sketch(four_bar, names="bodies")
     assert {t.get_text() for t in names_in(bodies)} == {"crank", "rocker"}
     assert not names_in(sketch(four_bar, names="none"))
@@ -152,8 +164,8 @@ def test_what_cannot_be_drawn_is_told(four_bar):
 def test_hodograph_is_the_derivative_by_components(four_bar):
     figure = hodograph(four_bar, "C", 2)
     (axes,) = figure.axes
-    (curve,) = [line for line in axes.lines if len(line.get_xdata()) == 41]
-    np.testing.assert_allclose(curve.get_xydata(), four_bar.outputs["C"][:, 2], rtol=1e-15)
+    (curve,) = [line for line in axes.lines if len(line.get_xdata()) == 601]
+    np.testing.assert_allclose(curve.get_xydata()[::15], four_bar.outputs["C"][:, 2], rtol=1e-9, atol=1e-12)
     assert axes.get_ylabel() == r"$\ddot{C}_{y}$  (m/s$^2$)"
     with pytest.raises(jn.errors.MechanismError, match="needs an output with components"):
         hodograph(four_bar, "psi")
@@ -167,15 +179,18 @@ def test_hodograph_is_the_derivative_by_components(four_bar):
 def test_hodograph_in_space_has_three_projections(hooke):
     figure = hodograph(hooke, "rim")
     for axes, pair in zip(figure.axes, ([0, 1], [0, 2], [1, 2]), strict=True):
-        (curve,) = [line for line in axes.lines if len(line.get_xdata()) == 11]
-        np.testing.assert_allclose(curve.get_xydata(), hooke.outputs["rim"][:, 1][:, pair], rtol=1e-15)
+        (curve,) = [line for line in axes.lines if len(line.get_xdata()) == 601]
+        np.testing.assert_allclose(curve.get_xydata()[::60], hooke.outputs["rim"][:, 1][:, pair], rtol=1e-9, atol=1e-12)
 
 
 def test_phase_portrait_draws_derivatives_against_each_other(four_bar):
     for orders in ((0, 1), (1, 3)):
         (axes,) = phase_portrait(four_bar, "psi", orders).axes
-        (curve,) = [line for line in axes.lines if len(line.get_xdata()) == 41]
-        np.testing.assert_allclose(curve.get_xydata(), four_bar.outputs["psi"][:, list(orders)], rtol=1e-15)
+        (curve,) = [line for line in axes.lines if len(line.get_xdata()) == 601]
+        at_instants = four_bar.outputs["psi"][:, list(orders)]
+        np.testing.assert_allclose(curve.get_xydata()[::15], at_instants, rtol=1e-9, atol=1e-12)
+        fine = jn.solve(four_bar.mechanism, np.linspace(0.0, 2.0, 601), order=3).outputs["psi"][:, list(orders)]
+        np.testing.assert_allclose(curve.get_xydata(), fine, rtol=0, atol=4e-3 * np.abs(fine).max())  # of 41 instants
     assert len(phase_portrait(four_bar, "C").axes) == 2
     with pytest.raises(jn.errors.MechanismError, match=r"up to order 3.*got 4"):
         phase_portrait(four_bar, "psi", (3, 4))

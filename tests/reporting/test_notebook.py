@@ -158,3 +158,17 @@ def test_an_equilibrium_and_what_moves_about_it():
     matrices = Tables(small._repr_html_()).tables
     assert matrices["Mass (SI)"][1] == ["upper.angle", "2", "1"]
     assert matrices["Modes"][1][1] == Tables(shown(small.modes)).tables["Modes"][1][1] == "0.381526"
+
+
+def test_everything_that_shows_itself_has_a_table():
+    arm = jn.load_robot(ROOT / "examples" / "robots" / "planar_arm.xml")
+    cam = jn.cams.load_cam(ROOT / "examples" / "cams" / "intake.yaml")
+    fall = jn.simulate(arm, [0.0, 0.01], order=2)
+    for thing, words in (
+        (cam, "pressure_angle"),
+        (fall, arm.joint_names[0]),
+        (jn.assemblies(jn.load(ROOT / "examples" / "four_bar.yaml")), "least singular value"),
+    ):
+        page = shown(thing)
+        assert "<table>" in page
+        assert words in page

@@ -7,8 +7,10 @@ import sys
 import pytest
 
 import jounce as jn
+from jounce.activity import Activity, Count, compiling, now
 from jounce.reporting.peaks import Peak, peaks
-from jounce.reporting.terminal import Bar, show_peaks
+from jounce.reporting.progress import Display
+from jounce.reporting.terminal import say, show_peaks
 
 RSUR = pathlib.Path(__file__).resolve().parents[2] / "examples" / "rsur.yaml"
 
@@ -45,23 +47,36 @@ def test_a_terminal_gets_a_colored_table(capsys, monkeypatch):
     assert "a_rather_long_name_of_an_output" in out
 
 
-def test_a_bar_is_shown_on_a_terminal_and_for_long_work_only(capsys, monkeypatch):
-    clock = iter([0.0, 0.5, 1.5, 2.0, *range(3, 1000)])
-    monkeypatch.setattr("jounce.reporting.terminal.time.monotonic", lambda: next(clock))
-    with Bar("solving") as bar:
-        for done in range(1, 5):
-            bar(done, 5)
-    assert capsys.readouterr().err == ""
-    clock = iter([0.0, 0.5, 1.5, 2.0, *range(3, 1000)])
+def test_a_line_of_progress_is_shown_on_a_terminal_and_for_long_work_only(capsys, monkeypatch):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     monkeypatch.setenv("TERM", "xterm-256color")
-    with Bar("solving") as bar:
-        bar(1, 5)
-        bar(2, 5)
-        assert capsys.readouterr().err == ""
-        bar(3, 5)
-        bar(5, 5)
-    assert "solving" in capsys.readouterr().err
+    told = []
+    with Display("solve") as shown, Count("solving", told=lambda *call: told.append(call)) as count:
+        count(3, 5)
+        shown._look()
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr("jounce.reporting.progress.PATIENCE", 0.0)
+    with Display("solve") as shown, Count("solving") as count:
+        count(3, 5)
+        shown._look()
+        assert "solving" in (err := capsys.readouterr().err)
+        assert "60 %" in err
+        say("words")  # take the line away
+        assert shown._line is None
+    assert capsys.readouterr().out == "words\n"
+    assert told == [(3, 5)]
+
+
+def test_what_is_compiled_is_said_until_something_is_done():
+    with Count("solving") as count:
+        with compiling("_positions_of"):
+            assert now().words == "solving: compiling positions of"
+            with Count("within") as within:  # the outermost is told
+                within(1, 2)
+            count(1, 7)
+            assert now() == Activity("solving", 1, 7)
+        count(7, 7)
+    assert now() is None
 
 
 @pytest.mark.slow

@@ -30,6 +30,7 @@ from jounce.cli.example_files import example
 from jounce.cli.exports import export
 from jounce.cli.feedforward import feedforward
 from jounce.cli.figures import plot, report
+from jounce.cli.file_kinds import is_data_file
 from jounce.cli.inspection import inspect
 from jounce.cli.installation import doctor
 from jounce.cli.mechanisms import run, schema, simulate
@@ -49,6 +50,7 @@ from jounce.cli.viewing import view
 from jounce.cli.written_equations import equations
 from jounce.errors import JounceError, SolveError
 from jounce.interrupts import end_on_signals, is_command
+from jounce.reporting.progress import Display
 from jounce.reporting.terminal import cautions, complain, detail, unexpected
 
 
@@ -214,13 +216,24 @@ def application() -> Any:
 
 
 def _computing(command: Callable[..., int]) -> Callable[..., int]:
-    """Return a command that keeps the programs that it compiles; JAX is imported when it runs, not before."""
+    """Return a command that keeps the programs that it compiles; JAX is imported when it runs, not before.
+
+    Where its first file is misspelled, the command says so before that, in a fraction of a second.
+    """
 
     @functools.wraps(command)
     def computing(*arguments: Any, **keywords: Any) -> int:
+        reading = keywords.get("reading")
+        if arguments and is_data_file(arguments[0]) and not getattr(reading, "import_", None):
+            from jounce.io.mechanisms.key_check import check_keys
+
+            check_keys(arguments[0])
         from jounce.cli.compiled_programs import use_compilation_cache
 
         use_compilation_cache()
-        return command(*arguments, **keywords)
+        if not sys.stderr.isatty():
+            return command(*arguments, **keywords)
+        with Display(command.__name__):
+            return command(*arguments, **keywords)
 
     return computing

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from jounce.activity import Count
 from jounce.cli.options import (
     PLAIN_MECHANISM,
     MechanismReading,
@@ -19,7 +20,7 @@ from jounce.cli.options import (
     written,
 )
 from jounce.errors import DesignError, JounceError
-from jounce.reporting.terminal import Bar, say, show_table
+from jounce.reporting.terminal import say, show_table
 
 OPTIONS = tuple("minimize subject_to vary curves starts samples assemblies seed clearance iterations".split())
 SPELT = {"minimize": "minimize", "subject_to": "subject-to", "curves": "curve"}
@@ -103,7 +104,7 @@ def optimize(
     from jounce.design import optimize
     from jounce.reporting.facts.design_facts import design_facts, design_table, design_words
 
-    with _errors_about(file), Bar("optimizing") as bar:
+    with _errors_about(file), Count("optimizing") as bar:
         design = optimize(
             mechanism,
             minimize,

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from jounce.activity import Count
 from jounce.cli.mechanisms import moved, outcome
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, errors_about, spare_inputs, written
 from jounce.errors import JounceError, MechanismError, check_name
-from jounce.reporting.terminal import Bar, say
+from jounce.reporting.terminal import say
 
 if TYPE_CHECKING:
     from jounce.kinematics import Motion
@@ -98,7 +99,7 @@ def plot(
         if chosen == "animation":
             from jounce.plot import animate
 
-            with Bar("drawing") as bar:
+            with Count("drawing") as bar:
                 written(lambda: animate(motion, out, progress=bar, speed=speed, fps=fps, overwrite=overwrite, **look))
         else:
             from jounce.plot import save
@@ -221,7 +222,7 @@ def report(
     mechanism = reading.mechanism(file)
     spare_inputs(out, overwrite=overwrite)
     motion = moved(mechanism, file, order)
-    look: dict[str, Any] = {"view": (azimuth, elevation), "source": file.name, "overwrite": overwrite}
+    look: dict[str, Any] = {"view": (azimuth, elevation), "source": file, "overwrite": overwrite}
     look |= {"equations": equations, "at": at}
     with errors_about(file):
         written(lambda: write_report(motion, out, **look))

@@ -24,6 +24,11 @@ ADVICE = {
 _ROOT = re.compile(rb"<(robot|mujoco)[\s>/]")
 
 
+def is_data_file(argument: object) -> bool:
+    """Return whether an argument of a command is the path of a YAML, TOML or JSON file."""
+    return isinstance(argument, Path) and argument.suffix.lower() in DATA_FILES
+
+
 def kind_of(path: str | PathLike[str]) -> str | None:
     """Return ``mechanism``, ``robot``, ``trajectory``, ``cam``, ``drives`` or ``limits``; None if nothing tells it.
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from jounce.activity import Count
 from jounce.cli.options import (
     NO_TABLE,
     PLAIN,
@@ -20,7 +21,7 @@ from jounce.cli.options import (
 from jounce.cli.robot_motion import RobotRun, simulate_robot_file
 from jounce.errors import JounceError, check_name
 from jounce.io.files import ROBOT_FILES
-from jounce.reporting.terminal import Bar, say, show_peaks
+from jounce.reporting.terminal import say, show_peaks
 
 if TYPE_CHECKING:
     from jounce.integrate import Obreshkov, Taylor
@@ -163,7 +164,7 @@ def _streamed(
     from jounce.kinematics import solve_in_chunks
     from jounce.reporting.peaks import parts_with_peaks
 
-    with Bar("solving") as bar:
+    with Count("solving") as bar:
         with errors_about(file):
             motion = solve_in_chunks(mechanism, order=order, tolerance=tolerance, progress=bar)
         parts = (in_units(part.dataset, mechanism.shown_units) for part in parts_with_peaks(motion, refine=refine))
@@ -256,7 +257,7 @@ def solved(mechanism: Mechanism, file: Path, order: int, tolerance: float = 1e-1
     """Solve at all instants of the file; those that fail are NaN."""
     from jounce.kinematics import solve
 
-    with errors_about(file), Bar("solving") as bar:
+    with errors_about(file), Count("solving") as bar:
         return solve(mechanism, order=order, tolerance=tolerance, strict=False, progress=bar)
 
 
@@ -264,7 +265,7 @@ def simulated(mechanism: Mechanism, file: Path, order: int, **options: Any) -> M
     """Simulate to all instants of the file; those that are not reached are NaN."""
     from jounce.integrate import simulate as integrate
 
-    with errors_about(file), Bar("simulating") as bar:
+    with errors_about(file), Count("simulating") as bar:
         return integrate(mechanism, order=order, strict=False, progress=bar, **options)
 
 

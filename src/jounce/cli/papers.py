@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from jounce.activity import Count
 from jounce.errors import JounceError, check_name
-from jounce.reporting.terminal import Bar, say
+from jounce.reporting.terminal import say
 
 PAPERS = ("sommer-2024", "negrean-2025")
 
@@ -65,7 +66,7 @@ def reproduce(
         from jounce.papers import negrean_2025 as home
     else:
         from jounce.papers import sommer_2024 as home
-    with Bar("reproducing") as bar:
+    with Count("reproducing") as bar:
         paths = home.reproduce(out, progress=bar, **given)
     say(paths[0].read_text(encoding="utf-8"))
     say(f"Written to {out}: {count(len(paths), 'file')}")

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jounce.activity import Count
 from jounce.cli.options import AMONG_THE_OTHERS, RobotReading, TableOutput, errors_about, spare_inputs
 from jounce.errors import JounceError, RobotError
-from jounce.reporting.terminal import Bar, say, show_peaks
+from jounce.reporting.terminal import say, show_peaks
 
 if TYPE_CHECKING:
     from jounce.integrate import AbstractMethod
@@ -130,7 +131,7 @@ def simulate_robot_file(
     spare_inputs(output.out, overwrite=output.overwrite)
     options: dict[str, Any] = {"method": method, "tolerance": tolerance, "longest_step": longest_step}
     options |= {"state": settings.state(robot), "torque": settings.laws("torque"), "driven": settings.laws("driven")}
-    with errors_about(file), Bar("simulating") as bar:
+    with errors_about(file), Count("simulating") as bar:
         motion = simulate(robot, times, order, strict=False, drives=not settings.no_drives, progress=bar, **options)
     peaks = table_peaks(motion.dataset)
     if not output.json:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from jounce.activity import Count
 from jounce.cli.mechanisms import outcome
 from jounce.cli.options import (
     NO_TABLE,
@@ -18,7 +19,7 @@ from jounce.cli.options import (
     spare_inputs,
 )
 from jounce.errors import JounceError, check_name
-from jounce.reporting.terminal import Bar, say, show_peaks
+from jounce.reporting.terminal import say, show_peaks
 
 if TYPE_CHECKING:
     from jounce.kinematics import Motion
@@ -75,7 +76,7 @@ def servo(
     for name in names:
         check_name("driver", name, mechanism.drivers, JounceError, name="--driver")
     shown = _units_of(mechanism, names)
-    with errors_about(file), Bar("solving") as bar:
+    with errors_about(file), Count("solving") as bar:
         if not names:
             raise JounceError("there is no driver", name="drivers")
         motion = _at_rate(mechanism, frequency, order, bar)

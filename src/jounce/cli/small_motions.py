@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
+from jounce.activity import Count
 from jounce.cli.arguments import check_ending
 from jounce.cli.file_kinds import expecting
 from jounce.cli.options import (
@@ -20,7 +21,7 @@ from jounce.cli.options import (
     written,
 )
 from jounce.errors import JounceError
-from jounce.reporting.terminal import Bar, say, show_table
+from jounce.reporting.terminal import say, show_table
 
 OPTIONS = ("time", "without", "hold", "release", "coordinates", "method", "mode", "amplitude")
 
@@ -129,7 +130,7 @@ def modes(
     if moved is not None and animation is not None:
         from jounce.plot import animate
 
-        with errors_about(file), Bar("drawing") as bar:
+        with errors_about(file), Count("drawing") as bar:
             duration = float(moved.time[-1])
             written(lambda: animate(moved, animation, speed=duration / 2, progress=bar, overwrite=overwrite))
         if not json:

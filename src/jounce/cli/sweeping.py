@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from jounce.activity import Count
 from jounce.cli.mechanisms import method_of
 from jounce.cli.options import PLAIN_MECHANISM, MechanismReading, RobotReading, errors_about
 from jounce.errors import JounceError
-from jounce.reporting.terminal import Bar, say, say_json, show_table
+from jounce.reporting.terminal import say, say_json, show_table
 
 if TYPE_CHECKING:
     from jounce.sweeps.problems import Problem
@@ -113,7 +114,7 @@ def sweep(
         plan = prepare(
             problem, forms, out, _title(problem, file), files, sample=sample, histories=histories, chunk=chunk
         )
-        with Bar("sweeping", "designs") as bar:
+        with Count("sweeping", "designs") as bar:
             checksum = run(
                 plan,
                 workers=workers,

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from jounce.activity import Count
 from jounce.cli.options import (
     NO_TABLE,
     PLAIN_MECHANISM,
@@ -16,7 +17,7 @@ from jounce.cli.options import (
     spare_inputs,
     written,
 )
-from jounce.reporting.terminal import Bar, say, show_table
+from jounce.reporting.terminal import say, show_table
 
 
 def tolerance(
@@ -80,7 +81,7 @@ def tolerance(
     for target in (output.out, figure):
         spare_inputs(target, overwrite=output.overwrite)
     names = None if of is None else [name.strip() for name in of.split(",") if name.strip()]
-    with errors_about(file), Bar("solving", "designs") as bar:
+    with errors_about(file), Count("solving", "designs") as bar:
         selection = None if names is None else [column_of(mechanism, name) for name in names]
         settings = {"of": names, "samples": samples, "linear": not no_linear, "indices": indices, "progress": bar}
         spread = spread_of(mechanism, forms, order=order, **settings)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.activity import Count
 from jounce.design.measures import PrescribedPath
 from jounce.design.result import OptimizedDesign
 from jounce.design.study import Asked, Study
@@ -123,18 +124,19 @@ def optimize(
     asked = Asked(minimize, tuple(subject_to), bounds, targets, instants)
     best, first_error = None, None
     chosen = _assemblies(mechanism, assemblies)
-    for number, variant in chosen:
-        study = Study(variant, asked, clearance, iterations, seed, progress)
-        try:
-            best_result = study.best(starts, samples)
-        except DesignError as error:
-            if len(chosen) == 1:
-                raise
-            first_error = first_error or error
-            continue
-        whole = study.result(mechanism, best_result, assembly=number)
-        if best is None or (whole.success, -whole.objective) > (best.success, -best.objective):
-            best = whole
+    with Count("optimizing", told=progress) as tell:
+        for number, variant in chosen:
+            study = Study(variant, asked, clearance, iterations, seed, tell)
+            try:
+                best_result = study.best(starts, samples)
+            except DesignError as error:
+                if len(chosen) == 1:
+                    raise
+                first_error = first_error or error
+                continue
+            whole = study.result(mechanism, best_result, assembly=number)
+            if best is None or (whole.success, -whole.objective) > (best.success, -best.objective):
+                best = whole
     if best is None:
         assert first_error is not None
         raise first_error

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from jounce.activity import Count
 from jounce.design.design_space import Sobol
 from jounce.design.variations import Variation, read_variations, reader_of, spreads
 from jounce.errors import MechanismError, UnsupportedError, check_name, no_such, whole_number
@@ -128,10 +129,11 @@ def tolerance(
     atom = _Spread(nominal, variations, selected)
     if linear:
         atom.add_gradients()
-    if samples:
-        atom.add_samples(samples, progress)
-    if indices:
-        atom.add_indices(samples, progress)
+    with Count("solving", "designs", progress) as tell:
+        if samples:
+            atom.add_samples(samples, tell)
+        if indices:
+            atom.add_indices(samples, tell)
     return atom.dataset()
 
 

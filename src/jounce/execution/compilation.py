@@ -19,6 +19,7 @@ import numpy as np
 from jax.core import Tracer
 from jax.experimental import serialize_executable
 
+from jounce.activity import compiling
 from jounce.execution.background import ByKey
 from jounce.execution.device import on_processor
 from jounce.execution.store import Descriptions, Store, current_store, is_wanted_soon, packed, unpacked
@@ -234,7 +235,7 @@ class Compiled:
             return partial(self.jitted, **static)
 
         def compiled_anew() -> Callable[..., Any]:
-            with compiling_anew():
+            with compiling_anew(), compiling(self.function.__name__):
                 with uncollected():
                     lowered = self.jitted.lower(*arguments, **keywords, **static)
                     without_sources(lowered.compiler_ir())

@@ -14,6 +14,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from jounce.activity import compiling
 from jounce.execution.backends import is_wanted, tell_missing
 from jounce.execution.background import ByKey
 from jounce.execution.llvm.modules import object_file
@@ -138,7 +139,8 @@ class Translated:
 
         def make() -> tuple[Any, ...]:
             try:
-                binary, results = object_file(function, *given, places, **options)
+                with compiling(self.function.__name__):
+                    binary, results = object_file(function, *given, places, **options)
             except NoRuleError as missing:  # which is kept, too: to find it out takes long
                 return b"", str(missing), None
             except UnsupportedOperationError:

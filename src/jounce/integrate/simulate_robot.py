@@ -6,6 +6,7 @@ from typing import Any, TypedDict
 import jax
 import numpy as np
 
+from jounce.activity import Count
 from jounce.errors import RobotError, UnsupportedError, check_name, flag
 from jounce.execution.backends import backend_of
 from jounce.integrate.marching.joint_events import JointEvent, JointEventDetector
@@ -76,7 +77,8 @@ def simulate_robot(
         raise RobotError("robots are simulated by jn.Taylor", name="method", value=type(method).__name__)
     terms = (method or Taylor()).expansion_order(tolerance)
     run = _Run(problem, tolerance, longest_step, terms - 1, detectors)
-    run.go(start, instants, progress)
+    with Count("simulating", told=progress) as tell:
+        run.go(start, instants, tell)
     pushed = tuple(wrenches)
     outcome = run.ending, run.events.happened, pushed, run.backends
     simulation = RobotSimulation(robot, problem, run.steps, instants, order, *outcome)

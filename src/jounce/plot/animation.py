@@ -136,7 +136,7 @@ def animate(
     fps : int, default 25
         Frames in a second; a GIF rounds their time to hundredths of a second.
     names : str, default "bodies"
-        Which names are written: ``"all"``, ``"bodies"``, ``"joints"`` or ``"none"``.
+        Which names are written: ``"all"``, ``"bodies"``, ``"joints"``, ``"outputs"`` or ``"none"``.
     paths, order, view
         As for `sketch`.
     progress : callable, optional
@@ -177,7 +177,7 @@ def animate(
     with style(), mpl.rc_context(program), replacing(path, overwrite=overwrite) as temporary:
         drawing = SketchFigure(scene, path_lines, mechanism.title, None if mechanism.space == "planar" else view)
         drawing.show(0)
-        drawing.write_names(0, names, fixed=False)
+        drawing.write_names(names, fixed=False)
         at_the_corner = {"transform": drawing.axes.transAxes, "ha": "right", "va": "bottom", "color": GRAY}
         clock = drawing.axes.text(0.99, 0.01, _clock_text(motion.time, float(motion.time[0])), **at_the_corner)
         drawing.figure.set_layout_engine("none")

@@ -21,7 +21,7 @@ from jounce.plot.style import COLORS, PALE_GRAY, RESOLUTION, blank_figure, set_t
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["check_figure", "draw", "draw_columns", "finish", "save"]
+__all__ = ["check_figure", "draw", "draw_columns", "finish", "save", "stacked"]
 
 Column = tuple[AbstractQuantity, Float[np.ndarray, "time derivative *component"]]
 """An output with its values."""
@@ -29,6 +29,7 @@ Column = tuple[AbstractQuantity, Float[np.ndarray, "time derivative *component"]
 
 SUFFIXES = (".png", ".svg", ".pdf")
 COLUMNS = 5  # of outputs beside each other, at most
+COST_OF_ROW = 0.03  # beside the share of empty places
 PANEL, SINGLE_PANEL = (3.5, 1.25), (4.8, 1.25)  # inches
 LEGEND = {"borderaxespad": 0.1, "handlelength": 1.2, "handletextpad": 0.5, "columnspacing": 1.2}
 STROKES = ("-", "--", ":")  # of more components than there are colors
@@ -42,13 +43,13 @@ def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Figure:
     motion : Motion
         Instants that were not solved are left out and shaded.
     outputs : sequence of str, optional
-        Names of the outputs, one column each, in blocks of five below each other; all unless given.
+        Names of the outputs; all unless given.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Rows are position, velocity, ... as far as the order of the motion; an angular velocity starts in the second, a
-        force in the third, beside the acceleration.
+        Each output has a column of panels: the position, the velocity, ... as far as the order of the motion. Forces,
+        which have two derivatives fewer, stand below each other where that leaves fewer places empty.
 
     Raises
     ------
@@ -72,37 +73,57 @@ def draw(motion: Motion, outputs: Sequence[str] | None = None) -> Figure:
 
 
 def draw_columns(motion: Motion, columns: Mapping[str, Column]) -> Figure:
-    """Draw outputs of a motion beside each other, each in a column with its derivatives below each other."""
-    lost = [output.lost_orders for output, _ in columns.values()]
-    first = min(lost)
-    rows = max(motion.order, max(lost)) + 1 - first
+    """Draw outputs of a motion, each as a column of its derivatives, in as many columns as leave few places empty."""
+    rows = {name: motion.order + 1 - output.lost_orders for name, (output, _) in columns.items()}
+    heights = {name: max(count, 1) for name, count in rows.items()}
+    places = stacked(heights)
+    wide = 1 + max(column for column, _ in places.values())
+    tall = max(places[name][1] + heights[name] for name in columns)
     with style():
         width, height = PANEL if len(columns) > 1 else SINGLE_PANEL
-        blocks = -(-len(columns) // COLUMNS)
-        wide = -(-len(columns) // blocks)
-        tall = height * rows * blocks + 0.9 + 0.45 * (blocks - 1)
-        figure = blank_figure(width * wide + 0.3, tall, motion.mechanism.title)
-        grid = figure.subplots(rows * blocks, wide, sharex=True, squeeze=False)
-        cells = grid.reshape(blocks, rows, wide).swapaxes(1, 2).reshape(-1, rows)
-        for panels, name in zip(cells, columns, strict=False):
-            _draw_column(motion, name, columns[name], panels, first)
-        for axes in cells[len(columns) :].flat:
+        levels = len({row for _, row in places.values()})
+        figure = blank_figure(width * wide + 0.3, height * tall + 0.9 + 0.45 * (levels - 1), motion.mechanism.title)
+        grid = figure.subplots(tall, wide, sharex=True, squeeze=False)
+        for axes in grid.flat:
             axes.set_axis_off()
+        for name, (column, row) in places.items():
+            panels = grid[row : row + heights[name], column]
+            for axes in panels:
+                axes.set_axis_on()
+            _draw_column(motion, name, columns[name], panels)
         figure.align_ylabels()
     return figure
 
 
-def _draw_column(motion: Motion, name: str, column: Column, panels: Any, first: int) -> None:
+def stacked(heights: Mapping[str, int]) -> dict[str, tuple[int, int]]:
+    """Return column and first row of outputs that take some rows each, so that the figure is full and not too tall.
+
+    The tallest come first, each in the column that is shortest so far.
+
+    Examples
+    --------
+    >>> stacked({"psi": 4, "force": 2, "yank": 2})
+    {'psi': (0, 0), 'force': (1, 0), 'yank': (1, 2)}
+    """
+    ordered, total, found = sorted(heights, key=lambda name: -heights[name]), sum(heights.values()), []
+    for count in range(1, min(COLUMNS, len(heights)) + 1):
+        filled, places = [0] * count, {}
+        for name in ordered:
+            column = filled.index(min(filled))
+            places[name] = (column, filled[column])
+            filled[column] += heights[name]
+        empty = (count * max(filled) - total) / total
+        found.append((empty + COST_OF_ROW * max(filled), places))
+    return min(found, key=lambda each: each[0])[1]
+
+
+def _draw_column(motion: Motion, name: str, column: Column, panels: Any) -> None:
     """Draw one output: panel by panel its derivatives, with its components over each other."""
     output, values = column
     unit, factor = motion.mechanism.shown_units.of(output.unit, name)
     values = (values[:, :, None] if values.ndim == 2 else values) * factor
     vector = values.shape[2] > 1
-    for row, axes in enumerate(panels):
-        order = row + first - output.lost_orders
-        if not 0 <= order < values.shape[1]:
-            axes.set_axis_off()
-            continue
+    for order, axes in enumerate(panels[: values.shape[1]]):
         exponent = scale_of(values[:, order])
         scaled = values[:, order] * 10.0**-exponent
         for c in range(values.shape[2]):
@@ -117,10 +138,10 @@ def _draw_column(motion: Motion, name: str, column: Column, panels: Any, first: 
             )
         finish(axes, motion, scaled)
         word = quantity_word(output, order)
-        word = f"{word} derivative" if row + first > 4 and not output.rate_names else word
+        word = f"{word} derivative" if order + output.lost_orders > 4 and not output.rate_names else word
         mark = "" if vector else symbol(name, order)
         axes.set_ylabel(f"{word}\n{mark}{'  ' if mark else ''}({unit_label(unit, order, exponent)})")
-    top = panels[max(output.lost_orders - first, 0)]  # a force starts beside the acceleration
+    top = panels[0]
     top.set_title(shown_name(name), loc="left", pad=6)
     if vector:
         lines = panels[-1].get_lines()[: values.shape[2]]

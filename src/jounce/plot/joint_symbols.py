@@ -13,9 +13,10 @@ from jounce.mechanism.belts import belt_course, belt_outline
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot import symbol_parts as parts
 from jounce.plot.curve_lines import shown
-from jounce.plot.drawing import BARS, GUIDES, INK, MARKS, SYMBOLS, WHEELS, Drawing, Flat, tinted
+from jounce.plot.drawing import BARS, GUIDES, INK, MARKS, SYMBOLS, WHEELS, Drawing, Flat, Label, tinted
 from jounce.plot.driver_symbols import DRIVERS_AND_FORCES
 from jounce.plot.geometry import Symbol, Wheel, frame_along
+from jounce.plot.style import GRAY
 
 __all__ = ["draw_symbols"]
 
@@ -42,6 +43,14 @@ def draw_symbols(drawing: Drawing, mechanism: Mechanism) -> None:
             for center in (point for point, names in zip(link.points, link.names, strict=True) if name in names):
                 drawing.owner, flat = f"outputs.{name}", drawing.flat(drawing.at(link.body, center))
                 drawing.disc(flat, 0.3 * drawing.unit, stroke="", fill=INK, layer=MARKS)
+                if not any(_says(label, name, link.body, flat, drawing.unit) for label in drawing.labels):
+                    drawing.name(name, flat, GRAY)
+
+
+def _says(label: Label, name: str, body: str, place: Flat, unit: float) -> bool:
+    """Return whether the name of a body, or of a joint at the place of an output, is that of the output already."""
+    near = np.linalg.norm(label.anchor - place, axis=1) < 3.0 * unit
+    return label.text == name and (label.owner == f"bodies.{body}" or bool(near.all()))
 
 
 def _draw_wheel(drawing: Drawing, wheel: Wheel) -> None:

@@ -12,7 +12,7 @@ from jounce.mechanism.outputs import AbstractQuantity
 from jounce.reporting.peaks import rate_name
 from jounce.units.shown_units import derivative_unit
 
-__all__ = ["axis_range", "quantity_word", "rounded_down", "scale_of", "symbol", "unit_label"]
+__all__ = ["axis_range", "bar_length", "quantity_word", "rounded_down", "scale_of", "symbol", "unit_label"]
 
 GREEK = (
     "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi psi "
@@ -121,6 +121,18 @@ def axis_range(values: Float[np.ndarray, "..."], margin: float = 0.0, size: floa
         middle, half = 0.5 * (low + high), 0.1 * size or 1.0
         return middle - half, middle + half
     return low - margin * (high - low), high + margin * (high - low)
+
+
+def bar_length(extent: float) -> float:
+    """Return the round length, 1, 2, 2.5 or 5 times a power of ten, that is a tenth to a fifth of what is drawn.
+
+    Examples
+    --------
+    >>> [bar_length(extent) for extent in (0.049, 0.2, 0.3, 1.3)]
+    [0.005, 0.025, 0.05, 0.25]
+    """
+    power = 10.0 ** np.floor(np.log10(extent / 5) + 1e-12)
+    return float(f"{power * max(k for k in (1.0, 2.0, 2.5, 5.0) if k * power <= extent / 5 * (1 + 1e-9)):.3g}")
 
 
 def rounded_down(value: float) -> float:

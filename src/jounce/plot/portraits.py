@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from jounce.plot.instants import evenly_chosen
 from jounce.plot.labels import axis_range, quantity_word, scale_of, symbol, unit_label
 from jounce.plot.style import COLORS, GRAY, PALE_GRAY, blank_figure, set_ticks, style
 from jounce.reporting.peaks import rate_name
+from jounce.trajectory.hermite import hermite_pieces
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,6 +24,10 @@ __all__ = ["hodograph", "phase_portrait"]
 ARROWS = 12  # vectors drawn from the origin of a hodograph
 PROJECTIONS = ((0, 1), (0, 2), (1, 2))
 SIDE = 3.4  # inches
+SMOOTH = 600  # steps of a curve at least
+LEAVING = 0.25  # of the range of the values: what a polynomial may go beyond it
+Line = Float[np.ndarray, " time"]
+Table = Float[np.ndarray, "time component"]
 
 
 def hodograph(motion: Motion, output: str, order: int = 1) -> Figure:
@@ -54,9 +60,9 @@ def hodograph(motion: Motion, output: str, order: int = 1) -> Figure:
     >>> figure.axes[0].get_xlabel()
     '$\\ddot{C}_{x}$  (m/s$^2$)'
     """
-    values = _values(motion, output, (order,))[0]
+    (values,), dense = _values(motion, output, (order,))
     outputs = motion.mechanism.outputs
-    if values.ndim != 2 or outputs[output].axes:
+    if motion.outputs[output].ndim != 3 or outputs[output].axes:
         vectors = [name for name, series in motion.outputs.items() if series.ndim == 3 and not outputs[name].axes]
         message = f"a hodograph needs an output with components; {did_you_mean(output, vectors)}"
         raise MechanismError(message, name="output", value=output)
@@ -70,7 +76,7 @@ def hodograph(motion: Motion, output: str, order: int = 1) -> Figure:
             solved = np.flatnonzero(np.isfinite(scaled).all(axis=1))
             for x, y in scaled[evenly_chosen(solved, ARROWS + 1)][:, [i, j]]:
                 axes.plot([0, x], [0, y], color=PALE_GRAY, linewidth=0.7, zorder=1.5)
-            axes.plot(scaled[:, i], scaled[:, j], color=COLORS[0])
+            axes.plot(*(dense[0][:, [i, j]] * 10.0**-exponent).T, color=COLORS[0])
             axes.plot([0], [0], marker="+", color=GRAY, markersize=7, linestyle="")
             _mark_start(axes, scaled[:, i], scaled[:, j])
             for label, k in ((axes.set_xlabel, i), (axes.set_ylabel, j)):
@@ -111,30 +117,34 @@ def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)
     ('$\\psi$  (rad)', 1)
     """
     pair = tuple(orders)
-    first, second = (values.reshape(len(values), -1) for values in _values(motion, output, pair))
+    (first, second), curves = _values(motion, output, pair)
     its_output, count = motion.mechanism.outputs[output], first.shape[1]
     unit, _ = motion.mechanism.shown_units.of(its_output.unit, output)
     with style():
         figure = blank_figure(SIDE * count + 0.5 * (count == 1), SIDE, _title(motion, output, pair))
         for k, axes in enumerate(np.atleast_1d(figure.subplots(1, count))):
-            component, scaled = its_output.labels[k] if count > 1 else "", []
+            component, scaled, dense = its_output.labels[k] if count > 1 else "", [], []
             named = ((axes.set_xlabel, axes.set_xlim), (axes.set_ylabel, axes.set_ylim))
-            for (label, limits), order, values in zip(named, pair, (first, second), strict=True):
+            for (label, limits), order, values, curve in zip(named, pair, (first, second), curves, strict=True):
                 exponent = scale_of(values)
                 scaled.append(values[:, k] * 10.0**-exponent)
+                dense.append(curve[:, k] * 10.0**-exponent)
                 mark = symbol(output, order, component) or rate_name(its_output, order)
                 label(f"{mark}  ({unit_label(unit, order, exponent)})")
                 size = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values))) * 10.0**-exponent
-                limits(axis_range(scaled[-1], 0.06, size))  # where nothing changes but rounding, it is not magnified
-            axes.plot(*scaled, color=COLORS[k % len(COLORS)])
+                limits(axis_range(dense[-1], 0.06, size))  # where nothing changes but rounding, it is not magnified
+            axes.plot(*dense, color=COLORS[k % len(COLORS)])
             axes.axhline(0.0, color=PALE_GRAY, linewidth=0.7, zorder=1)
             _mark_start(axes, *scaled)
             _few_ticks(axes)
     return figure
 
 
-def _values(motion: Motion, output: str, orders: tuple[int, ...]) -> list[Float[np.ndarray, "time *component"]]:
-    """Return derivatives of an output in its shown unit, or raise for a name or an order that there is not."""
+def _values(motion: Motion, output: str, orders: tuple[int, ...]) -> tuple[list[Table], list[Table]]:
+    """Return derivatives of an output in its shown unit, at the instants of a motion, and as smooth curves.
+
+    Between instants they are derivatives of the polynomials that have all derivatives of the instants at both ends.
+    """
     check_name("output", output, motion.outputs, MechanismError, name="output")
     _, factor = motion.mechanism.shown_units.of(motion.mechanism.outputs[output].unit, output)
     values = motion.outputs[output] * factor
@@ -142,7 +152,33 @@ def _values(motion: Motion, output: str, orders: tuple[int, ...]) -> list[Float[
         if not 0 <= order < values.shape[1]:
             message = f"there are derivatives up to order {values.shape[1] - 1}; solve with a higher order"
             raise MechanismError(message, name="order", value=order)
-    return [values[:, order] for order in orders]
+    lowest = min(*orders, values.shape[1] - 2) if values.shape[1] > 1 else 0
+    columns = values.reshape(*values.shape[:2], -1)
+    curves = [
+        np.stack([_curve(motion.time, jets, order - lowest) for jets in np.moveaxis(columns[:, lowest:], 2, 0)], axis=1)
+        for order in orders
+    ]
+    return [values[:, order].reshape(len(values), -1) for order in orders], curves
+
+
+def _curve(time: Line, jets: Float[np.ndarray, "time levels"], order: int) -> Line:
+    """Return a derivative at the instants and between them; straight where the polynomials leave what is known."""
+    known, values = jets[np.isfinite(jets).all(axis=1), order], jets[:, order]
+    steps = -(-SMOOTH // max(len(time) - 1, 1))
+    if steps == 1 or len(known) < 2:
+        return values
+    if time[-1] < time[0]:
+        return _curve(time[::-1], jets[::-1], order)[::-1]
+    powers = hermite_pieces(time, jets)[order:, :-1]
+    factors = np.array([math.perm(k + order, order) for k in range(len(powers))], float)
+    share = np.arange(steps) / steps
+    smooth = np.polynomial.polynomial.polyval(
+        share * np.diff(time)[:, None], (powers * factors[:, None])[:, :, None], tensor=False
+    )
+    straight = values[:-1, None] + share * np.diff(values)[:, None]
+    slack = LEAVING * np.ptp(known)
+    kept = ((smooth >= known.min() - slack) & (smooth <= known.max() + slack)).all(axis=1, keepdims=True)
+    return np.append(np.where(kept, smooth, straight), values[-1])
 
 
 def _title(motion: Motion, output: str, orders: tuple[int, ...]) -> str:

@@ -6,8 +6,10 @@ import html
 import json
 import math
 import re
+from collections.abc import Sequence
 from importlib.resources import files
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,12 +22,14 @@ from jounce.mechanism.mechanism import GROUND
 from jounce.mechanism.outputs import AbstractQuantity
 from jounce.mechanism.resolve import resolve
 from jounce.plot.animation import LONGEST, SHORTEST
-from jounce.plot.drawing import VIEW, View
+from jounce.plot.drawing import VIEW, Label, View
 from jounce.plot.instants import evenly_chosen, unsolved_runs
-from jounce.plot.labels import quantity_word, rounded_down
-from jounce.plot.scene import scene_of
+from jounce.plot.labels import bar_length, quantity_word
+from jounce.plot.name_placement import place_names
+from jounce.plot.scene import Scene, scene_of
 from jounce.plot.sketch import length_text, limits_with, paths_of
 from jounce.plot.style import BODY_COLORS
+from jounce.reporting.facts.mechanism_facts import parameter_facts
 from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.peaks import Peak, derivative_name, peaks, shown_peaks
 from jounce.reporting.text.summaries import motion_summary
@@ -38,6 +42,9 @@ __all__ = ["check_report", "report"]
 MOST_INSTANTS = 2001  # of the plots
 MOST_FRAMES = 240  # of the sketch, which goes on evenly between them
 STEPS = 20000  # of places across the sketch
+WIDTHS = (360.0, 620.0)  # pixels of the sketch, for each of which names have their places
+TALLEST, LEAST = 560.0, 220.0  # pixels of the sketch
+LETTER, LINE = 7.2, 16.0  # pixels that a letter and a line of a name take
 DIGITS = 9  # of plotted values; peaks are taken of all instants in full
 KINDS = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "at the start"}
 SPEEDS = (0.001, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0)
@@ -59,7 +66,7 @@ def report(
     path: str | PathLike[str],
     *,
     view: View = VIEW,
-    source: str = "",
+    source: str | PathLike[str] = "",
     equations: bool = False,
     at: Real | None = None,
     overwrite: bool = False,
@@ -76,8 +83,9 @@ def report(
         An .html file.
     view : tuple of float, default (-60, 25)
         Azimuth and elevation from which a spatial mechanism is seen, degrees.
-    source : str, optional
-        The file that the mechanism came from, for the foot of the page.
+    source : str or path, optional
+        The file that the mechanism came from. Its name stands in the foot of the page; where it exists, the table of
+        parameters shows how they are written in it.
     equations : bool, default False
         Whether the page ends with the constraint equations: joints with their numbers in Sommer 2024, the pattern of
         the Jacobian, and right sides.
@@ -107,7 +115,7 @@ def report(
     check_report(path, overwrite=overwrite)
     data = json.dumps(_data(motion, view, source), allow_nan=False, separators=(",", ":"))
     parts = {
-        "TITLE": html.escape(motion.mechanism.title or source or "Motion of a mechanism"),
+        "TITLE": html.escape(motion.mechanism.title or Path(source).name or "Motion of a mechanism"),
         "STYLE": _part("report.css"),
         "EQUATIONS": equations_section(motion, at) if equations else "",
         "SCRIPT": _part("report.js") + _part("plots.js"),
@@ -122,11 +130,12 @@ def _part(name: str) -> str:
     return files("jounce.plot").joinpath("page", name).read_text(encoding="utf-8")
 
 
-def _data(motion: Motion, view: View, source: str) -> dict[str, Any]:
+def _data(motion: Motion, view: View, file: str | PathLike[str]) -> dict[str, Any]:
     """Return all that the page shows."""
     from jounce.version import __version__
 
-    mechanism = motion.mechanism
+    mechanism, source = motion.mechanism, Path(file).name
+    parameters = parameter_facts(mechanism, file if source and Path(file).is_file() else None)
     rising = np.argsort(motion.time, kind="stable")
     shown = evenly_chosen(rising, MOST_INSTANTS)
     time = motion.time[shown]
@@ -151,7 +160,9 @@ def _data(motion: Motion, view: View, source: str) -> dict[str, Any]:
         "outputs": outputs,
         "scene": _scene(motion, rising, shown, view, [output["name"] for output in outputs]),
         "peaks": [_peak(peak) for peak in shown_peaks(peaks(motion), units)],
-        "parameters": [[name, _number(value)] for name, value in mechanism.parameter_values.items()],
+        "parameters": [
+            [row["name"], _number(row["value"]), row["unit"] or "", row["written"] or ""] for row in parameters
+        ],
         "bodies": _bodies(mechanism),
         "elements": [
             [name, f"{element.type_name or type(element).__name__} {kind}", ", ".join(element.bodies)]
@@ -236,7 +247,9 @@ def _scene(
     (left, right, lower, upper), margin = limits_with(scene, paths), 3.0 * scene.unit
     limits = [left - margin, right + margin, lower - 1.5 * margin, upper + margin]
     step = max(limits[1] - limits[0], limits[3] - limits[2]) / STEPS
-    bar = rounded_down(0.25 * (limits[1] - limits[0]))
+    bar = bar_length(max(right - left, upper - lower))
+    labels = [label for label in scene.labels if label.owner != f"bodies.{GROUND}"]
+    places = [_name_places(labels, scene, limits, width) for width in WIDTHS]
 
     def pixels(points: np.ndarray) -> list[int | None]:
         return [round(v) if math.isfinite(v) else None for v in (points / step).reshape(-1).tolist()]
@@ -255,13 +268,40 @@ def _scene(
         "shapes": [
             vars(shape) | {"points": moved(shape.points), "count": shape.points.shape[1]} for shape in scene.shapes
         ],
+        "widths": WIDTHS,
         "labels": [
-            {"text": label.text, "color": label.color, "points": moved(label.anchor[:, None])}
-            for label in scene.labels
-            if label.owner != f"bodies.{GROUND}"
+            {
+                "text": label.text,
+                "kind": label.owner.partition(".")[0],
+                "color": label.color,
+                "points": moved(label.anchor[:, None]),
+                "places": [chosen[number] for chosen in places],
+            }
+            for number, label in enumerate(labels)
         ],
         "paths": [
             {"output": outputs.index(name), "points": pixels(flat[shown])}
             for name, flat in (paths.flat.items() if paths else ())
         ],
     }
+
+
+def _name_places(
+    labels: Sequence[Label], scene: Scene, limits: Sequence[float], width: float
+) -> list[list[Any] | None]:
+    """Return direction and distance of names in a sketch of some pixels, placed as those of `sketch` are."""
+    left, right, lower, upper = limits
+    height = min(max(width * (upper - lower) / (right - left), LEAST), TALLEST)
+    scale = min(width / (right - left), height / (upper - lower))
+    middle = np.array([left + right, lower + upper]) / 2
+
+    def to_pixels(points: np.ndarray) -> np.ndarray:
+        return np.array([width, height]) / 2 + scale * (points - middle)
+
+    halves = [np.array([LETTER * len(label.text) / 2 + 2.0, LINE / 2]) for label in labels]
+    corner = np.array([[0.0, 0.0, 0.25 * width, 24.0]])  # the scale
+    frame = np.array([0.0, 0.0, width, height])
+    found = place_names(labels, halves, scene, to_pixels, frame, corner)
+    return [
+        place and [*(round(number, 4) for number in (*place.direction, place.distance)), place.led] for place in found
+    ]

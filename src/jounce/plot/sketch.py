@@ -6,17 +6,18 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from jaxtyping import Float
 
 from jounce.errors import MechanismError, check_choice, did_you_mean
 from jounce.kinematics import Motion
 from jounce.mechanism import PointOutput
 from jounce.mechanism.mechanism import Mechanism, check_mechanism
 from jounce.mechanism.time import nearest_instants
-from jounce.plot.drawing import VIEW, WHEELS, Label, Shape, View, screen_of
+from jounce.plot.drawing import VIEW, Label, Shape, View, screen_of
 from jounce.plot.instants import evenly_chosen, solved_instants
-from jounce.plot.labels import rounded_down, scale_of, unit_label
+from jounce.plot.labels import bar_length, scale_of, unit_label
 from jounce.plot.name_placement import place_names
-from jounce.plot.scene import Scene, outline, scene_of
+from jounce.plot.scene import Scene, scene_of
 from jounce.plot.style import GRAY, blank_figure, printable, shown_name, style
 from jounce.reporting.peaks import rate_name
 
@@ -25,10 +26,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Paths", "SketchFigure", "check_names", "draw_scale", "length_text", "limits_with", "paths_of", "sketch"]
 
-NAMES = ("all", "bodies", "joints", "none")
+NAMES = ("all", "bodies", "joints", "outputs", "none")
 WIDEST, TALLEST, LEAST = 6.4, 5.2, 2.6  # inches
 LETTER = 0.07  # inches of a title at least, which is then written smaller
 WIDEST_TITLE = 8.0  # inches; what is longer is cut
+AXES_FOOT = 0.16  # of the size of what is drawn, below it, for the axes of a view in space
+LETTERING = {"bodies": {"fontweight": "bold"}, "outputs": {"fontstyle": "italic"}}
 MOST = 400  # instants that a drawing is made for; more would not be seen
 PATH_MAP = "cividis"  # rises evenly in lightness, for the color-blind too
 
@@ -115,7 +118,9 @@ class SketchFigure:
     def __init__(self, scene: Scene, paths: Paths | None, title: str, view: View | None, axes: Any = None):
         self.scene = scene
         (left, right, lower, upper), margin = limits_with(scene, paths), 3.5 * scene.unit
-        left, right, lower, upper = left - margin, right + margin, lower - 2 * margin, upper + margin
+        self.extent = max(right - left, upper - lower)
+        foot = 2 * margin if view is None else max(2 * margin, AXES_FOOT * self.extent)
+        left, right, lower, upper = left - margin, right + margin, lower - foot, upper + margin
         if axes is None:
             axes = self._blank(right - left, upper - lower, 0.9 if paths and paths.order else 0.0, title)
         self.axes, self.figure = axes, axes.figure
@@ -127,7 +132,7 @@ class SketchFigure:
             _draw_paths(self.figure, axes, paths)
         self.artists = [self._artist(shape) for shape in scene.shapes]
         self.texts: list[tuple[Any, Label, np.ndarray]] = []
-        draw_scale(axes, view)
+        draw_scale(axes, self.extent, view)
 
     @staticmethod
     def _blank(wide: float, tall: float, bar: float, title: str) -> Any:
@@ -161,13 +166,44 @@ class SketchFigure:
             else:
                 artist.set_center(points[0])
 
-    def write_names(self, instant: int, names: str, *, fixed: bool = True) -> None:
-        """Write names near what they belong to, so that none covers another; lines lead to them in a still."""
-        kinds = {"all": ("bodies", "joints"), "none": ()}.get(names, (names,))
+    def write_names(self, names: str, *, fixed: bool = True) -> None:
+        """Write names near what they belong to, clear of the drawing at all instants; lines lead to them in a still."""
+        from matplotlib.patheffects import withStroke
+
+        kinds = {"all": ("bodies", "joints", "outputs"), "none": ()}.get(names, (names,))
+        axes, renderer = self.axes, self._placed_renderer()
+        boxes = np.array([_box(text, renderer) for text in axes.texts]).reshape(-1, 4)
         selected = [label for label in self.scene.labels if label.owner.partition(".")[0] in kinds]
-        obstacles = [outline(shape, instant) for shape in self.scene.shapes if shape.layer > WHEELS]
-        for label, text in place_names(self.figure, self.axes, selected, instant, obstacles, self.scene.unit, fixed):
-            self.texts.append((text, label, np.array(text.get_position()) - label.anchor[instant]))
+        texts, halves = [], []
+        for label in selected:
+            text = axes.text(0.0, 0.0, shown_name(label.text), color=label.color, fontsize=8, ha="center", va="center")
+            text.set(zorder=9, path_effects=[withStroke(linewidth=1.8, foreground="white")])
+            text.set_gid(printable(f"name.{label.owner}"))
+            text.set(**LETTERING.get(label.owner.partition(".")[0], {}))
+            left, lower, right, upper = _box(text, renderer)
+            texts.append(text)
+            halves.append(np.array([right - left, upper - lower]) / 2 + 1.0)
+        to_pixels = axes.transData
+        unit = float(np.diff(to_pixels.transform([[0.0, 0.0], [self.scene.unit, 0.0]]), axis=0)[0, 0])
+        frame = _box(axes, renderer)
+        places = place_names(selected, halves, self.scene, to_pixels.transform, frame, boxes)
+        for label, text, half, place in zip(selected, texts, halves, places, strict=True):
+            if place is None:
+                text.remove()
+                continue
+            anchor = label.anchor[0]
+            at = to_pixels.inverted().transform(to_pixels.transform(anchor) + place.offset(half, unit))
+            text.set_position(at)
+            self.texts.append((text, label, at - anchor))
+            if place.led and fixed:
+                look = {"color": label.color, "linewidth": 0.5, "alpha": 0.6, "zorder": 5.5}
+                begin = anchor + 1.2 * self.scene.unit * np.array(place.direction)  # at the rim of a pin
+                axes.plot([begin[0], at[0]], [begin[1], at[1]], **look)
+
+    def _placed_renderer(self) -> Any:
+        """Set the places of all panels, and return what measures texts in them."""
+        self.figure.draw_without_rendering()
+        return self.figure.canvas.get_renderer()
 
     def move_names(self, instant: int) -> None:
         """Let the names go along with what they belong to, to an instant, by index."""
@@ -193,7 +229,7 @@ def sketch(
     instant : float, optional
         Time, s; the nearest instant of the motion that was solved is taken, the first unless given.
     names : str, default "all"
-        Which names are written: ``"all"``, ``"bodies"``, ``"joints"`` or ``"none"``.
+        Which names are written: ``"all"``, ``"bodies"``, ``"joints"``, ``"outputs"`` (of points) or ``"none"``.
     paths : sequence of str, optional
         Outputs whose paths are drawn; those of all points unless given.
     order : int, default 0
@@ -219,7 +255,7 @@ def sketch(
     >>> from jounce.plot import sketch
     >>> figure = sketch(jn.load("examples/four_bar.yaml"))
     >>> sorted(text.get_text() for text in figure.axes[0].texts)
-    ['20 mm', 'A', 'BC', 'D', 'crank', 'rocker']
+    ['20 mm', 'A', 'BC', 'C', 'D', 'crank', 'rocker']
     """
     mechanism = getattr(moving, "mechanism", moving)
     check_mechanism(mechanism)
@@ -237,7 +273,7 @@ def sketch(
     with style():
         figure = SketchFigure(scene, path_lines, mechanism.title, None if mechanism.space == "planar" else view)
         figure.show(0)
-        figure.write_names(0, names)
+        figure.write_names(names)
     return figure.figure
 
 
@@ -263,12 +299,20 @@ def _draw_paths(figure: Any, axes: Any, paths: Paths) -> None:
     bar.outline.set_visible(False)
 
 
-def draw_scale(axes: Any, view: View | None = None) -> None:
-    """Draw a bar of a round length in the place of the one that is there, and the axes of a view in space."""
+def _box(artist: Any, renderer: Any) -> Float[np.ndarray, "4"]:
+    """Return left, lower, right and upper edge of what is drawn, in pixels."""
+    return artist.get_window_extent(renderer).extents
+
+
+def draw_scale(axes: Any, extent: float, view: View | None = None) -> None:
+    """Draw the axes of a view in space, and a bar of a round length in the place of the one that is there.
+
+    The bar is a tenth to a fifth of `extent`, the larger of width and height of the machine, m.
+    """
     for artist in axes.findobj(lambda each: each.get_gid() == "scale"):
         artist.remove()
     (left, right), (lower, upper) = axes.get_xlim(), axes.get_ylim()
-    length = rounded_down(0.22 * (right - left))
+    length = bar_length(extent)
     start, foot = left + 0.03 * (right - left), lower + 0.03 * (upper - lower)
     look = {"color": GRAY, "gid": "scale"}
     axes.plot([start, start + length], [foot, foot], linewidth=1.6, solid_capstyle="butt", zorder=8, **look)

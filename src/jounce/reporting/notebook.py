@@ -14,17 +14,18 @@ from jounce.design import OptimizedDesign
 from jounce.display import Displayed
 from jounce.dynamics import Equilibrium, LimitReport, Linearization, Modes
 from jounce.errors import JounceError, SampleWarning
-from jounce.integrate import Batch
-from jounce.kinematics import Curve, Motion, Status
+from jounce.integrate import Batch, RobotSimulation
+from jounce.kinematics import Assemblies, Curve, Motion, PlateCam, Status
 from jounce.mechanism import Mechanism
+from jounce.planning import Feedforward, JointPoses, ToolPathMotion
 from jounce.reporting.facts.curve_facts import curve_facts, curve_summary, curve_tables
 from jounce.reporting.facts.design_facts import design_facts, design_table, design_words
 from jounce.reporting.facts.mechanism_facts import mechanism_facts
 from jounce.reporting.facts.modes_facts import equilibrium_facts, equilibrium_tables, equilibrium_words, modes_table
 from jounce.reporting.facts.motion_facts import motion_facts
 from jounce.reporting.facts.robot_facts import robot_facts
-from jounce.reporting.peaks import peaks, shown_peaks
-from jounce.reporting.text.summaries import count, verdict
+from jounce.reporting.peaks import peaks, shown_peaks, table_peaks
+from jounce.reporting.text.summaries import count, robot_motion_words, verdict
 from jounce.reporting.text.tables import Table, limits_table, mechanism_tables, number, peaks_table, robot_tables, table
 from jounce.robot import Robot
 from jounce.trajectory import JointTrajectory
@@ -80,8 +81,25 @@ def shown(thing: Displayed) -> str:
                 *_tables([limits_table(thing)]),
             ]
         case _:
-            parts = _title(repr(thing).strip("<>"))
+            parts = _others(thing)
     return f'<div class="jounce">{STYLE}{"".join(parts)}</div>'
+
+
+def _others(thing: Displayed) -> list[str]:
+    """Return what there is to show of results that are seen less often."""
+    match thing:
+        case Assemblies():
+            return _assemblies(thing)
+        case RobotSimulation():
+            title = _title(*robot_motion_words(thing))
+            return [*title, *_tables([dataclasses.replace(peaks_table(table_peaks(thing.dataset)), title="Peaks")])]
+        case ToolPathMotion():
+            return _tool_path_motion(thing)
+        case JointPoses():
+            return _joint_poses(thing)
+        case PlateCam() | Feedforward():
+            return [*_title(repr(thing).strip("<>")), *_tables([_ranges(thing.dataset)])]
+    return _title(repr(thing).strip("<>"))
 
 
 def _text(value: object) -> str:
@@ -191,12 +209,56 @@ def _trajectory(trajectory: JointTrajectory) -> list[str]:
     names = ("position", "velocity", "acceleration", "jerk")
     rows = []
     for k, name in enumerate(trajectory.names):
-        ranges = [f"{number(values[:, d, k].min())} to {number(values[:, d, k].max())}" for d in range(4)]
+        ranges = [_range(values[:, d, k]) for d in range(4)]
         rows.append([name, type(trajectory.laws[name]).__name__, *ranges])
     joints = count(len(rows), "joint")
     line = f"{joints}, t = {trajectory.start:g} s to {trajectory.stop:g} s, {count(len(trajectory.times), 'instant')}"
     headings = ("joint", "law", *(f"{name}, SI" for name in names))
     return [*_title("Joint trajectory", line), *_tables([Table("Ranges", headings, rows)])]
+
+
+def _assemblies(found: Assemblies) -> list[str]:
+    headings = ("assembly", "circuit", "branch", "found from", "distance", "least singular value")
+    rows = [
+        [
+            str(each.number),
+            *("-" if part is None else str(part) for part in (each.circuit, each.branch)),
+            count(each.hits, "start"),
+            number(each.distance),
+            number(each.smallest_singular_value),
+        ]
+        for each in found
+    ]
+    return [*_title(repr(found).strip("<>")), *_tables([Table("", headings, rows, range(4, 6))])]
+
+
+def _tool_path_motion(moved: ToolPathMotion) -> list[str]:
+    orders = ("position", "velocity", "acceleration", "jerk")[: moved.q.shape[1]]
+    rows = [
+        [name, *(_range(moved.q[:, order, k]) for order in range(len(orders)))]
+        for k, name in enumerate(moved.robot.joint_names)
+    ]
+    title = _title(repr(moved).strip("<>"), moved.ending)
+    return [*title, *_tables([Table("Ranges", ("joint", *(f"{word}, SI" for word in orders)), rows)])]
+
+
+def _joint_poses(poses: JointPoses) -> list[str]:
+    rows = [[name, _range(poses.q[..., k])] for k, name in enumerate(poses.joint_names)]
+    return [*_title(repr(poses).strip("<>")), *_tables([Table("Coordinates", ("joint", "range, SI"), rows)])]
+
+
+def _ranges(dataset: Any) -> Table:
+    """Return the ranges of the variables of a dataset; of those with derivatives, that of the quantity itself."""
+    rows = []
+    for name, variable in dataset.data_vars.items():
+        values = variable.isel(derivative=0) if "derivative" in variable.dims else variable
+        rows.append([str(name), str(variable.attrs.get("units", "")), _range(values.values)])
+    return Table("Ranges", ("quantity", "unit", "range"), rows)
+
+
+def _range(values: np.ndarray) -> str:
+    known = values[np.isfinite(values)]
+    return f"{number(known.min())} to {number(known.max())}" if known.size else "-"
 
 
 def _batch(batch: Batch) -> list[str]:

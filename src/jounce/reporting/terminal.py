@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import sys
-import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +21,7 @@ from jounce.errors import (
     UnitWarning,
     shortened,
 )
-from jounce.interrupts import undoing
+from jounce.reporting.progress import pause
 
 if TYPE_CHECKING:
     from jounce.reporting.peaks import Peak
@@ -42,8 +40,6 @@ OURS = (
 )  # warnings of this package, which nobody may turn off by mistake
 WIDTH = 80  # of tables that do not go to a terminal
 WIDEST = 9999
-SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # on a cleared line; a progress bar hides it
-PATIENCE = 1.0  # s, before a progress bar is shown
 
 
 def show_peaks(given: Sequence[Peak]) -> None:
@@ -58,6 +54,7 @@ def show_peaks(given: Sequence[Peak]) -> None:
 
 def show_table(table: Table, style: str = "bold") -> None:
     """Print a table, in color on a terminal that is wide enough for its numbers; marked cells have a style there."""
+    pause()
     if not (sys.stdout.isatty() and _show_colored(table, style)):
         say("\n" + "\n".join(_plain_lines(table)))
 
@@ -123,6 +120,7 @@ def _show_colored(table: Table, style: str) -> bool:
 
 def show_columns(pairs: Sequence[tuple[str, str]]) -> None:
     """Print names and what they mean, in two columns."""
+    pause()
     width = max(len(name) for name, _ in pairs)
     colored = sys.stdout.isatty()
     if colored:
@@ -135,63 +133,6 @@ def show_columns(pairs: Sequence[tuple[str, str]]) -> None:
     say("\n".join(f"{name:{width}}  {meaning}" for name, meaning in pairs))
 
 
-class Bar:
-    """A progress bar on the terminal's standard error, shown only when work goes on for more than a moment.
-
-    Parameters
-    ----------
-    task : str
-        What is done.
-    unit : str
-        What is counted, where counts and a rate are of interest.
-    """
-
-    def __init__(self, task: str, unit: str = ""):
-        self._task, self._unit = task, unit
-        self._started: float | None = None
-        self._bar: Any = None
-        self._shown = ExitStack()
-
-    def __enter__(self) -> Bar:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._shown.close()
-
-    def __call__(self, done: int, total: int) -> None:
-        """Tell how much is done; compiling, before the first call, does not count as work."""
-        if self._bar is None:
-            now = time.monotonic()
-            self._started = now if self._started is None else self._started
-            if done >= total or now - self._started < PATIENCE or not sys.stderr.isatty():
-                return
-            from rich.console import Console
-            from rich.progress import Progress
-
-            self._bar = Progress(*_columns(self._unit), console=Console(stderr=True), transient=True)
-            self._shown.enter_context(undoing(lambda: os.write(2, SHOW_CURSOR)))
-            self._shown.enter_context(self._bar)
-            self._id = self._bar.add_task(self._task, total=total)
-        self._bar.update(self._id, completed=done, total=total)
-
-
-def _columns(unit: str) -> tuple[Any, ...]:
-    """Return the columns of a progress bar, with counts and a rate where there is something to count."""
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
-    from rich.text import Text
-
-    class Rate(ProgressColumn):
-        def render(self, task: Any) -> Text:
-            return Text("" if task.speed is None else f"{task.speed:,.0f} {unit}/s")
-
-    if not unit:
-        return Progress.get_default_columns()
-    return (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(), TextColumn("left"),
-        TimeRemainingColumn(),
-    )  # fmt: skip
-
-
 def _clean(text: str) -> str:
     """Replace control characters, with which a file could steer the terminal."""
     return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
@@ -199,12 +140,14 @@ def _clean(text: str) -> str:
 
 def say(text: str) -> None:
     """Print text on standard output."""
+    pause()
     sys.stdout.write(_clean(text) + "\n")
     sys.stdout.flush()
 
 
 def say_json(command: str, data: Mapping[str, Any]) -> None:
     """Print the result of a command as JSON on standard output."""
+    pause()
     from jounce.reporting.json.results import result_json
 
     sys.stdout.write(result_json(command, data) + "\n")
@@ -251,6 +194,7 @@ def cautions(*, json: bool = False) -> Iterator[None]:
 
 
 def _write_message(kind: str, style: str, message: object, json: bool) -> None:
+    pause()
     if json:
         from jounce.reporting.json.results import complaint
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Bool
 
+from jounce.activity import Count
 from jounce.design.design_space import sample_space
 from jounce.design.variations import read_variations
 from jounce.errors import DamageWarning, JounceError, MechanismError, OutputError, TrajectoryError, whole_number
@@ -130,7 +131,8 @@ def sweep(
     with recording() as files:
         problem, title = _problem(model, trajectory, time, order, simulate, method, tolerance)
     prepared = prepare(problem, vary, Path(fspath(out)), title, files, sample=sample, histories=histories, chunk=chunk)
-    run(prepared, workers=workers, scheduler=scheduler, timeout=timeout, progress=progress)
+    with Count("sweeping", "designs", progress) as tell:
+        run(prepared, workers=workers, scheduler=scheduler, timeout=timeout, progress=tell)
     return opened(prepared.folder)
 
 

@@ -65,7 +65,7 @@ class HermiteMotion(SplineMotion):
         if (steps < 0).any() or (twice[1:] & twice[:-1]).any() or twice[:1].any() or twice[-1:].any():
             raise TrajectoryError("must increase", name="times", value=instants.tolist()[:5])
         begins = np.append(~twice, True)  # of an instant that is given twice the second row begins a piece
-        pieces = _pieces(instants, table) if known.all() else _mixed_pieces(instants, table, known)
+        pieces = hermite_pieces(instants, table) if known.all() else _mixed_pieces(instants, table, known)
         self._set(instants[begins], pieces[:, begins], instants[-1], beyond)
 
     def jumps(self, order: int = 4) -> Jumps:
@@ -73,7 +73,7 @@ class HermiteMotion(SplineMotion):
         return knot_jumps(self, order)
 
 
-def _pieces(
+def hermite_pieces(
     times: Float[np.ndarray, " instants"], derivatives: Float[np.ndarray, "instants levels"]
 ) -> Float[np.ndarray, "powers instants"]:
     """Return the powers of the piece that begins at each instant; the last one is its Taylor polynomial."""
@@ -103,7 +103,7 @@ def _mixed_pieces(
     for count in np.unique(levels).tolist():
         (first,) = np.nonzero(levels == count)
         pairs = np.stack([first, first + 1], axis=1).reshape(-1)
-        powers = _pieces(times[pairs], derivatives[pairs, :count])[:, ::2]
+        powers = hermite_pieces(times[pairs], derivatives[pairs, :count])[:, ::2]
         result[: len(powers), first] = powers
     last = derivatives[-1, : known[-1].sum()][:highest]
     result[: len(last), -1] = last / np.array([math.factorial(k) for k in range(len(last))], float)

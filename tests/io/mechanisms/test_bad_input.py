@@ -1,13 +1,17 @@
 """Every way a mechanism file can be wrong ends in one message with file, line, name and value, never in a traceback."""
 
 import pathlib
+import subprocess
+import sys
 
 import pytest
 from ruamel.yaml import YAML
 
 from jounce.errors import MechanismFileError
 from jounce.io import load
+from jounce.io.mechanisms.key_check import check_keys
 
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 PLANAR = """\
 title: Planar four-bar
 space: planar
@@ -65,6 +69,14 @@ FILES = {"planar": PLANAR, "planar forces": PLANAR_FORCES, "spatial": SPATIAL, "
 CASES = YAML(typ="safe").load(pathlib.Path(__file__).with_name("bad_input.yaml"))
 
 
+def found_early(path):
+    """Return what is found before JAX is imported; None where nothing is."""
+    try:
+        check_keys(path)
+    except MechanismFileError as error:
+        return str(error)
+
+
 @pytest.mark.parametrize(
     "space, what", [pytest.param(space, what, id=f"{space}-{what}") for space in CASES for what in CASES[space]]
 )
@@ -79,6 +91,7 @@ def test_file_with_one_mistake(tmp_path, space, what):
     assert message.startswith(f"{path}, line {case['line']}, {case['name']}: ")
     assert case["says"] in message
     assert message.isprintable()
+    assert found_early(path) in (None, message)
 
 
 @pytest.mark.parametrize("text", FILES.values(), ids=FILES)
@@ -102,6 +115,23 @@ def test_a_file_of_comments_only_is_empty(tmp_path):
     path.write_text("# nothing")
     with pytest.raises(MechanismFileError, match=r"list\.yaml: the file is empty"):
         load(path)
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "examples").glob("*.yaml")), ids=lambda file: file.stem)
+def test_the_early_look_lets_pass_what_is_right(file):
+    check_keys(file)
+
+
+def test_a_misspelling_is_told_without_jax(tmp_path):
+    path = tmp_path / "typo.yaml"
+    path.write_text(PLANAR.replace("angle: 30", "angel: 30"))
+    command = [sys.executable, "-X", "importtime", "-m", "jounce", "inspect", path]
+    told = subprocess.run(command, capture_output=True, text=True, check=False)
+    imported = [line.rpartition("|")[2].strip() for line in told.stderr.splitlines() if line.startswith("import time:")]
+    assert "ruamel.yaml" in imported
+    assert not {"jax", "numpy", "pydantic"} & set(imported)
+    assert "line 6, bodies.crank.angel: unknown key 'angel'; did you mean 'angle'?" in told.stderr
+    assert told.returncode == 2
 
 
 def test_a_misspelled_key_is_named_rather_than_the_key_that_misses(tmp_path):

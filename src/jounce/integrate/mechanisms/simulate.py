@@ -8,6 +8,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool
 
+from jounce.activity import Count
 from jounce.constraints import AbstractConstraint
 from jounce.dynamics.forward.accelerations import Equations, Instants, State, with_ground
 from jounce.dynamics.forward.initial_state import ConsistentStart, consistent_start
@@ -200,7 +201,8 @@ def simulate(
     detectors = [_detector_of(event, mechanism, start) for event in watched]
     prepare(start.model)
     run = _Run(start, method, limits, detectors)
-    run.go(instants, progress)
+    with Count("simulating", told=progress) as tell:
+        run.go(instants, tell)
     run.note_ends(len(events))
     outcome = run.ending, run.events.happened[: len(events)], joined(run.backends)
     simulation = Simulation(mechanism, start, run.dense_output, instants, order, *outcome)

@@ -12,7 +12,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.display import Displayed
 from jounce.errors import RobotError
 from jounce.execution.backends import joined, xla_backend
 from jounce.execution.chunks import in_chunks
@@ -21,6 +20,7 @@ from jounce.integrate.marching.robot_marching import RobotProblem, RobotState, R
 from jounce.integrate.steps.methods import Lanes
 from jounce.jet import Jet, compose
 from jounce.kinematics import Status
+from jounce.kinematics.results.tables import Tabulated
 from jounce.robot.algorithms.base_motion import BaseMotion
 from jounce.robot.algorithms.inverse_dynamics import inverse_dynamics
 from jounce.robot.algorithms.wrench_laws import WrenchPart
@@ -37,7 +37,7 @@ MUCH_LONGER = 1e3  # than the step over a jump are those beside it
 CLOSE = 1e-5  # of the longest step: steps that come so near to a jump are of that
 
 
-class RobotSimulation(Displayed):
+class RobotSimulation(Tabulated):
     """The motion of a robot under forces of its joints, at the instants asked for and at any other.
 
     At each instant the derivatives of every order follow from the equations of motion, not from the steps. `status`

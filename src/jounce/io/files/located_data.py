@@ -9,8 +9,6 @@ from typing import Any
 
 from jounce.errors import UNSET, ExpressionError, JounceError, MechanismFileError, unknown
 from jounce.io.files.reading import named_file
-from jounce.units.dimensions import Dimension
-from jounce.units.values import Value, parse_value
 
 MAX_VALUES, MAX_KEYS = 200_000, 20_000  # of a file, and of one mapping in it
 MAX_DEPTH = 50
@@ -86,9 +84,11 @@ class Source:
         raw: Any,
         kind: str = "any",
         names: Iterable[str] = (),
-        dimensions: Mapping[str, Dimension] | None = None,
-    ) -> Value:
+        dimensions: Mapping[str, Any] | None = None,
+    ) -> Any:
         """Return a value in SI units with its dimension, as `parse_value` reads it."""
+        from jounce.units.values import parse_value  # here, as it brings JAX, which a misspelled key need not wait for
+
         try:
             return parse_value(raw, kind, names, dimensions)
         except JounceError as error:

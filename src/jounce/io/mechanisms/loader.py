@@ -16,7 +16,8 @@ from jounce.io.files.located_data import Location, Source
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.file_cams import CamEntry, coordinates_by_name, with_leaders
 from jounce.io.mechanisms.file_laws import FileLaws
-from jounce.io.mechanisms.keys import ROLES, FileKey, file_keys, location_of
+from jounce.io.mechanisms.key_check import ROLES
+from jounce.io.mechanisms.keys import FileKey, file_keys, location_of
 from jounce.io.mechanisms.unit_hints import warn_of_units
 from jounce.mechanism import Body, Mechanism, TimeGrid, time_grid, with_output_drivers
 from jounce.mechanism.gear_frames import check_distances

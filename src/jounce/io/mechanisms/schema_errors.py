@@ -5,16 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from jounce.constraints import catalogue
-from jounce.errors import JounceError, did_you_mean, no_such, show_value
+from jounce.errors import JounceError, did_you_mean, no_such
 from jounce.io.files.located_data import Location, Source
-from jounce.io.mechanisms.keys import ROLES, file_keys, is_cam
+from jounce.io.mechanisms.key_check import ROLES, unknown_key, unknown_type
+from jounce.io.mechanisms.keys import file_keys, is_cam
 from jounce.io.mechanisms.output_types import output_holder, output_types
 from jounce.io.mechanisms.schema import file_model, output_form
-
-_HINTS = {
-    ("planar", "orientation"): "a planar body has an angle",
-    ("spatial", "angle"): "a spatial body has an orientation",
-}
 
 
 def first_problem(source: Source, space: str, problems: list[Any]) -> JounceError:
@@ -54,7 +50,7 @@ def _word(source: Source, space: str, problem: Any) -> JounceError:
             stated = context["value"]
             return source.error(context["message"], at, value=value if stated is ... else stated)
         case "extra_forbidden":
-            return source.error(_unknown_key(source, space, at), at)
+            return unknown_key(source, space, at, _valid_keys(source, space, at[:-1]))
         case "missing":
             return source.error("is missing", at)
         case "union_tag_not_found" | "union_tag_invalid" if not isinstance(value, dict):
@@ -66,12 +62,6 @@ def _word(source: Source, space: str, problem: Any) -> JounceError:
         case "literal_error":
             return source.error(f"must be {context['expected']}", at, value=value)
     return source.error(f"is not valid: {problem['msg']}", at, value=value)
-
-
-def _unknown_key(source: Source, space: str, at: Location) -> str:
-    valid = _valid_keys(source, space, at[:-1])
-    hint = _HINTS.get((space, str(at[-1]))) if at[0] == "bodies" else None
-    return f"unknown key {show_value(at[-1])}; {hint or did_you_mean(at[-1], valid)}"
 
 
 def _valid_keys(source: Source, space: str, parent: Location) -> list[str]:
@@ -98,20 +88,7 @@ def _unknown_type(source: Source, space: str, at: Location, entry: dict[str, Any
     """Word a joint, driver, force or output of a kind that does not exist."""
     if at[0] == "outputs":
         return _unknown_output(source, space, at, entry)
-    role = ROLES[str(at[0])]
-    valid = catalogue(space, role)
-    if "type" not in entry:
-        return source.error(f"is missing; valid: {', '.join(sorted(valid))}", (*at, "type"))
-    name = entry["type"]
-    elsewhere = [
-        f"a {other_space} {other_role}"
-        for other_space in ("planar", "spatial")
-        for other_role in ("joint", "driver", "force")
-        if isinstance(name, str) and name in catalogue(other_space, other_role)
-    ]
-    note = f"it is the type of {' and '.join(elsewhere)}; " if elsewhere else ""
-    message = f"no {space} {role} has this type; {note}{did_you_mean(name, valid)}"
-    return source.error(message, (*at, "type"), value=name)
+    return unknown_type(source, space, at, entry, catalogue)
 
 
 def _unknown_output(source: Source, space: str, at: Location, entry: dict[str, Any]) -> JounceError:

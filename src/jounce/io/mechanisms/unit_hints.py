@@ -15,7 +15,8 @@ from jounce.constraints.facts import at_coordinate
 from jounce.errors import JounceError, UnitWarning
 from jounce.io.files.located_data import Location, Source, dotted
 from jounce.io.files.samples import sampled_dimension
-from jounce.io.mechanisms.keys import ROLES, file_keys, is_cam
+from jounce.io.mechanisms.key_check import ROLES
+from jounce.io.mechanisms.keys import file_keys, is_cam
 from jounce.mechanism import Mechanism
 from jounce.mechanism.angle_laws import (
     IN_SI,

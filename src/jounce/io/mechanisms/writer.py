@@ -14,7 +14,8 @@ import numpy as np
 from jounce.constraints import Cam, catalogue
 from jounce.constraints.base import value_fields
 from jounce.errors import MechanismError
-from jounce.io.mechanisms.keys import ROLES, file_keys
+from jounce.io.mechanisms.key_check import ROLES
+from jounce.io.mechanisms.keys import file_keys
 from jounce.io.mechanisms.output_types import OUTPUTS, output_holder
 from jounce.io.mechanisms.written_laws import WrittenLaws
 from jounce.io.mechanisms.written_values import plain, plain_number

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jounce.display import Displayed
 from jounce.errors import MechanismError, TrajectoryError, check_choice, whole_number
 from jounce.jet import Jet, atan2, sqrt
 from jounce.jet.turns import WHOLE_TURN
@@ -44,7 +45,7 @@ MOST = 100_000  # points of a profile
 
 
 @dataclasses.dataclass(frozen=True)
-class PlateCam:
+class PlateCam(Displayed):
     """A plate cam, with its follower and its law.
 
     Parameters

@@ -9,6 +9,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float, Int
 
+from jounce.activity import Count
 from jounce.errors import AssemblyError, JounceError, MechanismError, MobilityError, SolveError, check_name
 from jounce.execution.threads import thread_count
 from jounce.kinematics.assembly.assemble import assemble
@@ -130,8 +131,9 @@ def solve_batch(
     >>> int(family["status"].max())
     0
     """
-    family, values = _family(mechanism, parameters, time, order, tolerance, progress)
-    family.solve(thread_count(threads), alone=alone)
+    with Count("solving", "designs", progress) as tell:
+        family, values = _family(mechanism, parameters, time, order, tolerance, tell)
+        family.solve(thread_count(threads), alone=alone)
     return family.dataset(values)
 
 

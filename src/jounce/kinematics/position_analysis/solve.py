@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from jax.errors import ConcretizationTypeError
 
+from jounce.activity import Count
 from jounce.errors import AssemblyError, MechanismError, MobilityError, SolveError, UnsupportedError
 from jounce.execution.backends import joined
 from jounce.execution.background import prepare_later
@@ -149,8 +150,9 @@ def solve(
     order = checked_settings(mechanism, order, tolerance)
     count = thread_count(threads)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
-    solver, path = _followed(mechanism, instants, order, tolerance, refine=refine)
-    found = solve_grid(solver, path, instants, progress, count, keep=keep)
+    with Count("solving", told=progress) as tell:
+        solver, path = _followed(mechanism, instants, order, tolerance, refine=refine)
+        found = solve_grid(solver, path, instants, tell, count, keep=keep)
     state, outcome = (found.coordinates, found.outputs), (found.status, found.faults, path.change_points)
     told = path.history(), _backend(solver, path, instants)
     _check_count(solver.model, told[0])

@@ -10,7 +10,6 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.constraints import AbstractConstraint
-from jounce.display import Displayed
 from jounce.errors import MechanismError, check_name
 from jounce.execution.backends import xla_backend
 from jounce.execution.chunks import in_chunks
@@ -19,6 +18,7 @@ from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
 from jounce.kinematics.continuation.path_following import ChangePoint
 from jounce.kinematics.results.pose_outputs import output_series
+from jounce.kinematics.results.tables import Tabulated
 from jounce.kinematics.status import Status
 from jounce.mechanism import (
     AbstractMotionOutput,
@@ -74,7 +74,7 @@ def output_group(
     return group
 
 
-class Motion(Displayed):
+class Motion(Tabulated):
     """The motion of a mechanism at the instants of a time grid.
 
     Attributes

@@ -91,7 +91,7 @@ def draw(drawn: Mapping[str, Drawn], _: Any, *, title: str, note: str, size: tup
         panel.set_title(name)
         drawings.append(_panel(panel, its, VIEW))
     for drawing in drawings:  # once all panels have their places
-        drawing.write_names(0, "all")
+        drawing.write_names("all")
     return figure
 
 
@@ -131,7 +131,7 @@ def _panel(axes: Any, drawn: Drawn, view: View) -> SketchFigure:
     figure = SketchFigure(Scene.of(drawing), None, "", seen_from, axes)
     left, right = axes.get_xlim()
     axes.set_xlim(left - 0.15 * (right - left), right)  # room for lengths on the left
-    draw_scale(axes, seen_from)
+    draw_scale(axes, figure.extent, seen_from)
     figure.show(0)
     return figure
 

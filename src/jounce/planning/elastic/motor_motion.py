@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
+from jounce.display import Displayed
 from jounce.dynamics.limits.check_limits import worst_instants
 from jounce.dynamics.limits.limit_report import LimitRow, LimitRows
 from jounce.errors import TrajectoryError
@@ -96,7 +97,7 @@ class DriveReport(LimitRows):
         self.rows = rows
 
 
-class Feedforward(MotorMotion):
+class Feedforward(MotorMotion, Displayed):
     """What motors do along a trajectory, at its instants and at any other; see `MotorMotion` for the arrays.
 
     Attributes

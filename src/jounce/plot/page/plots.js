@@ -1,5 +1,5 @@
 /* Outputs over time: one panel for each chosen output and derivative. */
-const panels = [];
+const panels = [], NARROW = 480; // pixels, below which values stand below the title of a panel
 function niceStep(span, count) {
   const rough = span / Math.max(count, 1), power = 10 ** Math.floor(Math.log10(rough));
   return power * [1, 2, 2.5, 5, 10].find((k) => k * power >= rough * (1 - 1e-9));
@@ -26,9 +26,6 @@ function scaleOf(low, high) {
   const size = Math.max(Math.abs(low), Math.abs(high));
   return size === 0 || (size >= 0.01 && size < 2000) ? 0 : 3 * Math.floor(Math.log10(size) / 3);
 }
-const SUPER = { "-": "\u207B", 0: "\u2070", 1: "\u00B9", 2: "\u00B2", 3: "\u00B3", 4: "\u2074", 5: "\u2075",
-  6: "\u2076", 7: "\u2077", 8: "\u2078", 9: "\u2079" };
-const raised = (number) => [...String(number)].map((c) => SUPER[c] || c).join("");
 function unitText(unit, exponent) {
   const text = unit.replace(/\^(-?\d+)/g, (_, power) => raised(power)).replace(/\*/g, " ");
   return exponent ? "10" + raised(exponent) + " " + text : text;
@@ -69,7 +66,8 @@ class Panel {
   }
   draw() {
     const [pen, wide, tall] = prepared(this.canvas);
-    const { output, order, lines } = this, frame = { x0: 62, x1: wide - 12, y0: 24, y1: tall - 20 };
+    const { output, order, lines } = this, narrow = wide < NARROW;
+    const frame = { x0: 62, x1: wide - 12, y0: narrow ? 40 : 24, y1: tall - 20 };
     this.frame = frame;
     const first = before(data.times, state.from), last = Math.min(before(data.times, state.to) + 1, data.times.length - 1);
     const [low, high] = rangeOf(lines, first, last), exponent = scaleOf(low, high), factor = 10 ** exponent;
@@ -94,8 +92,10 @@ class Panel {
       pen.strokeStyle = "#e6e9ec";
       pen.beginPath(); pen.moveTo(X(value), frame.y0); pen.lineTo(X(value), frame.y1); pen.stroke();
       pen.fillStyle = "#5b6570";
-      pen.fillText(tickText(value, pace), X(value), frame.y1 + 5);
+      if (X(value) < frame.x1 - 40) pen.fillText(tickText(value, pace), X(value), frame.y1 + 5);
     }
+    pen.textAlign = "right";
+    pen.fillText("time (s)", frame.x1, frame.y1 + 5);
     pen.save();
     pen.beginPath(); pen.rect(frame.x0, frame.y0 - 2, frame.x1 - frame.x0, frame.y1 - frame.y0 + 4); pen.clip();
     if (this.drag && this.drag.to !== undefined) {
@@ -119,9 +119,9 @@ class Panel {
     pen.lineWidth = 1;
     pen.beginPath(); pen.moveTo(X(state.now), frame.y0); pen.lineTo(X(state.now), frame.y1); pen.stroke();
     pen.restore();
-    this.title(pen, frame, exponent, X, Y);
+    this.title(pen, frame, exponent, X, Y, narrow);
   }
-  title(pen, frame, exponent, X, Y) {
+  title(pen, frame, exponent, X, Y, narrow) {
     const { output, order, lines } = this, at = this.hover === null ? state.now : this.hover;
     const [a, b, share] = between(data.times, at), nearest = share < 0.5 ? a : b;
     pen.textBaseline = "alphabetic";
@@ -133,12 +133,13 @@ class Panel {
     pen.font = "12px system-ui, sans-serif";
     pen.textAlign = "right";
     let place = frame.x1;
-    const scaled = (value) => value === null ? null : value / 10 ** exponent; // as the axis is
-    const texts = lines.map((line, c) => (output.components[c] ? output.components[c] + " " : "") + shown(scaled(line[nearest]), 6));
-    texts.push("t " + shown(data.times[nearest], 6));
+    const power = exponent ? " \u00B7 10" + raised(exponent) : "", digits = narrow ? 4 : 6;
+    const texts = lines.map((line, c) => (output.components[c] ? output.components[c] + " " : "") + (line[nearest] === null
+      ? "-" : shown(line[nearest] / 10 ** exponent, digits) + power)); // as the axis counts
+    texts.push("t " + shown(data.times[nearest], digits) + " s");
     for (let c = texts.length - 1; c >= 0; c -= 1) {
       pen.fillStyle = c < lines.length ? LINES[c % LINES.length] : "#5b6570";
-      pen.fillText(texts[c], place, 14);
+      pen.fillText(texts[c], place, narrow ? 30 : 14);
       place -= pen.measureText(texts[c]).width + 12;
     }
     if (this.hover === null) return;
@@ -210,7 +211,8 @@ if (data.messages.length) { byId("status").hidden = false; byId("status").textCo
 fill("peaks", ["output", "derivative", "unit", "minimum", "at t / s", "maximum", "at t / s"], data.peaks.map((peak) => [
   peak.output, peak.derivative, unitText(peak.unit, 0), { text: shown(peak.minimum), largest: peak.largest[0] }, peak.minimum_at,
   { text: shown(peak.maximum), largest: peak.largest[1] }, peak.maximum_at]), [3, 4, 5, 6]);
-fill("parameters", ["name", "value, SI"], data.parameters, [1]);
+fill("parameters", ["name", "value", "unit", "as written"], data.parameters.map(([name, value, unit, written]) =>
+  [name, value, unitText(unit, 0), written]), [1]);
 fill("bodies", ["name", "mass, kg", "starting position, m"], data.bodies.map((body) => [
   { text: body.name, color: body.color }, body.mass, body.position]), [1]);
 fill("elements", ["name", "kind", "bodies"], data.elements, []);

@@ -12,10 +12,16 @@ function element(tag, text, kind) {
   if (kind) made.className = kind;
   return made;
 }
+const SUPER = { "-": "\u207B", 0: "\u2070", 1: "\u00B9", 2: "\u00B2", 3: "\u00B3", 4: "\u2074", 5: "\u2075",
+  6: "\u2076", 7: "\u2077", 8: "\u2078", 9: "\u2079" };
+const raised = (number) => [...String(number)].map((c) => SUPER[c] || c).join("");
 function shown(value, digits = 6) {
   if (value === null || !Number.isFinite(value)) return "-";
   const size = Math.abs(value);
-  if (size !== 0 && (size < 1e-4 || size >= 1e7)) return value.toExponential(digits - 1).replace(/\.?0+e/, "e");
+  if (size !== 0 && (size < 1e-4 || size >= 1e7)) {
+    const [front, power] = value.toExponential(digits - 1).split("e");
+    return Number(front) + " \u00B7 10" + raised(Number(power));
+  }
   return String(Number(value.toPrecision(digits)));
 }
 /* Index of the last entry of a rising list that is not above a value. */
@@ -53,7 +59,7 @@ const scene = data.scene;
 const [left, right, lower, upper] = scene.limits;
 const sketch = byId("sketch");
 function sketchHeight() {
-  const wide = sketch.parentElement.clientWidth - 24;
+  const wide = sketch.clientWidth;
   const tall = wide * (upper - lower) / (right - left);
   sketch.style.height = Math.round(Math.min(Math.max(tall, 220), 0.62 * window.innerHeight)) + "px";
 }
@@ -74,7 +80,7 @@ function choosePaths() {
   byId("legend").hidden = !sizes.length;
   if (sizes.length) {
     const output = data.outputs[scene.paths[0].output];
-    byId("range").textContent = "0 to " + shown(largest, 4) + " " + output.units[order];
+    byId("range").textContent = "0 to " + shown(largest, 4) + " " + unitText(output.units[order], 0);
     const pen = byId("colors").getContext("2d");
     for (let k = 0; k < 120; k += 1) { pen.fillStyle = colorOf(k / 119); pen.fillRect(k, 0, 1, 10); }
   }
@@ -131,45 +137,34 @@ function drawSketch() {
   }
   pen.setLineDash([]);
   if (traces_due) traces();
-  if (byId("names").checked) drawNames(pen, wide, tall, X, Y, at, scale);
+  if (byId("names").checked) drawNames(pen, wide, X, Y, at, scale);
   drawScale(pen, tall, scale);
   const solved = data.solved[before(data.times, state.now)];
   if (!solved) { pen.fillStyle = "#b22222"; pen.font = "600 14px sans-serif"; pen.textAlign = "left";
     pen.fillText("not solved at this time", 8, 20); }
 }
-function drawNames(pen, wide, tall, X, Y, at, scale) {
-  const taken = [], anchors = scene.labels.map((label) => at(label.points, 1, 0)).map(([x, y]) => [X(x), Y(y)]);
-  const gap = (box, [x, y]) => Math.hypot(Math.max(box[0] - x, 0, x - box[2]), Math.max(box[1] - y, 0, y - box[3]));
-  pen.font = "600 12px system-ui, sans-serif";
+function drawNames(pen, wide, X, Y, at, scale) {
+  const size = wide < (scene.widths[0] + scene.widths[1]) / 2 ? 0 : 1, unit = scene.unit * scale;
   pen.textAlign = "center";
   pen.textBaseline = "middle";
-  scene.labels.forEach((label, number) => {
-    const own = anchors[number], half = pen.measureText(label.text).width / 2 + 2;
-    const reach = 2.2 * scene.unit * scale + 7;
-    let best = null;
-    const others = anchors.filter((other) => Math.hypot(other[0] - own[0], other[1] - own[1]) > 2);
-    for (const far of [1, 1.8, 2.8, 4.5, 7]) for (let k = 0; k < 16; k += 1) {
-      const angle = Math.PI * (0.25 + k / 8);
-      const px = own[0] + Math.cos(angle) * (reach * far + 0.7 * half), py = own[1] - Math.sin(angle) * reach * far;
-      const box = [px - half, py - 8, px + half, py + 8];
-      const clash = taken.filter((b) => box[0] < b[2] && box[2] > b[0] && box[1] < b[3] && box[3] > b[1]).length;
-      const outside = box[0] < 0 || box[1] < 0 || box[2] > wide || box[3] > tall ? 1 : 0;
-      const wrong = others.some((other) => gap(box, other) <= gap(box, own) + 2) ? 1 : 0; // read as that one's name
-      const cost = far + 0.02 * k + 6 * clash + 7 * wrong + 8 * outside;
-      if (!best || cost < best.cost) best = { cost, px, py, box, line: wrong || far > 2 };
-    }
-    taken.push(best.box);
-    if (best.line) {
+  for (const label of scene.labels) {
+    if (!label.places[size]) continue;
+    const [across, up, far, led] = label.places[size], [x, y] = at(label.points, 1, 0);
+    pen.font = (label.kind === "bodies" ? "600 " : label.kind === "outputs" ? "italic " : "") + "12px system-ui, sans-serif";
+    const half = pen.measureText(label.text).width / 2 + 2;
+    const edge = Math.min(half / Math.max(Math.abs(across), 1e-9), 8 / Math.max(Math.abs(up), 1e-9), Math.max(half, 8));
+    const px = X(x) + across * (far * unit + edge), py = Y(y) - up * (far * unit + edge);
+    if (led) {
       pen.lineWidth = 0.8;
       pen.strokeStyle = label.color;
-      pen.beginPath(); pen.moveTo(...own); pen.lineTo(best.px, best.py); pen.stroke();
+      pen.beginPath(); pen.moveTo(X(x) + 1.2 * unit * across, Y(y) - 1.2 * unit * up); pen.lineTo(px, py); pen.stroke();
     }
     pen.lineWidth = 3;
     pen.strokeStyle = "rgba(255, 255, 255, 0.85)";
-    pen.strokeText(label.text, best.px, best.py);
+    pen.strokeText(label.text, px, py);
     pen.fillStyle = label.color;
-    pen.fillText(label.text, best.px, best.py);
-  });
+    pen.fillText(label.text, px, py);
+  }
 }
 function drawScale(pen, tall, scale) {
   pen.strokeStyle = pen.fillStyle = "#5b6570";

@@ -31,6 +31,7 @@ from jounce.reporting.facts.range_facts import RangeFacts
 from jounce.reporting.text.law_facts import LawFacts, law_facts
 from jounce.trajectory import OutputMotion, SegmentedMotion
 from jounce.units.dimensions import Dimension
+from jounce.units.expression import Expression
 from jounce.units.values import parse_value
 
 KINDS = ("joints", "drivers", "forces", "initial")
@@ -148,7 +149,7 @@ def mechanism_facts(mechanism: Mechanism, path: str | PathLike[str] | None = Non
         "title": mechanism.title,
         "space": mechanism.space,
         "gravity": _numbers(mechanism, mechanism.gravity, POSITION_COMPONENTS[mechanism.space]),
-        "parameters": _parameters(mechanism, path),
+        "parameters": parameter_facts(mechanism, path),
         **{kind: [_element(name, x) for name, x in getattr(mechanism, kind).items()] for kind in KINDS},
         "outputs": [_output(name, x) for name, x in mechanism.outputs.items()],
         "time": _time(mechanism),
@@ -233,20 +234,25 @@ def _numbers(mechanism: Mechanism, value: Any, size: int) -> list[float] | None:
     return np.reshape(np.asarray(resolve(value, mechanism.parameter_values), float), size).tolist()
 
 
-def _parameters(mechanism: Mechanism, path: str | PathLike[str] | None) -> list[dict[str, Any]]:
+def parameter_facts(mechanism: Mechanism, path: str | PathLike[str] | None) -> list[ParameterFacts]:
+    """Return the parameters of a mechanism, with the texts of its file where the values still are those of the file."""
     given = read_source(path).data.get("parameters") or {} if path is not None else mechanism.parameters
-    rows = []
-    for name, value in mechanism.parameter_values.items():
-        written = given.get(name)
-        try:
-            dimension = parse_value(written, "any", mechanism.parameters).dimension
-        except JounceError:
-            dimension = None
-        unit = None if dimension is None else unit_of_dimension(dimension)
+    values, rows = mechanism.parameter_values, {}
+    for name, value in values.items():
+        written, uses = given.get(name), mechanism.dimensions.get(name, ())
         text = written if isinstance(written, str) else getattr(written, "text", None)
-        rows.append({"name": name, "value": float(value), "unit": unit, "written": text})
-    order = list(mechanism.parameters)
-    return sorted(rows, key=lambda entry: order.index(entry["name"]))
+        dimension = uses[0] if len(uses) == 1 else None  # by where it is used
+        try:
+            quantity = parse_value(written, "any", mechanism.parameters)
+        except JounceError:
+            pass
+        else:
+            number = quantity.value.evaluate(values) if isinstance(quantity.value, Expression) else quantity.value
+            text = text if np.isclose(number, float(value), rtol=1e-12, atol=0.0) else None
+            dimension = dimension if quantity.dimension is None else quantity.dimension
+        unit = None if dimension is None else unit_of_dimension(dimension)
+        rows[name] = ParameterFacts(name=name, value=float(value), unit=unit, written=text)
+    return [rows[name] for name in mechanism.parameters]
 
 
 def unit_of_dimension(dimension: Dimension) -> str:

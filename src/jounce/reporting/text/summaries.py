@@ -195,13 +195,18 @@ def torques_summary(
 
 def robot_motion_summary(motion: RobotSimulation, file: Path) -> str:
     """Word how a robot moved, from when to when, and how its energy changed."""
+    first, *lines = robot_motion_words(motion)
+    return "\n".join(wrapped(line) for line in (f"{first} ({file.name})", *lines))
+
+
+def robot_motion_words(motion: RobotSimulation) -> list[str]:
+    """Word how a robot moved, in lines of which the first is a title."""
     times, energy, steps = motion.time, motion.energy, count(len(motion.steps.start), "step")
-    lines = [
-        f"{motion.robot.name}: motion of {count(len(motion.robot.joint_names), 'moving joint')} ({file.name})",
+    return [
+        f"{motion.robot.name}: motion of {count(len(motion.robot.joint_names), 'moving joint')}",
         f"t = {times[0]:g} s to {times[-1]:g} s, {count(len(times), 'instant')}, {steps}",
         f"energy: {energy[0]:.9g} J at the start, {energy[-1]:.9g} J at the stop",
     ]
-    return "\n".join(wrapped(line) for line in lines)
 
 
 def verdict(report: LimitReport) -> str:

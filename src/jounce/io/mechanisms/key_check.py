@@ -1,0 +1,128 @@
+"""Keys and types of mechanism files checked by the published schema, before JAX is imported for all else."""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Callable, Iterable, Iterator
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from jounce.errors import JounceError, did_you_mean, show_value
+from jounce.io.files.located_data import Location, Source
+from jounce.io.files.source import read_source
+
+__all__ = ["ROLES", "check_keys", "unknown_key", "unknown_type"]
+
+ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
+"""The sections of a file that hold what is told apart by ``type``, and the role of each."""
+
+LARGEST = 200_000  # bytes of a file that is read twice
+_HINTS = {
+    ("planar", "orientation"): "a planar body has an angle",
+    ("spatial", "angle"): "a spatial body has an orientation",
+}
+
+
+def check_keys(path: str | PathLike[str]) -> None:
+    """Raise the error that `load` would, where a file breaks its syntax, or has an unknown key or type.
+
+    What it lets pass may still be wrong. It knows the types of this package only: do not call it where a user's own
+    joints and forces are imported.
+
+    Parameters
+    ----------
+    path
+        A .yaml, .toml or .json file; one that holds no mechanism passes.
+
+    Raises
+    ------
+    MechanismFileError
+        With the line, the entry and the nearest valid name.
+    """
+    file, schema = Path(path), _schema()
+    if not schema or not file.is_file() or file.stat().st_size > LARGEST:
+        return
+    source = read_source(file, many=True)
+    space = source.data.get("space") if isinstance(source.data, dict) else None
+    if space not in ("planar", "spatial"):
+        return
+    problems = [problem for problem in _problems(source, str(space), schema) if problem is not None]
+    if problems:
+        raise min(problems, key=lambda problem: problem.line or 0)
+
+
+def unknown_key(source: Source, space: str, at: Location, valid: Iterable[str]) -> JounceError:
+    """Return the error for a key that an entry does not have, with those that it may have."""
+    hint = _HINTS.get((space, str(at[-1]))) if at[0] == "bodies" else None
+    return source.error(f"unknown key {show_value(at[-1])}; {hint or did_you_mean(at[-1], valid)}", at)
+
+
+def unknown_type(
+    source: Source, space: str, at: Location, entry: dict[str, Any], types: Callable[[str, str], Iterable[str]]
+) -> JounceError:
+    """Return the error for a joint, driver or force whose type is missing, or is none of those that `types` returns."""
+    role = ROLES[str(at[0])]
+    valid = types(space, role)
+    if "type" not in entry:
+        return source.error(f"is missing; valid: {', '.join(sorted(valid))}", (*at, "type"))
+    name = entry["type"]
+    elsewhere = [
+        f"a {other_space} {other_role}"
+        for other_space in ("planar", "spatial")
+        for other_role in ("joint", "driver", "force")
+        if isinstance(name, str) and name in types(other_space, other_role)
+    ]
+    note = f"it is the type of {' and '.join(elsewhere)}; " if elsewhere else ""
+    message = f"no {space} {role} has this type; {note}{did_you_mean(name, valid)}"
+    return source.error(message, (*at, "type"), value=name)
+
+
+@functools.cache
+def _schema() -> dict[str, Any]:
+    """Return the definitions of the published schema; none where the package was copied without it."""
+    name = "mechanism.schema.json"
+    for path in (Path(__file__).with_name(name), Path(__file__).parents[4] / "docs" / "schema" / name):
+        if path.is_file():
+            return json.loads(path.read_text(encoding="utf-8"))["$defs"]
+    return {}
+
+
+def _problems(source: Source, space: str, schema: dict[str, Any]) -> Iterator[JounceError | None]:
+    """Yield an error for each unknown key or type."""
+    data = source.data
+    yield from _unknown(source, space, (), data, schema[f"{space}_mechanism"])
+    entries = {section: data[section] for section in (*ROLES, "bodies") if isinstance(data.get(section), dict)}
+    for section, named in entries.items():
+        for name, entry in named.items():
+            if not isinstance(entry, dict):
+                continue
+            if section == "bodies":
+                yield from _unknown(source, space, (section, name), entry, schema[f"{space}_body"])
+                continue
+            kind = entry.get("type")
+            if not isinstance(kind, str) or kind not in _types(space, ROLES[section]):
+                cam = section == "joints" and "motion" in entry and f"{space}_{kind}_cam" in schema
+                yield None if cam else unknown_type(source, space, (section, name), entry, _types)
+                continue
+            if section == "joints" and "motion" in entry:  # a cam may share its name with a joint
+                continue
+            yield from _unknown(source, space, (section, name), entry, schema[f"{space}_{kind}_{ROLES[section]}"])
+
+
+def _types(space: str, role: str) -> list[str]:
+    """Return the types of this package."""
+    start, end = f"{space}_", f"_{role}"
+    found = [name[len(start) : -len(end)] for name in _schema() if name.startswith(start) and name.endswith(end)]
+    return [name for name in found if not name.endswith("_of_a")]  # those are outputs
+
+
+def _unknown(
+    source: Source, space: str, at: Location, entry: dict[str, Any], model: dict[str, Any]
+) -> Iterator[JounceError]:
+    """Yield an error for each key of an entry that its model does not have."""
+    valid = model["properties"]
+    for key in entry:
+        if key not in valid:
+            yield unknown_key(source, space, (*at, key), valid)
