@@ -62,9 +62,9 @@ def completion(shell: Literal["bash", "zsh", "fish"], /, *, install: bool = Fals
     shell
         bash, zsh or fish.
     install
-        Write it where the shell looks for it, and have it read.
+        Write the script to where the shell looks for it, and load it.
     out
-        Write the script to this file, and leave start-up files alone.
+        Write the script to this file; start-up files stay unchanged.
 
     Examples
     --------

@@ -33,26 +33,26 @@ def cam(
 ) -> int:
     r"""Find the profile of a plate cam, and whether it is undercut.
 
-    Told are the largest pressure angle, the least radii of curvature and
-    the width of a flat face, with the cam angles where; how smooth the
-    law is; and the parts of it that the follower loses.
+    The command prints the largest pressure angle, the smallest radii of
+    curvature and the width of a flat face, with their cam angles, the
+    smoothness of the law, and the parts of it that are lost to undercut.
 
-    The exit status is 1 where the cam is undercut.
+    The exit status is 1 if the cam is undercut.
 
     Parameters
     ----------
     file
         Cam file: .yaml, .yml, .toml or .json.
     count
-        Points of the table over a turn, both ends counted [file's].
+        Points of the table per turn, including both ends [file's].
     figure
         Draw the cam: .png, .svg or .pdf.
     set_
         NAME=VALUE of a parameter, with a unit; repeatable.
     allow
-        Folder whose files it may name, besides its own; repeatable.
+        Another folder from which the file may read others; repeatable.
     units
-        Of what is shown and written, as angle=deg,length=mm; repeatable.
+        Units of all results, such as angle=deg,length=mm; repeatable.
 
     Examples
     --------

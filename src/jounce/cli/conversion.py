@@ -35,8 +35,8 @@ def convert(
 
     Mechanism files are YAML, TOML or JSON, robot files URDF, MJCF or SDF.
 
-    Values keep their units and expressions; comments are lost. What is
-    written is read back before it takes its place.
+    Values keep their units and expressions; comments are lost. The file
+    is written to a temporary place and read back before it is moved.
 
     Parameters
     ----------
@@ -47,19 +47,19 @@ def convert(
     drive
         JOINT=LAW, a value or an expression of t; repeatable.
     start
-        JOINT=VALUE with a unit, where a joint starts; repeatable.
+        JOINT=VALUE, the starting position, with a unit; repeatable.
     hold
-        Hold the joints of a robot that are not driven.
+        Lock the joints of a robot that are not driven.
     no_drives
         Leave out armature, damping and friction of a robot.
     strict
-        Refuse a robot whose links are as those of no real one.
+        Refuse a robot whose inertias no real body can have.
     import_
         Python file with your own joints; repeatable.
     allow
-        Folder whose files it may name, besides its own; repeatable.
+        Another folder from which the file may read others; repeatable.
     overwrite
-        Replace files that are there.
+        Replace existing files.
 
     Examples
     --------

@@ -40,30 +40,30 @@ def trace(
 ) -> int:
     """Follow a mechanism through dead points: limits, branches, curves.
 
-    The value of one driver is free, and the whole curve of positions is
-    followed by its arc length, to where it closes or ends. Limit
-    positions, branches between them and change points are listed.
+    One driver is released, and the whole curve of configurations is
+    followed by arc length (numerical continuation) until it closes or
+    ends. The command lists limit positions, branches and change points.
 
     Parameters
     ----------
     file
         Mechanism file: .yaml, .yml, .toml or .json.
     driver
-        Whose value is free, or "time" [default: the only driver].
+        The driver that is released, or "time" [default: the only one].
     time
-        Of the start, at which other drivers are held, s [file's first].
+        Instant of the start, s; other drivers stop there [file's first].
     order
         Highest derivative with respect to arc length, 0 to 8.
     points
-        Of the table, evenly spaced in arc length.
+        Points of the table, evenly spaced in arc length.
     length
-        Largest arc length to either side, rad or sizes of the mechanism.
+        Limit of arc length in both directions, rad or mechanism sizes.
     circuits
-        Trace the circuits of all assemblies, not of the file's only.
+        Trace the circuits of all assemblies, not only of the file's.
     figure
         Draw paths of points and outputs: .png, .svg or .pdf.
     show
-        Output in the figure; repeatable [all].
+        Output to draw in the figure; repeatable [all].
 
     Examples
     --------

@@ -45,39 +45,38 @@ def optimize(
     overwrite: Overwrite = False,
     json: bool = False,
 ) -> int:
-    r"""Find the parameters of a mechanism in which something is least.
+    r"""Find the parameters of a mechanism that minimize an expression.
 
-    Expressions are of peak, maximum, minimum, span, mean, rms and at, of
+    Expressions may use peak, maximum, minimum, span, mean, rms and at of
     outputs, their derivatives, and forces: peak(psi, 4) is the largest
-    jounce of psi. Peaks are found between instants, too.
+    jounce of psi. Peaks include those between instants.
 
     Parameters
     ----------
     file
         Mechanism file: .yaml, .yml, .toml or .json.
     minimize
-        What is to be least; with a minus before it, what is to be largest:
-        "-span(psi)".
+        Expression to minimize; a minus sign maximizes: "-span(psi)".
     vary
         NAME=LOW:HIGH of a parameter, with units; repeatable.
     subject_to
-        Condition by <=, >= or ==, such as "span(psi) == 60 deg"; repeatable.
+        Condition with <=, >= or ==: "span(psi) == 60 deg"; repeatable.
     curve
-        NAME=FILE.csv of points for path_error(C, NAME); repeatable.
+        NAME=FILE.csv, points for path_error(C, NAME); repeatable.
     assemblies
-        Numbers of assemblies to try, as 1,2, or all [the file's].
+        Assemblies to try, such as 1,2, or all [the file's].
     starts
-        Searches, one of them from the file's values.
+        Number of searches; one starts from the file's values.
     samples
-        Designs that the other starts are chosen from.
+        Number of random designs from which other starts are chosen.
     seed
-        Of these designs.
+        Seed of these random designs.
     clearance
-        Smallest singular value that a design may have; 0 lifts this.
+        Smallest allowed singular value of a design; 0 allows any.
     iterations
-        Of one search between two changes of its region.
+        Iterations of a search between changes of its trust region.
     out
-        Write the file with the new values: comments and units stay.
+        Write the file with the new values; comments and units stay.
     overwrite
         Let --out replace the file that is read.
     json

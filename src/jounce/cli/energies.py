@@ -43,19 +43,19 @@ def energies(
     file
         Robot file, .urdf, .xml or .sdf; or a mechanism file with masses.
     trajectory
-        Of a robot: samples (.csv), laws or a motion (.yaml, .toml, .json).
+        Motion of a robot: samples (.csv) or laws (.yaml, .toml, .json).
     order
-        Of the energy: derivatives of order p + 1 take the place of velocities.
+        Order p of the energy: of the derivatives of order p + 1.
     rates
         Highest rate of the energies.
     no_drives
-        Leave out the rotors of a robot.
+        Omit the rotors of a robot.
     set_
         NAME=VALUE of a parameter of a mechanism, with a unit; repeatable.
     import_
         Python file with your own joints and forces; repeatable.
     allow
-        Folder whose files it may name, besides its own; repeatable.
+        Another folder from which the file may read others; repeatable.
     out
         Write all values to this .csv or .nc (NetCDF) file.
     json

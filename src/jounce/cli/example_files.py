@@ -17,11 +17,11 @@ def example(
     Parameters
     ----------
     name
-        Of the example, such as four_bar or robots/panda.urdf.
+        Name of the example, such as four_bar or robots/panda.urdf.
     file
         File to write [default: its own name, in this folder].
     overwrite
-        Replace files that are there.
+        Replace existing files.
     json
         Print the result as JSON.
 

@@ -26,10 +26,10 @@ def export(
     reading: RobotReading = PLAIN_ROBOT,
     overwrite: bool = False,
 ) -> int:
-    r"""Write a trajectory as a controller takes it, at its rate.
+    r"""Write a trajectory in the format of a robot controller.
 
-    Positions, velocities and accelerations, with --torques torques too.
-    jn.load_trajectory reads all three forms back.
+    The file has positions, velocities and accelerations; --torques adds
+    torques. jn.load_trajectory reads all formats back.
 
     Parameters
     ----------
@@ -38,15 +38,15 @@ def export(
     trajectory
         Samples (.csv), laws or a motion (.yaml, .toml, .json).
     format
-        franka or ur, a table (.csv), or ros, a JointTrajectory (.yaml).
+        franka or ur: a table (.csv); ros: a JointTrajectory (.yaml).
     out
-        Write it to this file.
+        File to write.
     rate
         Rows a second, as 1kHz; else 1 kHz, 500 Hz or 100 Hz.
     torques
-        Write torques, too.
+        Write torques too.
     header_units
-        Say units in the heading of a CSV.
+        Write units into the heading of a CSV file.
     overwrite
         Let --out replace a file that is read here.
 

@@ -40,25 +40,25 @@ def feedforward(
     reading: RobotReading = PLAIN_ROBOT,
     output: TableOutput = NO_TABLE,
 ) -> int:
-    r"""Compute what motors behind springs must do to move links as told.
+    r"""Compute the motor motion and torque for links behind springs.
 
-    The exit status is 0 where all limits of drives are kept, 1 where one
-    is broken.
+    The links follow the given motion exactly. The exit status is 0 if
+    all limits of the drives are kept, and 1 if one is broken.
 
     Parameters
     ----------
     file
         Robot file: .urdf, .xml or .sdf; or mechanism file with masses.
     trajectory
-        Of a robot: samples (.csv), laws or a motion (.yaml, .toml, .json).
+        Motion of a robot: samples (.csv) or laws (.yaml, .toml, .json).
     drives
         File of springs, gears and rotors.
     rates
         Highest rate of the motor torques, 0 to 24.
     no_losses
-        Leave out damping and friction of the robot file.
+        Omit damping and friction of the robot file.
     simulate
-        Simulate it with its springs, and tell the errors of the links.
+        Simulate the system with its springs, and print link errors.
     figure
         Draw deflections and simulated errors: .png, .svg or .pdf.
     set_

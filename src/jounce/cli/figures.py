@@ -52,27 +52,27 @@ def plot(
     file
         Mechanism file: .yaml, .yml, .toml or .json.
     kind
-        What is drawn [default: outputs, or an animation by its ending].
+        Kind of figure [default: outputs, or by the ending of --out].
     order
-        Highest derivative, to 30 [default: 4, or what is needed].
+        Highest derivative, up to 30 [default: 4, or as needed].
     out
         .png, .svg, .pdf, .gif or .mp4 [default: FILE's name.png].
     output
-        Output, point with a path, or joint; repeatable [all].
+        Output, point with a path, or joint to draw; repeatable [all].
     derivative
-        Of a hodograph, a portrait, or the color of paths.
+        Derivative in a hodograph, a portrait, or the color of paths.
     instant
-        Time that a sketch shows, s.
+        Instant that a sketch shows, s.
     names
-        Written in a sketch or animation.
+        Names to write in a sketch or an animation.
     azimuth
-        Around a spatial mechanism, degrees.
+        Azimuth of the viewer of a spatial mechanism, degrees.
     elevation
-        Above it, degrees.
+        Elevation of the viewer, degrees.
     speed
-        Seconds of motion in a second of the animation.
+        Seconds of motion per second of the animation.
     fps
-        Frames in a second of the animation.
+        Frames per second of the animation.
     overwrite
         Let --out replace a file that is read here.
 
@@ -183,9 +183,9 @@ def report(
 ) -> int:
     """Write a page to explore a motion in: one HTML file, offline.
 
-    A moving sketch, plots of all outputs and derivatives, peak values,
-    parameters, bodies and joints. A file with initial conditions is
-    simulated, any other is solved.
+    The page has a moving sketch, plots of all outputs and derivatives,
+    peak values, parameters, bodies and joints. A file with initial
+    conditions is simulated, any other is solved.
 
     Parameters
     ----------
@@ -196,14 +196,14 @@ def report(
     out
         The page, .html [default: FILE's name.html].
     azimuth
-        Around a spatial mechanism, degrees.
+        Azimuth of the viewer of a spatial mechanism, degrees.
     elevation
-        Above it, degrees.
+        Elevation of the viewer, degrees.
     equations
         Add the constraint equations: joints with their numbers in Sommer
         2024, the pattern of the Jacobian, right sides.
     at
-        Instant of these, s, or the nearest one [default: the first].
+        Instant of the equations, s; the nearest is used [the first].
     overwrite
         Let --out replace a file that is read here.
 

@@ -27,25 +27,26 @@ def inspect(
     as_: Annotated[str | None, Parameter(name="--as")] = None,
     model: str | None = None,
 ) -> int:
-    """Tell what is in a mechanism or robot file, and whether it can move.
+    """Print what a mechanism or robot file contains, and if it can move.
 
-    Bodies, joints, degrees of freedom, and the assembly that a motion starts from.
+    The command lists bodies, joints, degrees of freedom, the assembly at
+    the start, and redundant constraints: which joint repeats equations of
+    which others.
 
-    The exit status is 0 where a motion can start, 1 where the bodies
-    cannot be put together, the start is a singular position, or bodies
-    without mass are left to move. Redundant constraints that agree are
-    told: which joint repeats equations of which others.
+    The exit status is 0 if a motion can start, and 1 if the bodies cannot
+    be assembled, the start is a singular position, or bodies without mass
+    are free to move.
 
     Parameters
     ----------
     file
         Mechanism file, or robot file: .urdf, .xml or .sdf.
     strict
-        Refuse a robot whose links are as those of no real one.
+        Refuse a robot whose inertias no real body can have.
     json
         Print the result as JSON.
     range_
-        Tell how far a driver can go, and the transmission there.
+        Print the range of a driver, and the transmission at its ends.
     driver
         Whose range, where there are several.
     as_

@@ -19,11 +19,13 @@ LARGEST_ERROR = 1e-12  # of the peak of each derivative
 
 
 def doctor(*, json: bool = False) -> int:
-    """Say what this installation has, and test that it computes what it should: some seconds.
+    """Describe this installation, and test it within some seconds.
 
-    Versions, whether machine code is used and why not, the folder of compiled programs, devices, extras, variables of
-    the environment, and a test against closed forms: a point on a crank to its fourth derivative, and the torque of a
-    pendulum with its rates. Exit status 1 if the test fails.
+    The command prints versions, whether machine code is used and if not
+    why, the folder of compiled programs, devices, extras and environment
+    variables. It then compares a point on a crank to its fourth
+    derivative, and the torque of a pendulum with its rates, with closed
+    forms. The exit status is 1 if the test fails.
 
     Parameters
     ----------

@@ -51,9 +51,9 @@ def run(
     order
         Highest derivative, 0 to 30; 3 is jerk, 4 jounce.
     tolerance
-        Of positions, rad or sizes of the mechanism.
+        Tolerance of positions, rad or sizes of the mechanism.
     no_refine
-        Take peaks at the instants only, not between them.
+        Search peaks at the instants only, not between them.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def simulate(
     heading: Heading = PLAIN,
     output: TableOutput = NO_TABLE,
 ) -> int:
-    r"""Move a mechanism or robot by its forces: peaks, energy, drift.
+    r"""Simulate a mechanism or robot that moves under forces.
 
     Parameters
     ----------
@@ -100,13 +100,13 @@ def simulate(
     method
         taylor, obreshkov-4, obreshkov-6 or obreshkov-8.
     tolerance
-        Of the error of a step, rad or sizes of the mechanism.
+        Tolerance of the error per step, rad or mechanism sizes.
     step
-        Length of all steps in s, in the place of a control of the error.
+        Fixed step length, s, instead of error control.
     longest_step
-        Bound of all steps in s; each is looked at in 32 places or more for what it may miss.
+        Largest step, s; each step is checked at 32 points or more.
     no_refine
-        Take peaks at the instants only, not between them.
+        Search peaks at the instants only, not between them.
 
     Examples
     --------
@@ -230,7 +230,7 @@ def method_of(name: str, step: float | None) -> Taylor | Obreshkov:
 def schema(of: Literal["mechanism", "results"] = "mechanism", /) -> int:
     """Print the JSON Schema of mechanism files, or of results.
 
-    Editors complete and check files by it.
+    Editors use it to complete and check files.
 
     Parameters
     ----------

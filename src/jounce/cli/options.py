@@ -69,11 +69,11 @@ class MechanismReading:
     import_
         Python file with your own joints and forces; repeatable.
     allow
-        Folder whose files it may name, besides its own; repeatable.
+        Another folder from which the file may read others; repeatable.
     redundant_reactions
-        Where constraints are redundant: unique ones only, or least_norm.
+        Reactions of redundant constraints: unique only, or least_norm.
     units
-        Of what is shown and written, as angle=deg,length=mm; repeatable.
+        Units of all results, such as angle=deg,length=mm; repeatable.
     """
 
     set_: list[str] | None = None
@@ -108,23 +108,23 @@ class RobotReading:
     Parameters
     ----------
     payload
-        LINK=MASS with a unit, held in its origin; repeatable.
+        LINK=MASS with a unit, at the origin of the link; repeatable.
     degree
-        Of the splines through samples, odd from 3 to 11.
+        Degree of the splines through samples, odd, 3 to 11.
     strict
-        Refuse a robot whose links are as those of no real one.
+        Refuse a robot whose inertias no real body can have.
     allow
-        Folder whose files it may name, besides its own; repeatable.
+        Another folder from which the file may read others; repeatable.
     as_controller
-        Between points what ros2_control's joint_trajectory_controller does.
+        Interpolate as joint_trajectory_controller of ros2_control.
     topic
         Of a bag, as /joint_states.
     joints
         Those of the trajectory that are read (export: in this order), as a,b.
     model
-        Which model of an SDF file that holds several.
+        Model to read from an SDF file with several.
     closures
-        File with loops, springs and rotors that it does not have.
+        File with loops, springs and rotors to add to the robot.
     """
 
     payload: list[str] | None = None
@@ -231,9 +231,9 @@ class Heading:
     Parameters
     ----------
     header_units
-        Say units in the heading of a CSV; those that are not SI always are.
+        Write units into the heading of a CSV file, SI units too.
     plain_header
-        Say none, whatever the units.
+        Write no units into the heading.
     """
 
     header_units: bool = False

@@ -29,18 +29,18 @@ def reproduce(
     paper
         sommer-2024 or negrean-2025.
     out
-        Folder for figures and tables; made if it does not exist.
+        Folder for figures and tables; created if it does not exist.
     samples
         Your own accelerations (.csv: time, then a column for each motion: angular, rad/s^2, or tangential with
-        its unit, as fast [m/s^2]) in the place of stand-ins; negrean-2025 only.
+        its unit, as fast [m/s^2]) instead of stand-ins; negrean-2025 only.
     masses
         Your own link (.yaml, .toml, .json: mass, center_x, center_z, inertia_y; radius for tangential
         samples); negrean-2025 only.
     remove_gravity
-        Take gravity off tangential samples, as an accelerometer on an arm with a level axis reads it too.
+        Subtract gravity from tangential samples, for an accelerometer on an arm with a level axis.
     stop
-        What the assembly tolerances of sommer-2024's figures 4, 6, 10 and 12 bound: correction (the next one of
-        Newton-Raphson, the default) or residual (the largest one, with lengths in cm, as in the paper).
+        Quantity that the assembly tolerances of sommer-2024's figures 4, 6, 10 and 12 bound: correction (the next
+        Newton-Raphson correction, the default) or residual (the largest one, with lengths in cm, as in the paper).
 
     Examples
     --------

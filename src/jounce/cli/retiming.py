@@ -51,11 +51,11 @@ def retime(
 ) -> int:
     r"""Find the fastest motion along a path within limits.
 
-    The limits are those of velocity, acceleration, jerk, jounce, torque
-    and torque rate, and of points of links. What is written of a robot
-    keeps them also where splines go through its rows. The path of a
-    mechanism is that of its drivers' laws. Needs Clarabel: pip install
-    'jounce[planning]'.
+    Velocity, acceleration, jerk, jounce, torque and torque rate can be
+    limited, and the motion of points of links. The written trajectory of
+    a robot keeps the limits also when a controller interpolates it by
+    splines. The path of a mechanism is that of its drivers' laws. This
+    command needs Clarabel: pip install 'jounce[planning]'.
 
     Parameters
     ----------
@@ -64,17 +64,17 @@ def retime(
     path
         Waypoints or samples (.csv), expressions of s, laws (.yaml, ...).
     limits
-        File of limits, which go before those of the robot file.
+        File of limits, which override those of the robot file.
     repair
-        Keep the times of a trajectory, and slow it where it must be.
+        Keep the times of a trajectory, and slow it only as needed.
     hand_over
-        Repair also what starts or stops in motion.
+        Accept a trajectory that starts or stops in motion.
     rate
-        Of the rows, as 1kHz, 500Hz; a plain number is in Hz.
+        Rate of the rows, such as 1kHz; a plain number is in Hz.
     order
-        Highest derivative that is continuous [as the limits ask].
+        Highest continuous derivative [as the limits require].
     cells
-        Of the spline of the rate, 20 or more [160].
+        Pieces of the spline of the rate, 20 or more [160].
     deviation
         Of the path from straight lines between samples, as 0.1deg, 1mm; a
         plain number is in rad or m [0.001, or 0.001 of its size if less];
@@ -86,7 +86,7 @@ def retime(
     at
         Instant of it, as 0.8s; a plain number is in s.
     figure
-        Draw which limits bind where: .png, .svg or .pdf.
+        Draw which limits are active when: .png, .svg or .pdf.
 
     Examples
     --------

@@ -24,21 +24,21 @@ class RobotRun:
     Parameters
     ----------
     until
-        Of a robot: the end of its motion, from 0 s, with a unit.
+        End of the motion of a robot, from 0 s, with a unit.
     instants
-        How many, evenly spaced.
+        Number of instants, evenly spaced.
     start
         JOINT=VALUE at the start, with a unit; repeatable.
     torque
-        JOINT=LAW, a number or expression of t, joints and JOINT_d1; repeatable.
+        JOINT=LAW, an expression of t, joints and JOINT_d1; repeatable.
     driven
         JOINT=LAW of t that the joint follows; repeatable.
     no_drives
-        Leave out armature, damping, friction and springs.
+        Omit armature, damping, friction and springs.
     model
-        Which model of an SDF file that holds several.
+        Model to read from an SDF file with several.
     closures
-        File with springs and rotors that it does not have.
+        File with springs and rotors to add to the robot.
     """
 
     until: str | None = None

@@ -38,7 +38,7 @@ def check(
 ) -> int:
     r"""Compare a trajectory with the limits of a robot, to torque rate.
 
-    The exit status is 0 where all limits are kept, 1 where one is broken,
+    The exit status is 0 if all limits are kept, and 1 if one is broken,
     also by a jump from rest at the start or to rest at the stop.
 
     Parameters
@@ -48,13 +48,13 @@ def check(
     trajectory
         Samples (.csv), laws or a motion (.yaml, .toml, .json).
     limits
-        File of limits, which go before those of the robot file.
+        File of limits, which override those of the robot file.
     hand_over
-        The robot moves already at the start, and goes on at the stop.
+        The robot moves before the start and after the stop.
     out
-        Draw the joints' shares of their limits: .png, .svg or .pdf.
+        Draw each quantity as a share of its limit: .png, .svg or .pdf.
     deviation
-        Smooth the samples first, within this of each, as 0.01deg.
+        Smooth the samples first, within this deviation: 0.01deg.
     overwrite
         Let --out replace a file that is read here.
     json
@@ -120,7 +120,8 @@ def torques(
 ) -> int:
     r"""Compute the joint torques of a trajectory, and their rates.
 
-    Printed are the peaks at the instants of the trajectory, and on both sides of where its laws jump or bend.
+    The command prints the peaks at the instants of the trajectory and
+    on both sides of jumps and kinks of its laws.
 
     Parameters
     ----------
@@ -131,9 +132,9 @@ def torques(
     rates
         Highest rate of the torques, 0 to 28.
     no_drives
-        Leave out armature, damping and friction.
+        Omit armature, damping and friction.
     deviation
-        Smooth the samples first, within this of each, as 0.01deg.
+        Smooth the samples first, within this deviation: 0.01deg.
 
     Examples
     --------

@@ -40,22 +40,22 @@ def servo(
     heading: Heading = PLAIN,
     output: TableOutput = NO_TABLE,
 ) -> int:
-    r"""Tell the motion of drivers at the rate of a servo, position to jerk.
+    r"""Compute the motion of drivers at the rate of a servo, to jerk.
 
-    Where a driver follows from the law of an output, its motion is found
-    by inversion. Told are the peaks, and to which derivative the laws of
-    the file are continuous; --out writes a row for each period.
+    The motion of a driver with the law of an output is found by
+    inversion. The command prints the peaks and the highest continuous
+    derivative of each law; --out writes a row for each period.
 
     Parameters
     ----------
     file
         Mechanism file: .yaml, .yml, .toml or .json.
     rate
-        Of the rows, as 1kHz, 500Hz; a plain number is in Hz.
+        Rate of the rows, such as 1kHz; a plain number is in Hz.
     order
         Highest derivative, 0 to 30; 3 is jerk.
     driver
-        Which; repeatable [all].
+        Driver to compute; repeatable [all].
 
     Examples
     --------

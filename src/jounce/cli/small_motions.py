@@ -45,39 +45,38 @@ def modes(
     overwrite: Overwrite = False,
     json: bool = False,
 ) -> int:
-    """Tell where a mechanism stands still, and its modes about that place.
+    """Find an equilibrium of a mechanism, and its modes there.
 
-    With --moving, the modes about the motion that it starts with.
-
-    Equilibrium and its stability, natural frequencies, damping ratios,
-    and what moves most in each mode.
+    The command prints the equilibrium and its stability, natural
+    frequencies, damping ratios, and what moves most in each mode. With
+    --moving, the modes are those about the initial motion.
 
     Parameters
     ----------
     file
         Mechanism file with masses, or robot file: .urdf, .xml or .sdf.
     time
-        Instant at which laws are held, s [default: the first].
+        Instant at which motion laws stop, s [default: the first].
     method
-        settle goes where forces do work, newton to any equilibrium.
+        settle minimizes energy; newton finds any equilibrium.
     without
-        Driver that is left out; repeatable.
+        Driver to omit; repeatable.
     hold
-        Joint of a robot that is held, or all; repeatable.
+        Joint of a robot to lock, or all; repeatable.
     release
-        Driver whose force stays instead of its motion; repeatable.
+        Driver whose force, not motion, stays constant; repeatable.
     coordinate
         Output or coordinate of a body to use; repeatable [chosen].
     moving
-        About the motion of the initial conditions, as of a bicycle.
+        Linearize about the initial motion, as for a bicycle.
     out
         Write eigenvalues and shapes to this .csv file.
     animation
         Write a mode as an animation to this .gif or .mp4 file.
     mode
-        Which one, counted from 1.
+        Number of the mode to animate, from 1.
     amplitude
-        Of the animation, rad or sizes of the mechanism.
+        Amplitude of the animation, rad or sizes of the mechanism.
     overwrite
         Let --out replace a file that is read here.
     json

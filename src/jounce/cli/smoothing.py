@@ -27,7 +27,7 @@ def smooth(
     reading: RobotReading = PLAIN_ROBOT,
     output: TableOutput = NO_TABLE,
 ) -> int:
-    r"""Make a smooth motion within a deviation of noisy samples.
+    r"""Fit a smooth motion to noisy samples within a deviation.
 
     Its derivatives to the sixth are continuous, it stands still where the
     samples do, and its jerk is that of the motion, not of the noise. With

@@ -17,11 +17,11 @@ def new(
     Parameters
     ----------
     name
-        Of the starter, such as four-bar.
+        Name of the starter, such as four-bar.
     file
         File to write: .yaml, .yml, .toml or .json [default: NAME.yaml].
     overwrite
-        Replace a file that is there.
+        Replace an existing file.
     json
         Print the result as JSON.
 

@@ -44,16 +44,16 @@ def sweep(
 ) -> int:
     r"""Compute many designs, on all cores or a cluster, to a Zarr folder.
 
-    Of each design peaks, their times, rms, least and largest values of
-    all outputs and derivatives are kept. What was killed goes on where
-    it stopped when the same command is given again.
+    The folder stores peaks, their times, rms, minima and maxima of all
+    outputs and derivatives for each design. Run the same command again
+    to resume an interrupted sweep.
 
     Parameters
     ----------
     file
         Mechanism file, or robot file with a trajectory.
     trajectory
-        What a robot does: .csv, .yaml, .toml or .json.
+        Motion of a robot: .csv, .yaml, .toml or .json.
     vary
         NAME=LOW:HIGH:COUNT, with units; with --sample NAME=LOW:HIGH,
         NAME=normal:SIGMA or NAME=uniform:HALFWIDTH; repeatable. Of robots
@@ -61,29 +61,29 @@ def sweep(
     out
         Folder of the results, its name ending in .zarr.
     sample
-        sobol:COUNT draws designs from ranges; else all combinations.
+        sobol:COUNT samples the ranges [default: all combinations].
     order
-        Highest derivative; torques of robots have two less.
+        Highest derivative; torques of robots have two fewer.
     simulate
-        Move the mechanism by its forces rather than by its drivers.
+        Simulate the mechanism under forces instead of its drivers.
     method
-        Of a simulation: taylor, obreshkov-4, obreshkov-6 or obreshkov-8.
+        Integrator: taylor, obreshkov-4, obreshkov-6 or obreshkov-8.
     tolerance
-        As for jounce run or jounce simulate.
+        Tolerance, as for jounce run or jounce simulate.
     longest_step
-        Of a simulation, s.
+        Largest step of a simulation, s.
     histories
-        Keep all instants, too.
+        Store all instants too.
     payload
-        LINK=MASS with a unit, held in its origin; repeatable.
+        LINK=MASS with a unit, at the origin of the link; repeatable.
     workers
-        Processes here [all cores]; 0 computes in this one, without Dask.
+        Worker processes [all cores]; 0 uses this one, without Dask.
     scheduler
         Address of a Dask cluster, such as tcp://host:8786.
     timeout
-        Of an answer of the cluster, s.
+        Time to wait for an answer of the cluster, s.
     chunk
-        Designs that are computed together.
+        Number of designs that are computed together.
     json
         Print the result as JSON.
 

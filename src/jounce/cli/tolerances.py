@@ -34,11 +34,11 @@ def tolerance(
     reading: MechanismReading = PLAIN_MECHANISM,
     output: TableOutput = NO_TABLE,
 ) -> int:
-    r"""Tell how far outputs spread where parameters deviate, and why.
+    r"""Compute the spread of outputs under deviations of parameters.
 
-    To first order by exact gradients, and by solving designs drawn from
-    the deviations (Monte Carlo on a Sobol sequence). Printed is each
-    column where it spreads most, with the parameters that cause it.
+    The spread is found to first order by exact gradients, and by Monte
+    Carlo on a Sobol sequence. The command prints each column at the
+    instant of its largest spread, with the parameters that cause it.
 
     Parameters
     ----------
@@ -48,17 +48,17 @@ def tolerance(
         NAME=normal:SIGMA, NAME=uniform:HALFWIDTH or NAME=LOW:HIGH, with
         units; repeatable.
     of
-        Outputs, components and derivatives, as C_x,psi_d3 [all].
+        Outputs, components, derivatives: C_x,psi_d3 [all].
     order
-        Highest derivative, unless --output says.
+        Highest derivative, unless --output gives it.
     samples
-        Designs that are solved; 0 for gradients alone.
+        Number of designs to solve; 0 for gradients alone.
     no_linear
-        Leave gradients out.
+        Omit the gradients.
     indices
-        Sobol's indices of the peaks, by SALib.
+        Compute Sobol indices of the peaks with SALib.
     figure
-        Draw bands: .png, .svg or .pdf.
+        Draw the bands of outputs: .png, .svg or .pdf.
 
     Examples
     --------

@@ -28,18 +28,18 @@ def view(
 ) -> int:
     r"""Show a mechanism or a robot in the browser, moving.
 
-    With arrows, paths, plots, forces, and a slider for each parameter.
-    The page is served on this machine only, and needs no network. Ctrl-C
-    ends it.
+    The page has arrows, paths, plots, forces, and a slider for each
+    parameter. It is served on this machine only, and needs no network.
+    Ctrl-C ends the command.
 
     Parameters
     ----------
     file
         Mechanism or cam file, or robot file: .urdf, .xml or .sdf.
     trajectory
-        Of a robot (.csv, .yaml, .toml, .json); it swings without.
+        Motion of a robot (.csv, .yaml, ...) [default: it swings].
     port
-        Of this machine; 0 takes one that is free.
+        Port of this machine; 0 chooses a free one.
     no_open
         Only print the address; do not open the browser.
     order
@@ -47,9 +47,9 @@ def view(
     modes
         Show the modes about its equilibrium instead of its motion.
     without
-        Driver that is left out of the equilibrium; repeatable.
+        Driver to omit from the equilibrium; repeatable.
     hold
-        Joint of a robot that is held there, or all; repeatable.
+        Joint of a robot to lock there, or all; repeatable.
 
     Examples
     --------

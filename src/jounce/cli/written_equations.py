@@ -37,30 +37,31 @@ def equations(
 ) -> int:
     r"""Write equations as code, SymPy, LaTeX, or a table.
 
-    Of a mechanism residual, Jacobian and right sides of all orders, of a robot
-    its torques and their rates, from the same residuals that are solved, in SI
-    units. Sommer 2024, equations 1-8; Negrean 2025, equations 144-146.
+    For a mechanism the equations are residual, Jacobian and right sides of
+    all orders, for a robot torques and their rates, in SI units. They are
+    derived from the functions that jounce computes with. Sommer 2024,
+    equations 1-8; Negrean 2025, equations 144-146.
 
     Parameters
     ----------
     file
         Mechanism file, .yaml, .toml or .json; or robot, .urdf, .xml or .sdf.
     format
-        python, which needs NumPy alone, sympy, c, C99, or latex; or
-        table, their values along the motion, multipliers too.
+        python (NumPy only), sympy, c (C99) or latex; table writes values
+        along the motion, with multipliers.
     joint
-        The joint or driver whose equations alone are written.
+        Joint or driver whose equations are written [all].
     quantity
-        Of code, repeatable. Of a mechanism constraints, unless given; forces,
-        with the mass matrix; outputs, with derivatives. Of a robot torque,
-        unless given; mass_matrix; regressor; energies.
+        What code computes; repeatable. Mechanisms: constraints [default],
+        forces with the mass matrix, outputs with derivatives. Robots: torque
+        [default], mass_matrix, regressor, energies.
     order
-        Highest derivative, 4 unless given.
+        Highest derivative [4].
     no_drives
-        Leave out armature, damping, friction and springs of a robot.
+        Omit armature, damping, friction and springs of a robot.
     out
-        Write it to this file; else it is printed. A table is .csv, .nc
-        (NetCDF) or .json.
+        File to write [standard output]; of a table .csv, .nc (NetCDF)
+        or .json.
     overwrite
         Let --out replace a file that is read here.
 
