@@ -3,9 +3,11 @@
 It needs the extras viewer and test, and Debian's chromium.
 """
 
+import io
 import sys
 from pathlib import Path
 
+from PIL import Image
 from playwright.sync_api import sync_playwright
 
 import jounce as jn
@@ -17,6 +19,12 @@ FLAGS = ["--headless=new", "--no-sandbox", "--enable-unsafe-swiftshader"]
 SIZE = {"width": 1400, "height": 800}
 
 
+def packed(content, path):
+    """Write a picture at two pixels a point with few colors, which a page of plots and plain bodies needs."""
+    few = Image.open(io.BytesIO(content)).convert("RGB").quantize(192, dither=Image.Dither.NONE)
+    few.save(path, format="png", optimize=True)
+
+
 def four_bar(shown, page):
     shown.arrows.trace(shown.page.recording.appearance.points[0], (1, 2, 3))
     shown.page.seek(1.17)
@@ -26,7 +34,7 @@ def four_bar(shown, page):
 def failure(shown, page):
     page.get_by_text("Exact values").click()
     page.wait_for_timeout(800)
-    field = page.locator("xpath=(//*[normalize-space(text())='BC'])[last()]/following::input").first
+    field = page.locator("xpath=(//*[normalize-space(text())='BC (m)'])[last()]/following::input").first
     field.fill("0.03")
     field.press("Enter")
     shown.page.seek(0.4)
@@ -72,7 +80,7 @@ def main():
         for name in wanted:
             files, act = PICTURES[name]
             with view(*files, open_page=False, playing=False) as shown:
-                page = browser.new_page(viewport=SIZE)
+                page = browser.new_page(viewport=SIZE, device_scale_factor=2)
                 page.goto(shown.url)
                 page.get_by_text("Legend and plots").wait_for(timeout=60_000)
                 page.wait_for_timeout(5000)
@@ -82,7 +90,7 @@ def main():
                 act(shown, page)
                 shown.page.session.wait()
                 page.wait_for_timeout(4000)
-                page.screenshot(path=IMAGES / f"{name}.png")
+                packed(page.screenshot(), IMAGES / f"{name}.png")
                 page.close()
             print(name)
         browser.close()

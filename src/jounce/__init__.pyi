@@ -9,6 +9,7 @@ from jounce import (
     laws as laws,
     outputs as outputs,
     planning as planning,
+    progress as progress,
     robot as robot,
 )
 from jounce.constraints import (

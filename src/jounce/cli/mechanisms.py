@@ -19,12 +19,12 @@ from jounce.cli.options import (
     spare_inputs,
 )
 from jounce.cli.robot_motion import RobotRun, simulate_robot_file
-from jounce.errors import JounceError, check_name
+from jounce.errors import JounceError
 from jounce.io.files import ROBOT_FILES
 from jounce.reporting.terminal import say, show_peaks
 
 if TYPE_CHECKING:
-    from jounce.integrate import Obreshkov, Taylor
+    from jounce.integrate import AbstractMethod
     from jounce.kinematics import ChunkedMotion, Motion
     from jounce.mechanism import Mechanism
 
@@ -118,16 +118,16 @@ def simulate(
         --start "elbow=30 deg" --torque "shoulder=5*sin(t)"
     """
     output.check()
-    chosen = method_of(method, step)
     if file.suffix.lower() in ROBOT_FILES:
         _refuse_options(file, reading)
-        control: Any = {"method": chosen, "tolerance": tolerance, "longest_step": longest_step}
+        control: Any = {"method": method_of(method, step), "tolerance": tolerance, "longest_step": longest_step}
         return simulate_robot_file(file, order, robot, reading.allow, output, **control)
     for name in robot.given():
         option = f"--{name.replace('_', '-')}"
         raise JounceError("is for robot files; a mechanism file has its own time and forces", name=option, path=file)
     units = heading.units
     mechanism = reading.mechanism(file)
+    chosen = method_of(method, step)  # a file of --import may have registered it
     spare_inputs(output.out, overwrite=output.overwrite)
     motion = simulated(mechanism, file, order, method=chosen, tolerance=tolerance, longest_step=longest_step)
     return _finished("simulate", motion, file, output, refine=not no_refine, heading=units)
@@ -214,16 +214,14 @@ def _write_result(
     return outcome(motion, file)
 
 
-def method_of(name: str, step: float | None) -> Taylor | Obreshkov:
+def method_of(name: str, step: float | None) -> AbstractMethod:
     """Return the integration method of a name."""
-    from jounce.integrate import Obreshkov, Taylor
+    from jounce.integrate import method_named
 
-    orders: dict[str, int | None] = {"taylor": None, "obreshkov-4": 4, "obreshkov-6": 6, "obreshkov-8": 8}
-    check_name("method", name, orders, JounceError, name="--method")
     try:
-        return Taylor(step=step) if (order := orders[name]) is None else Obreshkov(order, step)
+        return method_named(name, step)
     except JounceError as error:
-        error.name = "--step"
+        error.name = "--method" if error.name == "method" else "--step"
         raise
 
 

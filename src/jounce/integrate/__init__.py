@@ -9,6 +9,7 @@ from jounce.integrate.results.simulation import Simulation as Simulation
 from jounce.integrate.steps.events import Event as Event
 from jounce.integrate.steps.methods import AbstractMethod as AbstractMethod, Taylor as Taylor
 from jounce.integrate.steps.obreshkov import Obreshkov as Obreshkov
+from jounce.integrate.steps.registry import method_named as method_named, register_method as register_method
 from jounce.settings import compute_under_own_settings as _compute_under_own_settings
 
 _compute_under_own_settings(__name__)

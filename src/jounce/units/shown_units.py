@@ -41,6 +41,9 @@ QUANTITIES: dict[str, tuple[str, Dimension]] = {
 """The kinds of quantity that a unit can be chosen for: the unit in SI, and the dimension."""
 
 
+_RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
+
+
 def derivative_unit(unit: str, order: int) -> str:
     """Return the unit of a time derivative of a quantity.
 
@@ -53,6 +56,17 @@ def derivative_unit(unit: str, order: int) -> str:
     base = unit[: per_time.start()] if per_time else unit
     total = order + (int(per_time[1] or 1) if per_time else 0)
     return base if total == 0 else f"{base}/s" if total == 1 else f"{base}/s^{total}"
+
+
+def raised(unit: str) -> str:
+    """Return a unit as people write it: exponents raised, products by spaces.
+
+    Examples
+    --------
+    >>> raised("N*m/s^2") == "N m/s\u00b2", raised("10^-3 rad/s^4") == "10\u207b\u00b3 rad/s\u2074"
+    (True, True)
+    """
+    return re.sub(r"\^(-?\d+)", lambda match: match[1].translate(_RAISED), unit.replace("*", " "))
 
 
 def time_axes(instants: Float[Numbers, " time"], levels: int) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from jounce.dynamics.forward.accelerations import Expansion, State
 from jounce.dynamics.forward.initial_state import consistent_start
 from jounce.errors import JounceError
 from jounce.integrate.marching.marching import begin_march
+from jounce.integrate.steps import registry
 from tests.problems import dynamics
 from tests.problems.marches import LENIENT, ends, marched, widened
 
@@ -117,3 +118,12 @@ def test_orders_without_a_formula(order):
 def test_steps_that_are_none(method, step):
     with pytest.raises(JounceError, match="positive number of seconds"):
         method(4, step=step)
+
+
+def test_methods_are_found_by_name_and_users_register_theirs(monkeypatch):
+    monkeypatch.setattr(registry, "_methods", dict(registry._methods))
+    assert jn.integrate.method_named("obreshkov-6", 0.01) == jn.Obreshkov(6, 0.01)
+    with pytest.raises(jn.errors.MechanismError, match="did you mean 'taylor'"):
+        jn.integrate.method_named("tayler")
+    jn.integrate.register_method("coarse", lambda step: jn.Obreshkov(4, step or 0.1))
+    assert jn.integrate.method_named("coarse") == jn.Obreshkov(4, 0.1)

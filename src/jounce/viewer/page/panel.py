@@ -84,13 +84,14 @@ class Panel(Observer):
                 self._add_number(parameter)
 
     def _add_slider(self, its: Parameter) -> None:
-        step, hint = _step(its.high - its.low), f"{its.name}, SI units; {its.value:.6g} in the file"
-        slider = self._sliders[its.name] = self.gui.add_slider(its.name, its.low, its.high, step, its.value, hint=hint)
+        step = 1 if its.whole else _step(its.high - its.low)
+        hint = f"{its.name}, SI units; {its.value:.6g} in the file"
+        slider = self._sliders[its.name] = self.gui.add_slider(its.label, its.low, its.high, step, its.value, hint=hint)
         slider.on_update(lambda event: self._changed(its.name, event))
 
     def _add_number(self, its: Parameter) -> None:
-        step = _step(abs(its.value) or 1.0)
-        number = self._numbers[its.name] = self.gui.add_number(its.name, its.value, step=step, disabled=its.derived)
+        step = 1 if its.whole else _step(abs(its.value) or 1.0)
+        number = self._numbers[its.name] = self.gui.add_number(its.label, its.value, step=step, disabled=its.derived)
         if not its.derived:
             number.on_update(lambda event: self._changed(its.name, event))
 

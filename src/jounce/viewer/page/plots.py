@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from jounce.plot.labels import axis_range, scale_of
 from jounce.plot.style import COLORS
-from jounce.units.shown_units import derivative_unit
+from jounce.units.shown_units import derivative_unit, raised
 from jounce.viewer.page.legend import legend
 from jounce.viewer.page.page import Observer, Page
 from jounce.viewer.shapes.recording import Recording
@@ -123,8 +123,8 @@ class Chart:
         values = cleaned(recording.time, quantity.values, self.order)
         exponent = scale_of(values)
         self.time, self.values = recording.time, values * 10.0**-exponent
-        unit = derivative_unit(quantity.unit.replace("*", " "), self.order)
-        unit = f"10^{exponent} {unit}" if exponent else unit
+        unit = derivative_unit(quantity.unit, self.order)
+        unit = raised(f"10^{exponent} {unit}" if exponent else unit)
         across = {"time": False, "range": (float(self.time[0]), float(self.time[-1]))}
         upward = {"auto": False, "range": axis_range(self.values, 0.06)}
         return f"{self.name}: {quantity.words[self.order]} ({unit})", {"x": across, "y": upward}

@@ -13,6 +13,7 @@ from xarray import Dataset
 
 from jounce.kinematics import Motion
 from jounce.mechanism.time import nearest_instants
+from jounce.units.shown_units import raised
 from jounce.viewer.shapes.appearance import Appearance, BodyPoint, Position
 
 __all__ = ["Load", "Parameter", "Quantity", "Recording", "Vectors", "poses", "rotated", "spatial_vectors"]
@@ -37,6 +38,10 @@ class Parameter:
         Heading under which it stands.
     derived : bool, default False
         It follows from others, by an expression, and is shown only.
+    unit : str, default ""
+        Its SI unit, where one is known.
+    whole : bool, default False
+        Whether it is a whole number.
     """
 
     name: str
@@ -45,6 +50,13 @@ class Parameter:
     high: float
     group: str = ""
     derived: bool = False
+    unit: str = ""
+    whole: bool = False
+
+    @property
+    def label(self) -> str:
+        """The name with the unit, as a slider shows it."""
+        return f"{self.name} ({raised(self.unit)})" if self.unit else self.name
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,6 +16,7 @@ from jounce.kinematics import Motion, Status, raise_for_status, solve
 from jounce.mechanism import AngularVelocityOutput, Mechanism, time_grid
 from jounce.mechanism.mechanism import GROUND
 from jounce.plot.labels import quantity_word
+from jounce.reporting.facts.mechanism_facts import parameter_facts
 from jounce.trajectory import Expression
 from jounce.viewer.shapes.appearance import Appearance, Position
 from jounce.viewer.shapes.mechanism_appearance import mechanism_appearance
@@ -64,8 +65,11 @@ class MechanismSubject:
 def mechanism_parameters(mechanism: Mechanism) -> tuple[Parameter, ...]:
     """Return the parameters of a mechanism with the ranges of their sliders."""
     given, values = mechanism.parameters, {k: float(v) for k, v in mechanism.parameter_values.items()}
+    units = {facts["name"]: facts["unit"] or "" for facts in parameter_facts(mechanism, None)}
     return tuple(
-        Parameter(name, value, *parameter_range(value), derived=isinstance(given[name], str | Expression))
+        Parameter(
+            name, value, *parameter_range(value), derived=isinstance(given[name], str | Expression), unit=units[name]
+        )
         for name, value in values.items()
     )
 

@@ -52,7 +52,7 @@ class ModesSubject:
         own = () if robot else mechanism_parameters(subject)
         taken = {parameter.name for parameter in own}
         self._keys = _unused(taken, MODE), _unused(taken, AMPLITUDE)
-        chosen = Parameter(self._keys[0], 1.0, 1.0, max(float(count), 1.0 + 1e-9), GROUP)
+        chosen = Parameter(self._keys[0], 1.0, 1.0, max(float(count), 1.0 + 1e-9), GROUP, whole=True)
         grouped = (dataclasses.replace(each, group="Parameters") for each in own)
         self.parameters = (chosen, Parameter(self._keys[1], 0.1, 0.01, LARGEST, GROUP), *grouped)
 
