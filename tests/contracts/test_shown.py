@@ -51,7 +51,7 @@ MAKERS = {
     "Simulation": lambda: jn.simulate(pendulum(), [0.0, 0.1], order=2),
     "RobotSimulation": lambda: jn.simulate(ROBOT, [0.0, 0.1], order=2, state=np.zeros((2, 2))),
     "Batch": lambda: jn.integrate.Batch(
-        U, {"l": U[:2]}, {"a": np.zeros((2, 9, 3))}, np.zeros((2, 9), int), np.ones(2, int)
+        U, {"l": U[:2]}, {"a": np.zeros((2, 9, 3))}, np.zeros((2, 9), int), np.ones(2, int), four_bar(), 2
     ),
     "Equilibrium": lambda: jn.equilibrium(pendulum()),
     "Linearization": lambda: jn.linearize(pendulum()),

@@ -41,3 +41,22 @@ def test_a_data_frame_has_the_columns_of_a_csv_file_and_units(motion, tmp_path):
     assert frame["C_y_d2"].columns.tolist() == ["m/s^2"]
     np.testing.assert_array_equal(frame["C_y_d2"]["m/s^2"], motion.outputs["C"][:, 2, 1])
     np.testing.assert_array_equal(frame.index, motion.time)
+
+
+def test_a_batch_of_simulations_has_the_dataset_of_a_family():
+    pendulum = jn.Mechanism(
+        space="planar",
+        gravity=[0, -9.81],
+        parameters={"lift": 0.1},
+        bodies={"rod": jn.Body([0, 0], mass=2.0, inertia=0.5, center_of_mass=[1, 0])},
+        joints={"O": jn.planar.Revolute(("ground", "rod"), [0, 0], [0, 0])},
+        initial={"rise": jn.drivers.CoordinateDriver(("ground", "rod"), "angle", motion="lift")},
+        outputs={"angle": jn.outputs.AngleOutput("rod"), "tip": jn.outputs.PointOutput("rod", [1, 0])},
+    )
+    batch = jn.simulate_batch(pendulum, {"lift": [0.1, 0.2]}, [0.0, 0.5], order=2)
+    family = jn.solve_batch(jn.load("examples/four_bar.yaml"), {"BC": [0.14, 0.15]}, [0.0, 0.1], order=2)
+    assert batch.dataset["tip"].dims == ("run", "time", "derivative", "component")
+    assert family["C"].dims == ("design", "time", "derivative", "component")
+    assert batch.dataset["lift"].values.tolist() == [0.1, 0.2]
+    assert batch.dataset["status"].attrs == family["status"].attrs
+    np.testing.assert_array_equal(batch.dataset["angle"], batch.outputs["angle"])

@@ -89,11 +89,11 @@ def test_a_trajectory():
     assert row == ["elbow", "ExpressionMotion", "0 to 2", "0 to 2", "1 to 1", "0 to 0"]
 
 
-def test_a_batch():
+def test_a_batch(four_bar):
     time, status = np.linspace(0, 1, 3), np.array([[0, 0, 0], [0, 6, 7]])
     outputs = {"angle": np.arange(18.0).reshape(2, 3, 3)}
     outputs["angle"][1, 1:] = np.nan
-    batch = jn.integrate.Batch(time, {"length": np.array([0.1, 0.2])}, outputs, status, np.array([4, 5]))
+    batch = jn.integrate.Batch(time, {"length": np.array([0.1, 0.2])}, outputs, status, np.array([4, 5]), four_bar, 2)
     page = batch._repr_html_()
     assert "1 of 2 runs complete" in page
     assert Tables(page).tables["Outputs of complete runs (SI)"][1] == ["angle", "2 x 3 x 3", "0", "6"]

@@ -29,6 +29,7 @@ from jounce.integrate.steps.revolution_counts import POINTS_IN_STEP, attitudes_a
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, whole_periods
 from jounce.kinematics import Status
+from jounce.kinematics.families.labels import labeled_family
 from jounce.kinematics.families.solve_batch import checked_values
 from jounce.kinematics.results.pose_outputs import output_series
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
@@ -63,6 +64,10 @@ class Batch(Displayed):
         See `Status`.
     steps : numpy.ndarray of int, shape (runs,)
         Steps taken.
+    mechanism : Mechanism
+        As it was given.
+    order : int
+        Highest derivative of the outputs.
     """
 
     time: Float[np.ndarray, " time"]
@@ -70,6 +75,19 @@ class Batch(Displayed):
     outputs: dict[str, Float[np.ndarray, "run time derivative *component"]]
     status: Int[np.ndarray, "run time"]
     steps: Int[np.ndarray, " run"]
+    mechanism: Mechanism
+    order: int
+
+    @property
+    def dataset(self) -> Any:
+        """The results as an `xarray.Dataset` of the form that `jounce.solve_batch` returns, of the dimension ``run``.
+
+        Variables are the outputs, with their units, the ``status``, and the ``steps`` of each run; parameters are
+        coordinates.
+        """
+        return labeled_family(
+            "run", self.mechanism, self.time, self.order, self.parameters, self.outputs, self.status
+        ).assign(steps=("run", self.steps, {"long_name": "steps taken"}))
 
     def __repr__(self) -> str:
         complete = int((self.status == Status.OK).all(axis=1).sum())
@@ -174,7 +192,7 @@ def simulate_batch(
     status = runs.status
     for run, reason in starts.failed.items():
         status[run, 0] = int(reason)
-    return Batch(instants, values, runs.outputs, status, runs.steps)
+    return Batch(instants, values, runs.outputs, status, runs.steps, mechanism, order)
 
 
 def _of_robot(values: dict[str, np.ndarray], runs: list[RobotSimulation]) -> Batch:

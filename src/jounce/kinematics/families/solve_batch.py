@@ -17,6 +17,7 @@ from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.families.design_paths import DesignPaths
 from jounce.kinematics.families.design_sides import Sides, sides_of_designs
 from jounce.kinematics.families.design_values import Designs
+from jounce.kinematics.families.labels import labeled_family
 from jounce.kinematics.position_analysis.idle_holding import with_idle_held_in_family
 from jounce.kinematics.position_analysis.solve import LOWEST_ORDER, checked_settings, lost_orders, solve
 from jounce.kinematics.results.motion import Motion
@@ -39,7 +40,6 @@ from jounce.mechanism.time import TimeLike
 from jounce.settings import under_own_settings
 from jounce.shapes import ArrayLike, real_numbers
 from jounce.trajectory.motion import SplineMotion
-from jounce.units.shown_units import derivatives_of, time_axes
 
 if TYPE_CHECKING:
     import xarray
@@ -252,30 +252,11 @@ class _Family:
 
     def dataset(self, values: Mapping[str, np.ndarray]) -> Any:
         """Return the results, labeled."""
-        import xarray
-
-        coordinates: dict[str, Any] = {"design": np.arange(len(self.rows)), **time_axes(self.instants, self.order + 1)}
-        variables = {}
-        for name, output in self.mechanism.outputs.items():
-            found = self.outputs.get(name)
-            if found is None:
-                continue
-            found = found[:, : len(self.instants)]
-            dims = ["design", "time", "derivative"]
-            if found.ndim == 4:
-                axes = output.axes or (("component", output.labels[: found.shape[3]]),)
-                coordinates |= {axis: list(labels) for axis, labels in axes}
-                found = found.reshape(*found.shape[:3], *(len(labels) for _, labels in axes))
-                dims += [axis for axis, _ in axes]
-            variables[name] = (dims, found, {"units": output.unit, "long_name": derivatives_of(name)})
-        meanings = " ".join(status.name.lower() for status in Status)
-        words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": meanings}
-        variables["status"] = (("design", "time"), self.status[:, : len(self.instants)], words)
-        taken = {*variables, *coordinates}
-        named = {name: name if name not in taken else f"parameter_{name}" for name in values}
-        coordinates |= {named[name]: ("design", value, {"long_name": name}) for name, value in values.items()}
-        attributes = {"title": self.mechanism.title or "designs of a mechanism", "source": "jounce"}
-        return xarray.Dataset(variables, coordinates, attributes)
+        count = len(self.instants)
+        outputs = {name: found[:, :count] for name, found in self.outputs.items()}
+        return labeled_family(
+            "design", self.mechanism, self.instants, self.order, values, outputs, self.status[:, :count]
+        )
 
     def _of_whole_motions(self) -> bool:
         """Tell whether outputs are asked for that follow from whole motions, not from one instant."""

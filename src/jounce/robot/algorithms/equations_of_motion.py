@@ -17,7 +17,7 @@ from jounce.errors import RobotError, check_choice, flag
 from jounce.jet import Jet, components, cross, dot
 from jounce.jet.algebra import stacked, total
 from jounce.rigid.frames import Frames
-from jounce.robot.model.arguments import checked_coordinates, checked_position
+from jounce.robot.model.arguments import checked_coordinates, checked_position, stacked_arguments
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.drive_forces import armature_matrix, inertial_forces, passive_forces
@@ -227,6 +227,7 @@ def mass_matrix(
     return matrix if rates else matrix[..., 0, :, :]
 
 
+@stacked_arguments(2, "jn.bias_forces(robot, np.stack([q, v])) for pin.nonLinearEffects(model, data, q, v)")
 def bias_forces(
     robot: Robot, q: ArrayLike, *, rates: bool = False, parts: str | Sequence[str] = PARTS, drives: bool | None = None
 ) -> Float[Numbers, "*batch joint"]:

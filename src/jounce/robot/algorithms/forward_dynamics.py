@@ -13,7 +13,7 @@ from jounce.errors import RobotError, SingularityError, check_name, flag
 from jounce.robot.algorithms.base_motion import BaseMotion, base_arrays, base_body
 from jounce.robot.algorithms.motion_series import MotionSeries, motion_series
 from jounce.robot.algorithms.wrenches import Wrench, wrench_arrays
-from jounce.robot.model.arguments import checked_state, floats, joints_of
+from jounce.robot.model.arguments import checked_state, floats, joints_of, stacked_arguments
 from jounce.robot.model.tree import Tree
 from jounce.robot.recursions.articulated_bodies import LEAST_INERTIA
 from jounce.robot.recursions.batches import Batched
@@ -52,6 +52,7 @@ def forward_dynamics(
     base: BaseMotion,
     strict: bool = True,
 ) -> tuple[BaseMotion, Float[Numbers, "*batch derivative joint"]]: ...
+@stacked_arguments(3, "jn.forward_dynamics(robot, np.stack([q, v]), tau[None])[2] for pin.aba(model, data, q, v, tau)")
 def forward_dynamics(
     robot: Robot,
     state: ArrayLike,

@@ -12,7 +12,7 @@ from jounce.jet import Jet, concatenate, cross, matvec
 from jounce.jet.algebra import stacked, total
 from jounce.robot.algorithms.base_motion import BaseMotion, base_arrays, base_body, falling, in_base, scene_axes
 from jounce.robot.algorithms.wrenches import FRAMES, Wrench, wrench_arrays
-from jounce.robot.model.arguments import checked_coordinates
+from jounce.robot.model.arguments import checked_coordinates, stacked_arguments
 from jounce.robot.model.tree import Frame, Tree
 from jounce.robot.recursions.batches import Batched
 from jounce.robot.recursions.drive_forces import inertial_forces, passive_forces
@@ -23,6 +23,7 @@ from jounce.robot.robot import Robot
 from jounce.shapes import ArrayLike, Numbers
 
 
+@stacked_arguments(2, "jn.inverse_dynamics(robot, np.stack([q, v, a])) for pin.rnea(model, data, q, v, a)")
 def inverse_dynamics(
     robot: Robot,
     q: ArrayLike,

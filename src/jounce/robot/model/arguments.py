@@ -1,8 +1,8 @@
 """What users hand to the functions of robots, checked: numbers, coordinates and their derivatives."""
 
 from collections.abc import Callable
-from functools import partial
-from typing import Any
+from functools import partial, wraps
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -12,6 +12,33 @@ from jounce.errors import RobotError
 from jounce.robot.model.abstract_robot import AbstractRobot
 from jounce.shapes import Numbers, is_real, real_numbers
 from jounce.trajectory.joint_trajectory import MAX_ORDER
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def stacked_arguments(count: int, hint: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Decorate a function so that a call as in another library, with separate derivatives, raises an error with a hint.
+
+    Parameters
+    ----------
+    count : int
+        How many arguments it takes without their names.
+    hint : str
+        The call here, and that of the other library.
+    """
+
+    def decorated(function: Callable[P, R]) -> Callable[P, R]:
+        @wraps(function)
+        def called(*arguments: P.args, **options: P.kwargs) -> R:
+            if len(arguments) > count:
+                message = f"takes {count} arguments without names, not {len(arguments)}; write {hint}"
+                raise RobotError(message, name=function.__name__)
+            return function(*arguments, **options)
+
+        return called
+
+    return decorated
 
 
 def floats(name: str, values: Any, read: Callable[..., np.ndarray] = real_numbers) -> Float[Numbers, "..."]:
@@ -43,7 +70,8 @@ def joints_of(robot: object) -> tuple[str, ...]:
         If it is none.
     """
     if not isinstance(robot, AbstractRobot):
-        raise RobotError("must be a jn.Robot, as jn.load_robot gives it", name="robot", value=robot)
+        message = "must be a jn.Robot, as jn.load_robot gives it; the robot is the first argument"
+        raise RobotError(message, name="robot", value=robot)
     return robot.joint_names
 
 
@@ -89,7 +117,8 @@ def checked_coordinates(
     n, q = len(joints_of(robot)), floats("q", q)
     if q.ndim < 2 or q.shape[-1] != n:
         joints = f"{robot.name} has {n} {'joint' if n == 1 else 'joints'}"
-        raise RobotError(f"must have the shape (..., order + 1, n), not {q.shape}; {joints}: n = {n}", name="q")
+        stack = "; stack positions and derivatives: np.stack([q, v, a])" if q.shape == (n,) else ""
+        raise RobotError(f"must have the shape (..., order + 1, n), not {q.shape}; {joints}: n = {n}{stack}", name="q")
     if q.shape[-2] < least + 1:
         names = ", ".join(["q", "q'", "q''"][: least + 1])
         lacks = f"must hold {names}" if least < 3 else f"needs derivatives of q to order {least}"

@@ -1,0 +1,68 @@
+"""Results of designs, or of runs of a simulation, as labeled arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.kinematics.status import Status
+from jounce.mechanism import Mechanism
+from jounce.units.shown_units import derivatives_of, time_axes
+
+__all__ = ["labeled_family"]
+
+
+def labeled_family(
+    lane: str,
+    mechanism: Mechanism,
+    instants: Float[np.ndarray, " time"],
+    order: int,
+    values: Mapping[str, np.ndarray],
+    outputs: Mapping[str, np.ndarray],
+    status: Int[np.ndarray, "lane time"],
+) -> Any:
+    """Return the results of designs or runs as an `xarray.Dataset`, with their parameters as coordinates.
+
+    Parameters
+    ----------
+    lane : str
+        Name of their dimension: design or run.
+    mechanism : Mechanism
+        Whose outputs they are.
+    instants : numpy.ndarray of shape (time,)
+        s.
+    order : int
+        Highest derivative.
+    values : mapping of str to numpy.ndarray of shape (lane,)
+        Parameters in which they differ.
+    outputs : mapping of str to numpy.ndarray of shape (lane, time, order + 1) or (lane, time, order + 1, component)
+        Those that were computed.
+    status : numpy.ndarray of shape (lane, time)
+        See `Status`.
+    """
+    import xarray
+
+    coordinates: dict[str, Any] = {lane: np.arange(len(status)), **time_axes(instants, order + 1)}
+    variables = {}
+    for name, output in mechanism.outputs.items():
+        found = outputs.get(name)
+        if found is None:
+            continue
+        dims = [lane, "time", "derivative"]
+        if found.ndim == 4:
+            axes = output.axes or (("component", output.labels[: found.shape[3]]),)
+            coordinates |= {axis: list(labels) for axis, labels in axes}
+            found = found.reshape(*found.shape[:3], *(len(labels) for _, labels in axes))
+            dims += [axis for axis, _ in axes]
+        variables[name] = (dims, found, {"units": output.unit, "long_name": derivatives_of(name)})
+    meanings = " ".join(each.name.lower() for each in Status)
+    words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": meanings}
+    variables["status"] = ((lane, "time"), status, words)
+    taken = {*variables, *coordinates}
+    named = {name: name if name not in taken else f"parameter_{name}" for name in values}
+    coordinates |= {named[name]: (lane, value, {"long_name": name}) for name, value in values.items()}
+    attributes = {"title": mechanism.title or f"{lane}s of a mechanism", "source": "jounce"}
+    return xarray.Dataset(variables, coordinates, attributes)
