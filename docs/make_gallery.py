@@ -212,7 +212,7 @@ def motion(name, picture):
         on_bodies = {key: jn.robot.body_point(machine, *there) for key, there in picture.points.items()}
         points = {key: jn.outputs.PointOutput(body, place) for key, (body, place) in on_bodies.items()}
         time = np.linspace(0.0, picture.stop, 201) if picture.stop else None
-        machine = machine.mechanism(drivers=laws, outputs=points, time=time)
+        machine = machine.mechanism(drivers=laws, outputs=points, time=time, drives=False)  # without their symbols
         return jn.solve(dataclasses.replace(machine, title=picture.title), order=picture.order)
     if picture.module:
         module(EXAMPLES / picture.module)
