@@ -73,11 +73,11 @@ class Count:
 
 
 @contextmanager
-def compiling(name: str) -> Iterator[None]:
+def compiling(function: Any) -> Iterator[None]:
     """Say that a program is compiled meanwhile, by the name of its function."""
-    token = object()
+    token, name = object(), getattr(function, "__name__", "a function")
     with _lock:
-        _compiled[token] = name.strip("_").replace("_", " ")
+        _compiled[token] = name.strip("_<>").replace("_", " ")
     try:
         yield
     finally:

@@ -4,6 +4,7 @@ import math
 import pathlib
 import sys
 
+import numpy as np
 import pytest
 
 import jounce as jn
@@ -69,8 +70,8 @@ def test_a_line_of_progress_is_shown_on_a_terminal_and_for_long_work_only(capsys
 
 def test_what_is_compiled_is_said_until_something_is_done():
     with Count("solving") as count:
-        with compiling("_positions_of"):
-            assert now().words == "solving: compiling positions of"
+        with compiling(np.linalg.matrix_rank):
+            assert now().words == "solving: compiling matrix rank"
             with Count("within") as within:  # the outermost is told
                 within(1, 2)
             count(1, 7)

@@ -235,7 +235,7 @@ class Compiled:
             return partial(self.jitted, **static)
 
         def compiled_anew() -> Callable[..., Any]:
-            with compiling_anew(), compiling(self.function.__name__):
+            with compiling_anew(), compiling(self.function):
                 with uncollected():
                     lowered = self.jitted.lower(*arguments, **keywords, **static)
                     without_sources(lowered.compiler_ir())

@@ -139,7 +139,7 @@ class Translated:
 
         def make() -> tuple[Any, ...]:
             try:
-                with compiling(self.function.__name__):
+                with compiling(self.function):
                     binary, results = object_file(function, *given, places, **options)
             except NoRuleError as missing:  # which is kept, too: to find it out takes long
                 return b"", str(missing), None
