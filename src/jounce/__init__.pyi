@@ -9,7 +9,6 @@ from jounce import (
     laws as laws,
     outputs as outputs,
     planning as planning,
-    progress as progress,
     robot as robot,
 )
 from jounce.constraints import (

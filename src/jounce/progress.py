@@ -1,4 +1,4 @@
-"""Progress of long computations, on a terminal or in a notebook: ``jounce.progress.show()``."""
+"""Progress of long computations, on a terminal or in a notebook: ``from jounce import progress; progress.show()``."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ def show() -> None:
     Examples
     --------
     >>> import jounce as jn
-    >>> jn.progress.show()
+    >>> from jounce import progress
+    >>> progress.show()
     >>> motion = jn.solve(jn.load("examples/four_bar.yaml"))
-    >>> jn.progress.hide()
+    >>> progress.hide()
     """
     global _display
     if _display is None:
