@@ -98,7 +98,7 @@ def _draw_row(spread: Any, column: Column, panels: Any, parameters: list[str]) -
         label = "first order" if side is sides[0] else None
         deviation.plot(time, side * 10.0**-away, color=GRAY, linewidth=0.9, linestyle=(0, (4, 2)), label=label)
     deviation.axhline(0.0, color=LINE_COLORS[0], linewidth=0.8)
-    deviation.set_ylabel(f"({unit_label(units, order, away)})")
+    deviation.set_ylabel(rf"$\Delta$ {label}  ({unit_label(units, order, away)})")
     if f"{name}_share" in spread:
         parts = chosen(spread, f"{name}_share", column)
         first = np.argsort(-parts.mean(axis=1), kind="stable")[:MOST_SHARES]
@@ -107,6 +107,7 @@ def _draw_row(spread: Any, column: Column, panels: Any, parameters: list[str]) -
         names = [shown_name(parameters[k]) for k in ordered]
         share.stackplot(time, parts[ordered], labels=names, colors=colors, alpha=0.75, linewidth=0)
     share.set_ylim(0.0, 1.0)
+    share.set_ylabel(f"of {label}")
     for axes in panels:
         axes.set_xlim(time[0], time[-1])
         set_ticks(axes.yaxis, 5)
