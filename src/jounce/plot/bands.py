@@ -95,8 +95,8 @@ def _draw_row(spread: Any, column: Column, panels: Any, parameters: list[str]) -
         differences = [(x - nominal) * 10.0**-away for x in bounds]
         deviation.fill_between(time, *differences, color=LINE_COLORS[0], alpha=BAND, linewidth=0, label="samples")
     for side in sides:
-        label = "first order" if side is sides[0] else None
-        deviation.plot(time, side * 10.0**-away, color=GRAY, linewidth=0.9, linestyle=(0, (4, 2)), label=label)
+        entry = "first order" if side is sides[0] else None
+        deviation.plot(time, side * 10.0**-away, color=GRAY, linewidth=0.9, linestyle=(0, (4, 2)), label=entry)
     deviation.axhline(0.0, color=LINE_COLORS[0], linewidth=0.8)
     deviation.set_ylabel(rf"$\Delta$ {label}  ({unit_label(units, order, away)})")
     if f"{name}_share" in spread:
