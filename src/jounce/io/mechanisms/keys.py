@@ -17,9 +17,6 @@ from jounce.constraints.friction import Friction
 from jounce.io.files.located_data import Location
 from jounce.modules import is_ours
 
-ROLES = {"joints": "joint", "drivers": "driver", "forces": "force", "initial": "driver"}
-"""The sections of a file that hold what is told apart by ``type``, and the role of each."""
-
 NESTED: Mapping[str, type[Any]] = {"friction": Friction}
 """What a field of this name has, in a file a mapping of the fields of its class."""
 
