@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike, fspath
+from typing import Any
 
 import numpy as np
 
@@ -206,10 +207,11 @@ def _planar(reader: str, name: str, element: Element) -> TheirJoint:
 
 def _of_mjcf(path: str | PathLike[str], robot: Robot) -> Iterator[TheirJoint]:
     """Give the joints of an MJCF file by their number in MuJoCo; what they became stands in the same order."""
-    import mujoco
+    import mujoco as package
 
     from jounce.io.robots.mjcf_files import quiet_mujoco
 
+    mujoco: Any = package
     with quiet_mujoco(mujoco):
         spec = mujoco.MjSpec.from_file(fspath(path))
     names = [joint.name or f"joint_{number}" for number, joint in enumerate(spec.joints)]
