@@ -50,18 +50,18 @@ def altered() -> str | None:
     True
     """
     note()
-    for place, (thing, held, tables) in list(_held.items()):
+    for name_of, (thing, held, tables) in list(_held.items()):
         space = dict(vars(thing))
         for name, value in held.items():
             if space.get(name) is not value and _counts(thing, name, value):
-                return f"{place}.{name}"
+                return f"{name_of}.{name}"
         for name, entries in tables.items():
             if not _same(entries, _entries(space[name])):
-                return f"{place}.{name}"
+                return f"{name_of}.{name}"
         if isinstance(thing, type) and len(space) != len(held):
             for name, value in space.items():
                 if name not in held and _counts(thing, name, value):
-                    return f"{place}.{name}"
+                    return f"{name_of}.{name}"
     return None
 
 

@@ -150,17 +150,17 @@ def unknown(what: str, given: object, valid: Iterable[str]) -> str:
 
 
 def check_name(
-    kind: str, given: object, known: Collection[str], error: type[JounceError], what: str = "name", **place: Any
+    kind: str, given: object, known: Collection[str], error: type[JounceError], what: str = "name", **location: Any
 ) -> None:
-    """Raise an error unless something of a kind has the name given; `place` says where it was given."""
+    """Raise an error unless something of a kind has the name given; `location` says where it was given."""
     if given not in known:
-        raise error(no_such(kind, given, known, what), value=given, **place)
+        raise error(no_such(kind, given, known, what), value=given, **location)
 
 
-def check_choice(field: str, value: object, valid: Collection[str], error: type[JounceError], **place: Any) -> None:
-    """Raise an error unless a word, such as the name of a frame, is one of those valid; `place` is the field's name."""
+def check_choice(field: str, value: object, valid: Collection[str], error: type[JounceError], **location: Any) -> None:
+    """Raise an error unless a word, such as the name of a frame, is valid; `location` is the field's name."""
     if value not in valid:
-        raise error(unknown(field, value, valid), value=value, **{"name": field, **place})
+        raise error(unknown(field, value, valid), value=value, **{"name": field, **location})
 
 
 def whole_number(name: str, value: object, least: int = 0, most: int | None = None, *, error: type[JounceError]) -> int:
@@ -245,16 +245,16 @@ class JounceError(Exception):
         self.value = value
 
     def __str__(self) -> str:
-        place = [] if self.path is None else [_printable(shortened(str(self.path)))]
+        location = [] if self.path is None else [_printable(shortened(str(self.path)))]
         if self.line is not None:
-            place.append(f"line {self.line}")
+            location.append(f"line {self.line}")
         if self.name:
-            place.append(_printable(shortened(self.name, 400)))
+            location.append(_printable(shortened(self.name, 400)))
         message = "\n".join(map(_printable, self.message.split("\n")))
         if self.value is not UNSET:  # what is wrong, got this; what to do about it
             problem, semicolon, advice = message.partition("; ")
             message = f"{problem}, got {show_value(self.value)}{semicolon}{advice}"
-        return f"{', '.join(place)}: {message}" if place else message
+        return f"{', '.join(location)}: {message}" if location else message
 
     def located(
         self, *, path: object = None, line: int | None = None, name: str | None = None, value: Any = UNSET
@@ -275,8 +275,8 @@ class ExpressionError(JounceError):
     ``column`` counts from 1 within the expression; it is None where no single place is at fault.
     """
 
-    def __init__(self, message: str, *, column: int | None = None, **place: Any) -> None:
-        super().__init__(message, **place)
+    def __init__(self, message: str, *, column: int | None = None, **location: Any) -> None:
+        super().__init__(message, **location)
         self.column = column
 
 
@@ -307,8 +307,8 @@ class MobilityError(MechanismError):
     about themselves, on the bodies, by body, where all degrees of freedom left are of that kind.
     """
 
-    def __init__(self, message: str, *, status: Any = None, idle: Any = None, **place: Any) -> None:
-        super().__init__(message, **place)
+    def __init__(self, message: str, *, status: Any = None, idle: Any = None, **location: Any) -> None:
+        super().__init__(message, **location)
         self.status, self.idle = status, idle or {}
 
 
@@ -393,8 +393,8 @@ class SolveError(JounceError):
     ``Motion.status``.
     """
 
-    def __init__(self, message: str, *, motion: Any = None, status: Any = None, **place: Any) -> None:
-        super().__init__(message, **place)
+    def __init__(self, message: str, *, motion: Any = None, status: Any = None, **location: Any) -> None:
+        super().__init__(message, **location)
         self.motion = motion
         self.status = status
 
@@ -405,14 +405,14 @@ class AssemblyError(SolveError):
     ``details`` is all that is known of it, where the message is a short one; the command tells it with ``--verbose``.
     """
 
-    def __init__(self, message: str, *, details: str = "", **place: Any) -> None:
-        super().__init__(message, **place)
+    def __init__(self, message: str, *, details: str = "", **location: Any) -> None:
+        super().__init__(message, **location)
         self.details = details
 
 
 class DesignError(SolveError):
     """No design was found that moves and meets the conditions; `design` is the one nearest to that, if there is one."""
 
-    def __init__(self, message: str, *, design: Any = None, **place: Any) -> None:
-        super().__init__(message, **place)
+    def __init__(self, message: str, *, design: Any = None, **location: Any) -> None:
+        super().__init__(message, **location)
         self.design = design

@@ -1,6 +1,6 @@
-"""What may happen to the process: that it is told to stop, or forked.
+"""Signals that stop the process, and forks of it.
 
-The command ends when it is told to stop: at once, with a status that says so, and nothing half written.
+A signal to stop ends the command at once, with a status that says so, and nothing half written.
 
 `KeyboardInterrupt` is no way to end a program that computes in JAX: raised in a callback of the tracer or the collector
 it is lost, and the command goes on; raised while XLA's threads compile, the interpreter is taken down under them. So

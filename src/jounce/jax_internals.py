@@ -99,7 +99,7 @@ def description_reader(reader: type) -> type:
 
 
 def use_file_cache(make: Callable[[str], tuple[Any, str]]) -> bool:
-    """Have JAX keep its own programs in what a function makes for a path; tell whether this release can be told so."""
+    """Have JAX keep its own programs in what a function makes for a path; tell whether this release supports that."""
     from jax._src import compilation_cache
 
     if known := hasattr(compilation_cache, "get_file_cache"):
@@ -118,5 +118,5 @@ def sizes_of_scan(equation: Any) -> tuple[int, int]:
     def alike(outer: Sequence[Any], inside: Sequence[Any]) -> int:
         return sum(x.aval.ndim == y.aval.ndim for x, y in zip(outer, inside, strict=True))
 
-    carried = alike(equation.outvars, inner.outvars)
-    return alike(equation.invars, inner.invars) - carried, carried
+    carry = alike(equation.outvars, inner.outvars)
+    return alike(equation.invars, inner.invars) - carry, carry

@@ -1,7 +1,7 @@
 """The settings of JAX and NumPy under which this package computes, however they are set up around it.
 
-JAX computes in single precision unless it is told otherwise, stops at numbers that are not finite where it is told to
-look for them, and takes hours where it is not to compile. What it is told holds for a thread or for the whole process,
+JAX computes in single precision by default, stops at numbers that are not finite where its settings ask it to
+look for them, and takes hours where it is not to compile. Its settings hold for a thread or for the whole process,
 which belongs to whoever imports this package. So the settings of the process are left alone: what a room offers, and
 all that its objects can do, computes in a context of its own, entered at the first of nested calls. Threads, which
 inherit no context, enter it for themselves.
@@ -46,7 +46,7 @@ LEFT_ALONE = frozenset({"tree_flatten", "tree_unflatten", "mro"})
 
 
 FLOATING_POINT = {"divide": "warn", "over": "warn", "invalid": "warn", "under": "ignore"}
-"""What NumPy does by default where numbers are not finite; it is told to ignore it where that is no error."""
+"""What NumPy does by default where numbers are not finite; operations where that is no error ignore it."""
 
 
 class _Thread(threading.local):
@@ -70,20 +70,20 @@ class _OwnSettings:
                 "start of the program, or put `with jax.enable_x64(True):` around the call of the transformed function"
             )
         others: list[AbstractContextManager[Any]] = [
-            state(value) for state, value in _states if (found := state.value) is not None and found != value
+            state(value) for state, value in _states if (current := state.value) is not None and current != value
         ]
-        if (told := np.geterr()) != FLOATING_POINT:
-            quiet: Any = {kind: "ignore" if told[kind] == "ignore" else does for kind, does in FLOATING_POINT.items()}
+        if (given := np.geterr()) != FLOATING_POINT:
+            quiet: Any = {kind: "ignore" if given[kind] == "ignore" else does for kind, does in FLOATING_POINT.items()}
             others.append(np.errstate(**quiet))
         for other in others:
             other.__enter__()
         self._before = others, _thread.computing
         _thread.computing = True
 
-    def __exit__(self, kind: Any, error: BaseException | None, place: Any) -> None:
+    def __exit__(self, kind: Any, error: BaseException | None, traceback: Any) -> None:
         others, _thread.computing = self._before
         for other in others[::-1]:
-            other.__exit__(kind, error, place)
+            other.__exit__(kind, error, traceback)
         if isinstance(error, AssertionError | RuntimeError):
             _check_device(error)
 
@@ -102,18 +102,18 @@ def check_process() -> None:
 
 
 def _check_device(error: BaseException) -> None:
-    """Raise UnsupportedError if that is why JAX failed: it is told to compute on what this machine does not have.
+    """Raise UnsupportedError if JAX failed because its settings name a device that this machine does not have.
 
     Looking beforehand would start the device, and JAX's threads with it, where nothing computes, as on import.
     """
-    chosen, told = config.default_device.value, config.jax_platforms.value
+    chosen, platforms = config.default_device.value, config.jax_platforms.value
     chosen = chosen if isinstance(chosen, str) else None
     try:
         jax.devices(chosen)
     except (AssertionError, RuntimeError):
-        option, value = ("jax_default_device", chosen) if chosen else ("JAX_PLATFORMS", told)
+        option, value = ("jax_default_device", chosen) if chosen else ("JAX_PLATFORMS", platforms)
         raise UnsupportedError(
-            "JAX is told to compute on a device that it does not find here; leave it the choice, have it "
+            "JAX is set to compute on a device that it does not find here; leave it the choice, have it "
             'compute on the processor ("cpu"), or install the release of JAX for that device',
             name=option,
             value=value,
@@ -127,7 +127,7 @@ def own_settings() -> AbstractContextManager[Any]:
     ------
     UnsupportedError
         Within a transformation of JAX in single precision: its values are rounded already, and so would results be.
-        Where JAX is told to compute on a device that this machine does not have.
+        Where JAX is set to compute on a device that this machine does not have.
 
     Examples
     --------
@@ -206,16 +206,16 @@ def called_back(function: Callable[[Any], Any], shapes: Any, values: Any, *, vma
 
     @under_own_settings
     def of_words(words: Any) -> Any:
-        found = function(jax.tree.map(lambda x: np.ascontiguousarray(x).view(np.float64)[..., 0], words))
-        return jax.tree.map(lambda x, shape: _words(np.asarray(x, shape.dtype)), found, shapes)
+        result = function(jax.tree.map(lambda x: np.ascontiguousarray(x).view(np.float64)[..., 0], words))
+        return jax.tree.map(lambda x, shape: _words(np.asarray(x, shape.dtype)), result, shapes)
 
     def as_words(shape: Any) -> jax.ShapeDtypeStruct:
         return jax.ShapeDtypeStruct((*shape.shape, 2), np.uint32) if _is_wide(shape) else shape
 
     words = jax.tree.map(lambda x: jax.lax.bitcast_convert_type(jnp.asarray(x, float), np.uint32), values)
-    found = jax.pure_callback(of_words, jax.tree.map(as_words, shapes), words, vmap_method=vmap_method)
+    result = jax.pure_callback(of_words, jax.tree.map(as_words, shapes), words, vmap_method=vmap_method)
     return jax.tree.map(
-        lambda x, shape: jax.lax.bitcast_convert_type(x, shape.dtype) if _is_wide(shape) else x, found, shapes
+        lambda x, shape: jax.lax.bitcast_convert_type(x, shape.dtype) if _is_wide(shape) else x, result, shapes
     )
 
 
@@ -251,8 +251,8 @@ def cover_new_modules() -> None:
 
     A room above may be the first to import a module of one below.
     """
-    rooms = tuple(f"{room}." for room in _rooms)
-    for name in [name for name in list(sys.modules) if name.startswith(rooms) and name not in _modules]:
+    prefixes = tuple(f"{room}." for room in _rooms)
+    for name in [name for name in list(sys.modules) if name.startswith(prefixes) and name not in _modules]:
         _modules.add(name)
         for value in list(vars(sys.modules[name]).values()):
             if inspect.isclass(value) and value.__module__ == name:

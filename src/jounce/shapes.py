@@ -42,7 +42,7 @@ def is_traced(values: Any) -> bool:
 
 
 def real_numbers(
-    name: str | None, values: Any, error: Callable[..., Exception], wanted: str = "real numbers"
+    name: str | None, values: Any, error: Callable[..., Exception], expected: str = "real numbers"
 ) -> np.ndarray:
     """Return values as an array of double precision, the same one if they are one.
 
@@ -52,7 +52,7 @@ def real_numbers(
         That given, if they are no real numbers in one rectangular array: text, truth values, dates, durations, records,
         complex numbers, masked values, or quantities with a unit that is not of SI. NumPy would take most for numbers.
     """
-    return _checked(name, values, error, wanted, timed=False)
+    return _checked(name, values, error, expected, timed=False)
 
 
 def real_or_traced(name: str | None, values: Any, error: Callable[..., Exception], *, timed: bool = False) -> Any:
@@ -70,7 +70,9 @@ def real_or_traced(name: str | None, values: Any, error: Callable[..., Exception
     return (seconds if timed else real_numbers)(name, values, error)
 
 
-def seconds(name: str | None, values: Any, error: Callable[..., Exception], wanted: str = "real numbers") -> np.ndarray:
+def seconds(
+    name: str | None, values: Any, error: Callable[..., Exception], expected: str = "real numbers"
+) -> np.ndarray:
     """Return instants as `real_numbers` does, durations and quantities of time converted to seconds.
 
     Dates are refused: which of them is time zero is for the user to say.
@@ -80,16 +82,18 @@ def seconds(name: str | None, values: Any, error: Callable[..., Exception], want
     >>> seconds("time", np.array([0, 500], "timedelta64[ms]"), ValueError).tolist()
     [0.0, 0.5]
     """
-    return _checked(name, values, error, wanted, timed=True)
+    return _checked(name, values, error, expected, timed=True)
 
 
-def _checked(name: str | None, values: Any, error: Callable[..., Exception], wanted: str, *, timed: bool) -> np.ndarray:
+def _checked(
+    name: str | None, values: Any, error: Callable[..., Exception], expected: str, *, timed: bool
+) -> np.ndarray:
     try:
         return _numbers(values, timed)
     except _NoNumbersError as reason:
-        raise error(f"must be {wanted}{reason}", name=name, value=values) from None
+        raise error(f"must be {expected}{reason}", name=name, value=values) from None
     except (TypeError, ValueError, OverflowError):
-        raise error(f"must be {wanted}", name=name, value=values) from None
+        raise error(f"must be {expected}", name=name, value=values) from None
 
 
 class _NoNumbersError(Exception):
@@ -142,10 +146,10 @@ def _unit_free(values: Any, timed: bool) -> Any:
     if not timed:
         raise _NoNumbersError(f"these have the unit {own or 1}: convert them to SI units, and give plain numbers")
     try:
-        found: Any = bare.to("s")
+        in_seconds: Any = bare.to("s")
     except Exception:  # noqa: BLE001 - the errors of libraries of units have no common base
         raise _NoNumbersError(f"these have the unit {own or 1}, which is none of time") from None
-    return found.magnitude if hasattr(found, "magnitude") else found.value
+    return in_seconds.magnitude if hasattr(in_seconds, "magnitude") else in_seconds.value
 
 
 _PLAIN = {float, int, np.float64, np.int64}

@@ -10,7 +10,7 @@ import zlib
 
 import pytest
 
-from jounce.cli.compiled_programs import JaxEntries
+from jounce.cli.compiled_programs import JaxProgramFolder
 from jounce.execution import compilation, store
 from jounce.execution.program_folder import ProgramFolder
 from jounce.private_folder import PrivateFolder
@@ -20,7 +20,7 @@ FOUR_BAR = pathlib.Path(__file__).resolve().parents[2] / "examples" / "four_bar.
 
 
 def test_jax_takes_nothing_from_its_own_store_where_a_program_is_to_be_kept(tmp_path):
-    entries = JaxEntries(PrivateFolder(tmp_path))
+    entries = JaxProgramFolder(PrivateFolder(tmp_path))
     entries.put("key", PROGRAM)
     with compilation.compiling_anew():
         assert entries.get("key") is None

@@ -198,7 +198,7 @@ def test_a_device_that_is_not_there_is_refused():
     done = run("-m", "jounce", "run", "examples/four_bar.yaml", JAX_PLATFORMS="abacus", JOUNCE_CACHE_DIR="")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("error: ")
-    assert "JAX_PLATFORMS: JAX is told to compute on a device that it does not find here, got 'abacus'" in done.stderr
+    assert "JAX_PLATFORMS: JAX is set to compute on a device that it does not find here, got 'abacus'" in done.stderr
     assert done.stderr.count("\n") == 1
 
 

@@ -1,5 +1,6 @@
 """Promises that the project makes about itself: the two commands, the pins, the size of files, plain text."""
 
+import importlib.util
 import pathlib
 import re
 import subprocess
@@ -95,3 +96,33 @@ def test_every_requirement_says_what_it_needs_at_least():
     every = project["dependencies"] + [x for extra in project["optional-dependencies"].values() for x in extra]
     every = [entry for entry in every if not entry.startswith("jounce[")]  # extras of its own
     assert [entry for entry in every if ">=" not in entry] == []
+
+
+def check_names():
+    spec = importlib.util.spec_from_file_location("check_names", ROOT / ".ci" / "check_names.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_names_say_what_they_hold():
+    assert list(check_names().reports(ROOT)) == []
+
+
+def test_a_name_that_says_little_is_reported_with_its_line(tmp_path):
+    (tmp_path / ".ci").mkdir()
+    (tmp_path / ".ci" / "names.txt").write_text("told->reported\n")
+    (tmp_path / "src" / "jounce").mkdir(parents=True)
+    (tmp_path / "src" / "jounce" / "module.py").write_text(
+        "untold = 1\n\n\ndef f(x):\n    _told = x.told\n    return _told\n"
+    )
+    assert list(check_names().reports(tmp_path)) == ["src/jounce/module.py:5: the name _told says little: reported"]
+
+
+def test_words_are_a_dictionary_of_codespell():
+    lines = [
+        *(ROOT / ".ci" / "words.txt").read_text().splitlines(),
+        *(ROOT / ".ci" / "names.txt").read_text().splitlines(),
+    ]
+    assert all(re.fullmatch(r"[a-z]+->\S.*", line) for line in lines)
+    assert "rehearsal->compilation in the background," in lines

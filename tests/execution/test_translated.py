@@ -39,7 +39,7 @@ def few(x, *_, **__):
 
 
 def program():
-    return Compiled(logistic, ("power",), alone=few)
+    return Compiled(logistic, ("power",), single=few)
 
 
 def expected(x, count, rate=3.5, power=1):
@@ -80,7 +80,7 @@ def test_xla_computes_the_rest(reason, monkeypatch):
 def test_an_operation_without_code_is_left_to_xla(monkeypatch):
     monkeypatch.setattr(backends, "_warned", set())
 
-    @compiled(alone=lambda x: True)
+    @compiled(single=lambda x: True)
     def transformed(x):
         return jax.lax.digamma(x)
 
@@ -97,7 +97,7 @@ def test_what_is_kept_is_loaded_or_made_again(damage, monkeypatch):
     monkeypatch.setattr(store_, "_store", shelf)
     monkeypatch.setattr(structure, "altered", lambda: None)  # whatever other tests of this process have replaced
     for _ in range(2):
-        function = translated.Translated(logistic, (Compiled.__call__,), alone=True)
+        function = translated.Translated(logistic, (Compiled.__call__,), single=True)
         arrays, tree = [x, np.asarray(4)], jax.tree.structure(((x, 4), {}))
         run = function.program((arrays, tree), ((), jax.tree.structure(())), {"power": 2}, large=32, hasty=True)
         check(run(arrays), expected(x, 4, power=2))

@@ -354,7 +354,7 @@ def test_what_models_of_one_structure_share_cannot_be_written():
     first, second = build(four_bar()), build(four_bar(BC=0.15))
     assert first.system.pattern is second.system.pattern
     with pytest.raises(ValueError, match="read-only"):
-        first.system.pattern.places[0] = 0
+        first.system.pattern.entry_indices[0] = 0
 
 
 def test_elements_of_which_some_values_are_traced_are_grouped_as_those_of_numbers():

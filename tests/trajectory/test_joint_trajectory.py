@@ -161,7 +161,7 @@ def test_warning_above_the_degree():
 
 def test_warning_with_too_few_samples_to_compare():
     few = np.linspace(0.0, 2.0, 7)
-    with pytest.warns(SampleWarning, match="cannot be told from them"):
+    with pytest.warns(SampleWarning, match="cannot be known from them"):
         JointTrajectory.from_samples(few, sine(few, 0)[:, None], ["a"]).derivatives([1.0], 1)
 
 

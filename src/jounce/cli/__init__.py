@@ -157,7 +157,7 @@ def _end_at_once(status: int) -> None:
 
 
 def _status(given: list[str], as_json: bool, verbose: bool) -> int:
-    """Return the exit status of a command, whose errors are told, with all that is known of them if verbose."""
+    """Return the exit status of a command, and print its error, with all that is known of it if verbose."""
     try:
         with _settings():
             return _dispatch(given)

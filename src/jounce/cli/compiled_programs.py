@@ -12,7 +12,7 @@ from jounce.execution.program_folder import ProgramFolder, chosen_folder
 from jounce.private_folder import PrivateFolder
 
 
-class JaxEntries(ProgramFolder):
+class JaxProgramFolder(ProgramFolder):
     """The programs that JAX keeps by itself: those that `jounce.execution.store` does not."""
 
     def get(self, key: str) -> bytes | None:
@@ -35,7 +35,7 @@ def keep_programs(folder: PrivateFolder) -> bool:
     from jounce.jax_internals import use_file_cache
 
     def file_cache(path: str) -> Any:
-        return JaxEntries(folder), path
+        return JaxProgramFolder(folder), path
 
     if known := use_file_cache(file_cache):
         ask_before_jax()
@@ -47,7 +47,7 @@ def keep_programs(folder: PrivateFolder) -> bool:
 
 
 def use_compilation_cache(*, quiet: bool = False) -> None:
-    """Keep compiled programs between calls of the command, unless JAX was told where or the folder is out of reach.
+    """Keep compiled programs between calls of the command, unless JAX has a folder or this one is out of reach.
 
     A folder in which others may write is not used, and a line on standard error says so, unless that is to be `quiet`.
     """

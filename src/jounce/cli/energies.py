@@ -110,15 +110,15 @@ def _peaks(dataset: xarray.Dataset, order: int) -> list[dict[str, Any]]:
 
     from jounce.units.shown_units import derivative_unit
 
-    times, found = dataset["time"].values, []
+    times, arrays = dataset["time"].values, []
     for name, variable in dataset.data_vars.items():
         body = None if name == "energy" else str(name).removeprefix("energy_of_")
         for k, values in enumerate(variable.values.T):
             row: dict[str, Any] = {"body": body, "rate": k, "unit": derivative_unit("J", 2 * order + k)}
             for word, place in (("minimum", np.argmin(values)), ("maximum", np.argmax(values))):
                 row |= {word: float(values[place]), f"{word}_at": float(times[place])}
-            found.append(row)
-    return found
+            arrays.append(row)
+    return arrays
 
 
 def _of_robot(
@@ -157,7 +157,7 @@ def _dataset(times: Any, energy: Any) -> xarray.Dataset:
     from jounce.dynamics.energy.energies import energy_unit
 
     parts = np.asarray(energy.translation) + np.asarray(energy.rotation)
-    found = {"energy": parts.sum(axis=-1)} | {f"energy_of_{n}": parts[..., k] for k, n in enumerate(energy.bodies)}
+    arrays = {"energy": parts.sum(axis=-1)} | {f"energy_of_{n}": parts[..., k] for k, n in enumerate(energy.bodies)}
     units = {"units": energy_unit(energy.order)}
-    variables = {name: (("time", "derivative"), values, units) for name, values in found.items()}
+    variables = {name: (("time", "derivative"), values, units) for name, values in arrays.items()}
     return xarray.Dataset(variables, {"time": times, "derivative": np.arange(parts.shape[-2])})

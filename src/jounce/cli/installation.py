@@ -57,13 +57,13 @@ def doctor(*, json: bool = False) -> int:
 def _versions() -> dict[str, str]:
     from jounce.version import __version__
 
-    found = {"jounce": __version__, "Python": f"{platform.python_version()} ({platform.platform()})"}
+    versions = {"jounce": __version__, "Python": f"{platform.python_version()} ({platform.platform()})"}
     for name in PACKAGES:
         try:
-            found[name] = importlib.metadata.version(name)
+            versions[name] = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+            versions[name] = "not installed"
+    return versions
 
 
 def _machine_code() -> dict[str, str]:
@@ -107,7 +107,7 @@ def _devices() -> dict[str, str]:
 
 def _extras() -> dict[str, str]:
     """Return which optional packages are there, by extra."""
-    found: dict[str, str] = {}
+    extras: dict[str, str] = {}
     needed: dict[str, list[str]] = {}
     for requirement in importlib.metadata.requires("jounce") or ():
         if match := re.match(r"([\w.-]+)[^;]*;.*extra == ['\"]([\w-]+)['\"]", requirement):
@@ -117,8 +117,8 @@ def _extras() -> dict[str, str]:
             continue
         missing = [package for package in packages if package != "jounce" and not _is_installed(package)]
         state = "installed" if not missing else f"missing: {', '.join(missing)}"
-        found[f"extra {extra}"] = state
-    return found
+        extras[f"extra {extra}"] = state
+    return extras
 
 
 def _is_installed(package: str) -> bool:
@@ -143,8 +143,8 @@ def _tests() -> dict[str, float]:
     from jounce.robot import Inertia, inverse_dynamics
     from jounce.robot.construct import JointAxis, from_screws
 
-    def error(found: Any, right: Any) -> float:
-        return float((np.abs(found - right).max(axis=0) / np.abs(right).max(axis=0)).max())
+    def error(value: Any, right: Any) -> float:
+        return float((np.abs(value - right).max(axis=0) / np.abs(right).max(axis=0)).max())
 
     time, rate = np.linspace(0.0, 1.0, 201), 3.0
     crank = Mechanism(

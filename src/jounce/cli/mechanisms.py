@@ -243,11 +243,11 @@ def schema(of: Literal["mechanism", "results"] = "mechanism", /) -> int:
     import json
 
     if of == "results":
-        from jounce.reporting.json.result_schema import result_schema as wanted
+        from jounce.reporting.json.result_schema import result_schema as schema_function
     else:
-        from jounce.io import json_schema as wanted
+        from jounce.io import json_schema as schema_function
 
-    say(json.dumps(wanted(), indent=1))
+    say(json.dumps(schema_function(), indent=1))
     return 0
 
 

@@ -202,7 +202,7 @@ class TableOutput:
             check_writable(self.out, overwrite=self.overwrite)
 
     def write(self, dataset: Callable[[], Any], *, header_units: bool | None = None) -> None:
-        """Write the values, an xarray.Dataset, if they are wanted."""
+        """Write the values, an xarray.Dataset, if they are requested."""
         if (out := self.out) is not None:
             from jounce.io import write
 

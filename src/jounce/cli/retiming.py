@@ -105,9 +105,9 @@ def retime(
 
         check_figure(figure, overwrite=output.overwrite)
     frequency = frequency_of(rate)
-    asked: dict[str, Any] = {"order": order} | ({} if cells is None else {"cells": cells})
-    asked |= {} if deviation is None else {"deviation": deviation_of(deviation)}
-    asked |= {} if duration is None else {"duration": duration_of(duration)}
+    settings: dict[str, Any] = {"order": order} | ({} if cells is None else {"cells": cells})
+    settings |= {} if deviation is None else {"deviation": deviation_of(deviation)}
+    settings |= {} if duration is None else {"duration": duration_of(duration)}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SampleWarning)
         if (running is None) != (at is None):
@@ -124,7 +124,7 @@ def retime(
             if path is not None or repair or deviation is not None:
                 name = "--repair" if repair else "path" if path is not None else "--deviation"
                 raise JounceError("the path of a mechanism is that of its drivers, which is not repaired", name=name)
-            result = _of_mechanism(file, limits, frequency, asked, reading)
+            result = _of_mechanism(file, limits, frequency, settings, reading)
         else:
             if path is None:
                 raise JounceError("a robot needs a path; give its file", name="path")
@@ -133,7 +133,7 @@ def retime(
                 path,
                 limits,
                 frequency,
-                asked | {"repair": repair, "hand_over": hand_over},
+                settings | {"repair": repair, "hand_over": hand_over},
                 reading,
                 output,
                 None if running is None or at is None else (running, instant_of(at)),
@@ -189,7 +189,7 @@ class _Result:
     read: Any = None
 
 
-def _of_mechanism(file: Path, limits: Path | None, rate: float, asked: Any, reading: RobotReading) -> _Result:
+def _of_mechanism(file: Path, limits: Path | None, rate: float, settings: Any, reading: RobotReading) -> _Result:
     from jounce.io import load, load_drive_limits
     from jounce.planning import retime as find
 
@@ -199,7 +199,7 @@ def _of_mechanism(file: Path, limits: Path | None, rate: float, asked: Any, read
         raise JounceError("a mechanism has no limits of its own; give a file of limits with --limits", path=file)
     bounds = load_drive_limits(limits, mechanism)
     with errors_about(file):
-        retimed = find(mechanism, None, bounds, **asked)
+        retimed = find(mechanism, None, bounds, **settings)
     from jounce.mechanism import TimeGrid, time_grid
 
     retimed.times = time_grid(TimeGrid(0.0, retimed.stop, 1 / rate), {})
@@ -211,7 +211,7 @@ def _of_robot(
     path: Path,
     limits: Path | None,
     rate: float,
-    asked: Any,
+    settings: Any,
     reading: RobotReading,
     output: TableOutput,
     running: tuple[Path, float] | None,
@@ -231,13 +231,13 @@ def _of_robot(
             path, reading.degree, allowed(reading.allow), topic=reading.topic, robot=model, only=reading.chosen
         )
     if running is not None:
-        asked = asked | {"state": _state(model, given.names, running, reading)}
+        settings = settings | {"state": _state(model, given.names, running, reading)}
     spare_inputs(output.out, overwrite=output.overwrite)
     with errors_about(path, file):
-        retimed = find(model, given, bounds, **asked)
+        retimed = find(model, given, bounds, **settings)
         free, read = retimed.stop, None
         if output.out is not None:
-            retimed, read = _at_rate(model, retimed, bounds, rate, reading.degree, "duration" in asked)
+            retimed, read = _at_rate(model, retimed, bounds, rate, reading.degree, "duration" in settings)
     return _Result(retimed, free, given.stop - given.start if isinstance(given, JointTrajectory) else None, read)
 
 

@@ -179,7 +179,7 @@ def _torques_at_breaks(robot: Any, motion: Any, rates: int, *, drives: bool) -> 
     if not len(sides):
         return None
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SampleWarning)  # told of all instants
+        warnings.simplefilter("ignore", SampleWarning)  # the message covers all instants
         torques_there = trajectory_torques(robot, motion, rates, times=sides, drives=drives)
     return torques_there.assign_coords(time=breaks[which])
 

@@ -135,16 +135,16 @@ def _table(
             check_name("joint or driver", joint, (*mechanism.joints, *mechanism.drivers), MechanismError, name="joint")
     motion = moved(mechanism, file, order)
     with errors_about(file):
-        found = constraint_equations(motion)
+        dataset = constraint_equations(motion)
     if joint is not None:
-        found = found.sel(row=[row for row in found.row.values if row.rpartition(".")[0] == joint])
+        dataset = dataset.sel(row=[row for row in dataset.row.values if row.rpartition(".")[0] == joint])
 
     def put() -> None:
         if out.suffix.lower() == ".json":
             with replacing(out, overwrite=overwrite) as scratch:
-                scratch.write_text(as_json(found), encoding="utf-8")
+                scratch.write_text(as_json(dataset), encoding="utf-8")
         else:
-            write(found if out.suffix.lower() == ".nc" else columns(found), out, overwrite=overwrite)
+            write(dataset if out.suffix.lower() == ".nc" else columns(dataset), out, overwrite=overwrite)
 
     _written(put, out)
     return outcome(motion, file)

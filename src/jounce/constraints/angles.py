@@ -23,7 +23,7 @@ from jounce.modules import Module
 from jounce.rigid.spatial import SpatialPose, body_axes
 from jounce.shapes import Numbers
 
-SMALLEST_COSINE = 1e-6  # of half the tilt of the axis: below it the tilt is half a turn, and no angle is told
+SMALLEST_COSINE = 1e-6  # of half the tilt of the axis: below it the tilt is half a turn, and the angle is undefined
 
 
 Vectors = Float[Numbers, "3 *#batch"]

@@ -175,15 +175,15 @@ class AbstractConstraint(Module):
         time : Jet
             In s.
         """
-        moved = [k for k, change in enumerate(changes) if change is not None]
+        varied = [k for k, change in enumerate(changes) if change is not None]
 
         def residual(*poses: Any) -> Jet:
             placed = list(bodies)
-            for k, pose in zip(moved, poses, strict=True):
+            for k, pose in zip(varied, poses, strict=True):
                 placed[k] = pose
             return self.residual(*placed, time)
 
-        return jax.jvp(residual, tuple(bodies[k] for k in moved), tuple(changes[k] for k in moved))[1]
+        return jax.jvp(residual, tuple(bodies[k] for k in varied), tuple(changes[k] for k in varied))[1]
 
     def admissible(self, time: Jet) -> Bool[Numbers, "..."]:
         """Tell at which instants the motion law, if there is one, has a permitted value: a finite one, unless more."""
@@ -202,8 +202,8 @@ def catalogue(space: str, role: str) -> dict[str, type[Any]]:
     >>> sorted(catalogue("planar", "driver"))
     ['coordinate', 'distance', 'slide']
     """
-    found = {name: _last_whole(kinds) for name, kinds in _REGISTRY.get((space, role), {}).items()}
-    return {name: kind for name, kind in found.items() if kind is not None}
+    kinds_by_name = {name: _last_whole(kinds) for name, kinds in _REGISTRY.get((space, role), {}).items()}
+    return {name: kind for name, kind in kinds_by_name.items() if kind is not None}
 
 
 def _last_whole(kinds: tuple[type[Any], ...]) -> type[Any] | None:

@@ -156,18 +156,18 @@ def facts_of(kind: type[Any]) -> Facts:
         if field.name in NAMES:
             message = f"no field of {kind.__qualname__} may have this name, by which a class states a fact; rename it"
             raise MechanismError(message, name="field", value=field.name)
-    found = Facts(
+    facts = Facts(
         dimensions={name: _of_field(kind, "dimensions", name, "any") for name in fields},
         signs={name: _of_field(kind, "signs", name, "any") for name in fields},
-        choices={name: told for name in fields if (told := _of_field(kind, "choices", name, ()))},
+        choices={name: choices for name in fields if (choices := _of_field(kind, "choices", name, ()))},
         held_parallel=tuple(map(tuple, getattr(kind, "held_parallel", ()))),
         never_parallel=tuple(map(tuple, getattr(kind, "never_parallel", ()))),
         squared_distance=_of_residual(kind, "squared_distance"),
         symbol=getattr(kind, "symbol", ""),
         pair=_of_residual(kind, "pair"),
     )
-    _check(kind, found, fields)
-    return found
+    _check(kind, facts, fields)
+    return facts
 
 
 def _of_field(kind: type[Any], fact: str, field: str, otherwise: Any) -> Any:

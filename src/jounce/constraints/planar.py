@@ -255,14 +255,14 @@ class Gear(AbstractConstraint, type="gear", space="planar"):
         if self.ratio is not None:
             return _turned(self, body_i, body_j, others[0].angle, self.ratio)
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
-        ratio, apart = -self.radius_i / self.radius_j, self.radius_i + self.radius_j
-        d = d + _aside(d, apart)
+        ratio, center_distance = -self.radius_i / self.radius_j, self.radius_i + self.radius_j
+        d = d + _aside(d, center_distance)
         excess = _turned_on_line(self, body_i, body_j, others, d, ratio)
         if self.flank is None or self.pressure_angle is None:
             return excess
         # how far the centers may part, which they never do: across it, the tooth force is along the line of action
-        parted = sqrt(d.dot(d)) - jnp.abs(apart)
-        side = -self.flank * jnp.sign(apart) / jnp.abs(self.radius_j)
+        parted = sqrt(d.dot(d)) - jnp.abs(center_distance)
+        side = -self.flank * jnp.sign(center_distance) / jnp.abs(self.radius_j)
         return excess + side * jnp.tan(self.pressure_angle) * parted
 
 
@@ -284,7 +284,7 @@ def _turned(joint: Any, body_i: PlanarPose, body_j: PlanarPose, line: Jet, ratio
 
 
 def _aside(d: Jet, distance: Any) -> Any:
-    """Return what parts centers of gears that a starting guess has in one place, where no line of centers is told."""
+    """Return an offset of centers of gears that coincide in a guess, where the line of centers is undefined."""
     value = d.coefficients[0]
     together = (value == 0).all(axis=0)
     return jnp.where(together, jnp.abs(distance), 0.0)[None] * np.array([1.0, 0.0]).reshape(2, *[1] * together.ndim)

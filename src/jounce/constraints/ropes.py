@@ -59,9 +59,9 @@ class Rope(AbstractConstraint, type="rope"):
     def residual(self, *bodies_and_time: Any) -> Jet:
         """Return by how much the distances from point to point exceed the length, m."""
         *bodies, _ = bodies_and_time
-        places = [bodies[slot].point(self.points[k]) for k, slot in enumerate(self.slots or range(len(bodies)))]
-        spans = [after - before for before, after in pairwise(places)]
-        return total(sqrt(span.dot(span)) for span in spans) - self.length
+        points = [bodies[slot].point(self.points[k]) for k, slot in enumerate(self.slots or range(len(bodies)))]
+        segments = [after - before for before, after in pairwise(points)]
+        return total(sqrt(segment.dot(segment)) for segment in segments) - self.length
 
     def line_force(self) -> float:
         """Return the tension, N, for a multiplier."""

@@ -44,15 +44,15 @@ class Wheel(AbstractConstraint, type="wheel", space="spatial"):
 
     def variation(self, bodies: tuple[Any, ...], changes: tuple[Any, ...], time: Jet) -> Jet:
         """Return the varied height, and by how much the touching points slip on each other by displacements."""
-        moved = [k for k, change in enumerate(changes) if change is not None]
+        varied = [k for k, change in enumerate(changes) if change is not None]
 
         def height(*poses: Any) -> Jet:
             placed = list(bodies)
-            for k, pose in zip(moved, poses, strict=True):
+            for k, pose in zip(varied, poses, strict=True):
                 placed[k] = pose
             return self._height(*placed)
 
-        raised = jax.jvp(height, tuple(bodies[k] for k in moved), tuple(changes[k] for k in moved))[1]
+        raised = jax.jvp(height, tuple(bodies[k] for k in varied), tuple(changes[k] for k in varied))[1]
         still = Jet.constant(jnp.zeros_like(bodies[0].position.coefficients[0]), bodies[0].order)
         moving = [
             (still, still) if change is None else (change.position, body.direction(body.turning(change)))

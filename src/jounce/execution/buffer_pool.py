@@ -37,11 +37,11 @@ def bytes_needed(shapes: Sequence[Sequence[int]]) -> int:
 
 def arrays_in(block: np.ndarray, shapes: Sequence[Sequence[int]], kinds: Sequence[type]) -> list[np.ndarray]:
     """Return arrays of these shapes and types, of eight bytes, one after another in a block."""
-    place, found = -block.ctypes.data % LINE, []
+    index, result = -block.ctypes.data % LINE, []
     for shape, kind in zip(shapes, kinds, strict=True):
-        found.append(block[place : place + math.prod(shape) * ENTRY].view(kind).reshape(shape))
-        place += _lines(shape)
-    return found
+        result.append(block[index : index + math.prod(shape) * ENTRY].view(kind).reshape(shape))
+        index += _lines(shape)
+    return result
 
 
 def _lines(shape: Sequence[int]) -> int:

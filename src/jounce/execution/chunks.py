@@ -9,14 +9,17 @@ from jaxtyping import Int
 
 from jounce.execution.threads import Threads, thread_count
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 WIDTHS = (256,)  # instants: one program serves a motion, its peaks and a long grid
 
 
 def in_chunks(
-    function: Callable[[Int[np.ndarray, " chunk"]], Found], count: int, widths: tuple[int, ...] = WIDTHS, axis: int = -1
-) -> Found:
+    function: Callable[[Int[np.ndarray, " chunk"]], Result],
+    count: int,
+    widths: tuple[int, ...] = WIDTHS,
+    axis: int = -1,
+) -> Result:
     """Return what a function of indices of instants gives, for all of them; few lengths of chunks are compiled.
 
     Chunks are computed in several threads at once; the function must let them.

@@ -32,7 +32,7 @@ from jounce.settings import check_process, under_own_settings
 LARGE = 32  # numbers of an array that stays in memory in machine code of one instant
 _NOTHING = jax.tree.structure(())
 _thread = threading.local()
-_asked = False  # whether JAX's own store, where it has one, asks `compiles_anew`
+_requested = False  # whether JAX's own store, where it has one, asks `compiles_anew`
 
 
 @contextmanager
@@ -55,14 +55,14 @@ def compiles_anew() -> bool:
 
 def ask_before_jax() -> None:
     """Take note that JAX's own store asks `compiles_anew`."""
-    global _asked
-    _asked = True
+    global _requested
+    _requested = True
 
 
 def _store_of_xla() -> Store | None:
     """Return the store of what XLA compiles; None where JAX has a store of its own, or a device that was chosen."""
     config: Any = jax.config
-    elsewhere = config.jax_compilation_cache_dir is not None and not _asked
+    elsewhere = config.jax_compilation_cache_dir is not None and not _requested
     return None if elsewhere or config.jax_default_device is not None else current_store()
 
 
@@ -129,7 +129,7 @@ class Compiled:
         Whether a command calls it so seldom, or has it compute so little, that it waits longer for the compiler: then
         LLVM optimizes nothing in machine code, in a seventh of the time; nor in XLA's where code is wanted soon, in
         half the time.
-    alone : bool or callable, optional
+    single : bool or callable, optional
         Whether machine code, all in one piece, is better where there is a compiler for it; or what tells that from the
         arguments.
     otherwise : mapping of str to object, optional
@@ -144,14 +144,14 @@ class Compiled:
         *,
         narrow: bool = False,
         brief: bool = False,
-        alone: Callable[..., bool] | bool = False,
+        single: Callable[..., bool] | bool = False,
         otherwise: Mapping[str, Any] | None = None,
     ):
         self.function, self.static, self.made_of = function, static, made_of or (function,)
         self.narrow, self.brief = narrow, brief
         self._programs = ByKey()
-        self._suits_alone, self._otherwise = alone, dict(otherwise or {})
-        self.machine_code = Translated(function, self.made_of, alone=True, brief=brief)
+        self._suits_single, self._otherwise = single, dict(otherwise or {})
+        self.machine_code = Translated(function, self.made_of, single=True, brief=brief)
         self._names = tuple(inspect.signature(function).parameters)
         self._traced = min([self._names.index(name) for name in static], default=len(self._names))
         update_wrapper(self, function)
@@ -202,7 +202,7 @@ class Compiled:
 
     def _code(self, arguments: Any, keywords: Any, static: Mapping[str, Any], leaves: list[Any], tree: Any) -> Any:
         """Return machine code for arguments, None where there is none, or it does not suit them."""
-        suits = self._suits_alone
+        suits = self._suits_single
         if not (suits if isinstance(suits, bool) else suits(*arguments, **keywords, **static)):
             return None
         given, hasty = (list(map(shaped, leaves)), tree), is_wanted_soon()

@@ -131,8 +131,8 @@ class OnXla:
         width = self._block_width(count)
 
         def computed(first: int) -> Any:
-            places = np.minimum(np.arange(first, first + width), count - 1)
-            block = jax.tree.map(lambda x: _taken(x, places, axis), lanes)
+            indices = np.minimum(np.arange(first, first + width), count - 1)
+            block = jax.tree.map(lambda x: _taken(x, indices, axis), lanes)
             return jax.tree.map(np.asarray, self.mapped.on_xla(self.shared, block, self.how))
 
         with Threads(threads) as pool:
@@ -170,17 +170,17 @@ class OnXla:
 
         def run(targets: Int[np.ndarray, "round lane"]) -> None:
             order, total = targets.ravel(), self.width * _power(len(targets))
-            place = np.full(wholes[0].shape[-1], -1)
-            place[order[::-1]] = np.arange(len(order))[::-1]
+            index = np.full(wholes[0].shape[-1], -1)
+            index[order[::-1]] = np.arange(len(order))[::-1]
             source = sources[order]
-            before = np.unique(source[place[source] < 0])  # those that are not solved here
-            source = np.where(place[source] < 0, total + np.searchsorted(before, source), place[source])
+            before = np.unique(source[index[source] < 0])  # those that are not solved here
+            source = np.where(index[source] < 0, total + np.searchsorted(before, source), index[source])
             starts = [_filled(wholes[k][..., before], STARTS * _power(-(-len(before) // STARTS))) for k in links]
             given = [_filled(x[..., order], total) for x in own]
             order_of_rounds = _filled(source, total), np.asarray(len(targets))
             how = links, recorded, self.width, self.form, self.how
-            found = self.mapped.in_rounds(self.shared, starts, (given, held), order_of_rounds, how)
-            for whole, part in zip(wholes, found, strict=True):
+            result = self.mapped.in_rounds(self.shared, starts, (given, held), order_of_rounds, how)
+            for whole, part in zip(wholes, result, strict=True):
                 whole[..., order] = np.asarray(part)[..., : len(order)]
 
         return run
@@ -193,16 +193,16 @@ def _power(count: int) -> int:
 
 def _filled(array: np.ndarray, total: int) -> np.ndarray:
     """Return an array with zeros behind its instants, up to so many."""
-    found = np.zeros((*array.shape[:-1], total), array.dtype)
-    found[..., : array.shape[-1]] = array
-    return found
+    result = np.zeros((*array.shape[:-1], total), array.dtype)
+    result[..., : array.shape[-1]] = array
+    return result
 
 
-def _taken(array: np.ndarray, places: Int[np.ndarray, " lane"], axis: int) -> np.ndarray:
+def _taken(array: np.ndarray, indices: Int[np.ndarray, " lane"], axis: int) -> np.ndarray:
     """Return some instants of an array; zeros where it has none."""
     if array.shape[axis]:
-        return np.take(array, places, axis)
-    return np.zeros((len(places), *array.shape[1:]) if axis == 0 else (*array.shape[:-1], len(places)), array.dtype)
+        return np.take(array, indices, axis)
+    return np.zeros((len(indices), *array.shape[1:]) if axis == 0 else (*array.shape[:-1], len(indices)), array.dtype)
 
 
 class Mapped:
@@ -302,8 +302,8 @@ class Mapped:
         def solved(linked: Sequence[Any], own: Sequence[Any]) -> list[Any]:
             same = [jnp.broadcast_to(jnp.asarray(x), (*x.shape[:-1], width)) for x in held]
             given = jax.tree.unflatten(form, [*linked, *own, *same])
-            found = jax.tree.leaves(self._many(shared, given, **dict(static)))
-            return [found[k] for k in recorded]
+            result = jax.tree.leaves(self._many(shared, given, **dict(static)))
+            return [result[k] for k in recorded]
 
         def some(x: Any, turn: Any) -> Any:
             return jax.lax.dynamic_slice_in_dim(x, turn * width, width, axis=-1)
@@ -319,8 +319,8 @@ class Mapped:
         stored = [jnp.zeros((*x.shape[:-1], total), x.dtype) for x in shapes]
         for k, start in zip(links, starts, strict=True):
             stored[k] = jnp.concatenate([stored[k], start], axis=-1)
-        found = jax.lax.fori_loop(0, turns, go_on, stored)
-        return [x[..., :total] for x in found]
+        result = jax.lax.fori_loop(0, turns, go_on, stored)
+        return [x[..., :total] for x in result]
 
 
 def mapped(**how: Any) -> Callable[[Callable[..., Any]], Mapped]:

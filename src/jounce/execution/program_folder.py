@@ -74,9 +74,9 @@ class ProgramFolder:
 
     def _remove_oldest(self) -> None:
         """Remove the programs that were not used for longest, until no more is kept than is allowed."""
-        found = sorted(self._folder.files(ENDING))
-        total = sum(size for _, size, _ in found)
-        for _, size, name in found:
+        result = sorted(self._folder.files(ENDING))
+        total = sum(size for _, size, _ in result)
+        for _, size, name in result:
             if total <= LARGEST:
                 break
             total -= size

@@ -135,14 +135,16 @@ class Descriptions(pickle.Unpickler):
 
     def find_class(self, module: str, name: str) -> Any:
         """Return what a name stands for, if it is a class or what JAX itself makes its own classes with."""
-        room = module.partition(".")[0]
-        if room in (*OURS, *LIBRARIES) and module in sys.modules:
-            found = super().find_class(module, name)
-            ours = room in OURS and isinstance(found, type)
-            plain = room == "numpy" and name in PLAIN
-            of_jax = room.startswith("jax") and (isinstance(found, type) or name.startswith(("_unpickle_", "tracing_")))
+        package = module.partition(".")[0]
+        if package in (*OURS, *LIBRARIES) and module in sys.modules:
+            result = super().find_class(module, name)
+            ours = package in OURS and isinstance(result, type)
+            plain = package == "numpy" and name in PLAIN
+            of_jax = package.startswith("jax") and (
+                isinstance(result, type) or name.startswith(("_unpickle_", "tracing_"))
+            )
             if ours or plain or of_jax:
-                return found
+                return result
         raise pickle.UnpicklingError(f"{module}.{name} is no part of a program")
 
 

@@ -1,4 +1,4 @@
-"""What a program is compiled for, told in words that stay the same from one process to the next.
+"""What a program is compiled for, described in words that stay the same from one process to the next.
 
 Two descriptions may be equal only where the programs are: a wrong program would give wrong numbers without a sign of
 it. So every kind of value that may make a difference is known here, and what is not known has no description: functions
@@ -78,12 +78,12 @@ def _several(values: Any) -> str:
 
 def _own(thing: type | types.FunctionType) -> str:
     """Return the name of a class or a function of this package, by which the same one is found."""
-    found: Any = sys.modules.get(thing.__module__)
-    origin = getattr(getattr(found, "__spec__", None), "origin", None)
+    result: Any = sys.modules.get(thing.__module__)
+    origin = getattr(getattr(result, "__spec__", None), "origin", None)
     inside = origin is not None and Path(origin).is_relative_to(PACKAGE)
     for part in thing.__qualname__.split("."):
-        found = getattr(found, part, None)
-    if not inside or thing not in (found, getattr(found, "__wrapped__", None)):  # or what a decorator made of it
+        result = getattr(result, part, None)
+    if not inside or thing not in (result, getattr(result, "__wrapped__", None)):  # or what a decorator made of it
         raise UndescribedError(f"{thing.__module__}.{thing.__qualname__}")
     return f"{thing.__module__}.{thing.__qualname__}"
 
@@ -154,8 +154,8 @@ def _files() -> list[Path]:
 @lru_cache(maxsize=1)
 def _changed_file() -> str | None:
     """Return a file that was written after this process had begun, which may have imported another text, or None."""
-    found = {str(file): file.stat() for file in _files()}
-    return next((n for n, x in found.items() if max(x.st_mtime, x.st_ctime) > BEGUN - MARGIN), None)
+    result = {str(file): file.stat() for file in _files()}
+    return next((n for n, x in result.items() if max(x.st_mtime, x.st_ctime) > BEGUN - MARGIN), None)
 
 
 @lru_cache(maxsize=1)

@@ -21,7 +21,7 @@ AHEAD = 2  # results for each thread that may wait to be fetched
 
 
 def thread_count(given: int | Refused | None = None) -> int:
-    """Return how many threads compute: those given, or told by the environment, or the cores that this process has.
+    """Return how many threads compute: those given, or set by the environment, or the cores that this process has.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def thread_count(given: int | Refused | None = None) -> int:
 
 
 def callers_context() -> Callable[[], AbstractContextManager[Any]]:
-    """Return what makes the context of another thread: what JAX is told by `with` holds for one thread only."""
+    """Return what makes the context of another thread: what `with` sets in JAX holds for one thread only."""
     device: Any = getattr(jax.config, "jax_default_device", None)
 
     @contextmanager

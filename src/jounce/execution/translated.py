@@ -49,7 +49,7 @@ class Translated:
         results have; and of static arguments. Alone, of the arguments and keywords that are in the first.
     made_of : tuple of callable
         Functions of the package that say what it computes.
-    alone : bool, default False
+    single : bool, default False
         Whether there is one instant only.
     rows : bool, default False
         Whether arrays of many instants, those given and the results, have the instants along their first axis.
@@ -64,13 +64,13 @@ class Translated:
         function: Callable[..., Any],
         made_of: tuple[Callable[..., Any], ...],
         *,
-        alone: bool = False,
+        single: bool = False,
         rows: bool = False,
         most_lines: int = MOST_LINES,
         brief: bool = False,
     ):
         self.function, self.made_of = function, made_of
-        self._alone, self._rows, self._most_lines, self._brief = alone, rows, most_lines, brief
+        self._single, self._rows, self._most_lines, self._brief = single, rows, most_lines, brief
         self._programs = ByKey()
 
     def __len__(self) -> int:
@@ -100,7 +100,7 @@ class Translated:
         (arrays, structure), (few, form) = shared, lanes
         kinds = tuple([(x.shape, x.dtype) for x in arrays])
         ones = tuple([(self._one(x.shape), x.dtype) for x in few])
-        places: Any = {} if self._alone else {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
+        places: Any = {} if self._single else {k: x for k, x in enumerate(arrays) if x.dtype.kind in "iu" and x.ndim}
         known = tuple([x.tobytes() for x in places.values()])
         static_key = tuple([(name, type(value), value) for name, value in static.items()])
         key = structure, form, kinds, ones, known, large, hasty, static_key, settings()
@@ -121,7 +121,7 @@ class Translated:
         return (*(shape[1:] if self._rows else shape[:-1]), 1)
 
     def _traced(self, given: Any, lanes: Any, **static: Any) -> Any:
-        if not self._alone:
+        if not self._single:
             return self.function(given, lanes, **static)
         _thread.tracing = True
         try:
@@ -134,7 +134,7 @@ class Translated:
     ) -> Single | Program | str | None:
         """Return a program from the store of programs, or one that is made; or the operation that has no code."""
         function = partial(self._traced, **static)
-        options: Any = how | {"most_lines": self._most_lines, "rows": self._rows, "alone": self._alone}
+        options: Any = how | {"most_lines": self._most_lines, "rows": self._rows, "single": self._single}
         options["brief"] = self._brief and sum(leaf.size for leaf in jax.tree.leaves(given)) <= LITTLE
 
         def make() -> tuple[Any, ...]:
@@ -153,12 +153,12 @@ class Translated:
     def _loaded(self, binary: bytes, given: Any, results: Any) -> Single | Program | str | None:
         if not binary:
             return given
-        return Single(binary, given, results) if self._alone else Program(binary, given, results, rows=self._rows)
+        return Single(binary, given, results) if self._single else Program(binary, given, results, rows=self._rows)
 
     def _key(self, given: tuple[Any, Any], places: Mapping[int, np.ndarray], static: dict[str, Any]) -> str | None:
         """Return the name of a program in other processes, None where it holds something of a user's own."""
         leaves, tree = jax.tree.flatten(given)
         kinds = [*((leaf.shape, str(leaf.dtype)) for leaf in leaves), *places.values()]
         with suppress(UndescribedError):
-            return program_key(self.made_of, tree, [*kinds, "alone" if self._alone else "side by side"], static)
+            return program_key(self.made_of, tree, [*kinds, "single" if self._single else "side by side"], static)
         return None

@@ -98,14 +98,14 @@ class AbstractForce(Module):
         """
 
     def velocity(self, *bodies_and_time: Any, **_: Any) -> Jet:
-        """Return the jet of the velocity on which the force works: the rate of the displacement, unless told."""
+        """Return the jet of the velocity on which the force works: the rate of the displacement by default."""
         return self.displacement(*bodies_and_time).differentiate()
 
     def variation(self, bodies: tuple[Pose, ...], changes: tuple[Pose, ...], time: Jet) -> Jet:
         """Return how far the force acts along as the bodies move by changes; linear in them.
 
         It follows from the displacement, unless the force works on what is no change of any displacement, as a moment
-        in space does; `velocity` and this are then told together.
+        in space does; `velocity` is then overridden, too.
 
         Parameters
         ----------
@@ -119,7 +119,7 @@ class AbstractForce(Module):
         return jax.jvp(lambda *poses: self.displacement(*poses, time), tuple(bodies), tuple(changes))[1]
 
     def energy(self, displacement: Jet) -> Jet:
-        """Return the energy that the force has stored and gives back, in J; none, unless told."""
+        """Return the energy that the force has stored and gives back, in J; none by default."""
         first = displacement.coefficients[0]
         zero = jnp.zeros_like(first if jnp.ndim(first) < 3 else first[0])  # instances and batch stand last
         return Jet.constant(zero, displacement.order)

@@ -89,7 +89,7 @@ class SpatialMoment(AbstractForce, type="moment", space="spatial"):
     velocity_names = ("wx", "wy", "wz")
 
     def displacement(self, body: SpatialPose, time: Jet) -> Jet:
-        # no vector changes at the rate of the angular velocity: what the moment works on is told by the rates below
+        # no vector changes at the rate of the angular velocity: the rates below are those on which the moment works
         return Jet.constant(jnp.zeros_like(body.position.coefficients[0]), body.order)
 
     def velocity(self, body: SpatialPose, time: Jet) -> Jet:

@@ -16,15 +16,15 @@ from jounce.rigid.pose import Pose
 
 def linear_force(self: Any, displacement: Jet, velocity: Jet, time: Jet) -> Jet:  # noqa: ARG001
     """Return the jet of the force of a linear spring with a damper: the method `force` of its class."""
-    return -_stretch(self, displacement) * self.stiffness - velocity * self.damping
+    return -_elongation(self, displacement) * self.stiffness - velocity * self.damping
 
 
 def stored_energy(self: Any, displacement: Jet) -> Jet:
     """Return the energy that a linear spring has stored, J: the method `energy` of its class."""
-    return _stretch(self, displacement).square() * (0.5 * self.stiffness)
+    return _elongation(self, displacement).square() * (0.5 * self.stiffness)
 
 
-def _stretch(spring: Any, displacement: Jet) -> Jet:
+def _elongation(spring: Any, displacement: Jet) -> Jet:
     return displacement - (spring.angle if hasattr(spring, "angle") else spring.length)
 
 

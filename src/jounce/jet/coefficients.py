@@ -107,23 +107,23 @@ def convolution(product: Product, a: Coefficients, b: Coefficients) -> list[Any]
 
 def self_convolution(product: Product, a: Coefficients) -> list[Any]:
     """Return the coefficients of a symmetric product of a series with itself, mirrored terms computed once."""
-    found = []
+    terms = []
     for k in range(len(a)):
         half = (k + 1) // 2
         twice = sum_of_products(product, a[:half], a[k : k - half : -1] if half else ())
         middle = sum_of_products(product, a[k // 2 : k // 2 + 1], a[k // 2 : k // 2 + 1]) if k % 2 == 0 else None
-        found.append(plus(None if twice is None else multiplied(twice, 2.0), middle))
-    return found
+        terms.append(plus(None if twice is None else multiplied(twice, 2.0), middle))
+    return terms
 
 
 def quotient(a: Coefficients, b: Coefficients) -> list[Any]:
     """Return the coefficients of the quotient of two series, to the order of the shorter one."""
     first, *others = b
-    found: list[Any] = []
+    coefficients: list[Any] = []
     for k in range(min(len(a), len(b))):
-        rest = minus(a[k], sum_of_products(multiplied, others[:k], found[::-1]))
-        found.append(None if rest is None else divided(rest, first))
-    return found
+        rest = minus(a[k], sum_of_products(multiplied, others[:k], coefficients[::-1]))
+        coefficients.append(None if rest is None else divided(rest, first))
+    return coefficients
 
 
 def next_of_chain(outer: Coefficients, inner: Coefficients, slope: Coefficients) -> Any:

@@ -7,7 +7,7 @@ from jounce.shapes import Numbers
 
 
 def last_begun(begins: Float[Numbers, " piece"], instants: Float[Numbers, "*batch"]) -> Int[Numbers, "*batch"]:
-    """Return the last piece that has begun at each instant; the first one before it begins, and where none is told.
+    """Return the last piece that has begun at each instant; the first one before it begins.
 
     It is found by halving, in operations for which there is machine code: there is none for `jax.numpy.searchsorted`.
 
@@ -24,8 +24,8 @@ def last_begun(begins: Float[Numbers, " piece"], instants: Float[Numbers, "*batc
     [0, 0, 2, 3]
     """
     begins, last = jnp.asarray(begins), len(begins) - 1
-    place, step = jnp.zeros(jnp.shape(instants), int), 1 << last.bit_length()
+    index, step = jnp.zeros(jnp.shape(instants), int), 1 << last.bit_length()
     while step := step // 2:
-        further = jnp.minimum(place + step, last)
-        place = jnp.where(begins.at[further].get(mode="promise_in_bounds") <= instants, further, place)
-    return place
+        further = jnp.minimum(index + step, last)
+        index = jnp.where(begins.at[further].get(mode="promise_in_bounds") <= instants, further, index)
+    return index

@@ -8,8 +8,8 @@ from jounce.jet.coefficients import ranked
 from jounce.shapes import Numbers, Real
 
 ROUNDING = 1e-15  # of a coefficient, relative
-LARGEST_ERROR = 1e-2  # of a coefficient that is told, in its natural size
-LOOKED_AT = 4  # coefficients: the same, whatever the order
+LARGEST_ERROR = 1e-2  # of a coefficient that is returned, in its natural size
+COEFFICIENTS = 4  # coefficients: the same, whatever the order
 SMALLEST = 1e-13  # part of a line that is seen along it, or sine between lines, but for rounding
 
 Rates = Float[Numbers, "*batch"]
@@ -17,17 +17,19 @@ Rates = Float[Numbers, "*batch"]
 
 def sizes(jet: Jet, batch: int) -> list[Rates]:
     """Return the sizes of the first coefficients of a jet that has `batch` trailing axes besides its components."""
-    whole = jet.dense().coefficients[: LOOKED_AT + 1]
+    whole = jet.dense().coefficients[: COEFFICIENTS + 1]
     return [jnp.sqrt(jnp.sum(c * c, axis=0)) if jnp.ndim(c) > batch else jnp.abs(c) for c in whole]
 
 
-def growth(found: list[Rates], of: Real) -> Rates:
+def growth(coefficient_sizes: list[Rates], of: Real) -> Rates:
     """Return by which factor per unit of time coefficients from the first on grow, beside a size of order zero, 1/s."""
-    rates = [jnp.power(size / of, 1.0 / k) for k, size in enumerate(found, 1)]
+    rates = [jnp.power(size / of, 1.0 / k) for k, size in enumerate(coefficient_sizes, 1)]
     return jnp.max(jnp.stack(rates), axis=0) if rates else jnp.zeros_like(jnp.asarray(of))
 
 
-def told(result: Jet, nearness: Rates, rate: Rates, lost: int = 0, also: Bool[Numbers, "*batch"] | None = None) -> Jet:
+def nan_where_rounding(
+    result: Jet, nearness: Rates, rate: Rates, lost: int = 0, also: Bool[Numbers, "*batch"] | None = None
+) -> Jet:
     """Return a series with NaN for those coefficients that are rounding, as what it is divided by nears zero.
 
     Parameters
@@ -42,17 +44,17 @@ def told(result: Jet, nearness: Rates, rate: Rates, lost: int = 0, also: Bool[Nu
     lost : int, default 0
         Divisions before the first coefficient, but one.
     also : array of bool, shape (...), optional
-        Where the series is told at all.
+        Where the series is defined at all.
     """
-    kept = []
+    coefficients = []
     for k, c in enumerate(result.dense().coefficients):
         largest = (LARGEST_ERROR / ROUNDING) ** (1.0 / max(k + lost, 1))
         known = nearness <= largest * rate  # false where a growth is no number
-        kept.append(jnp.where(ranked(known if also is None else known & also, jnp.ndim(c)), c, jnp.nan))
-    return Jet(kept)
+        coefficients.append(jnp.where(ranked(known if also is None else known & also, jnp.ndim(c)), c, jnp.nan))
+    return Jet(coefficients)
 
 
-def told_in_plane(angle: Jet, seen: Jet, line: Jet, normal: Jet | None = None) -> Jet:
+def nan_where_rounding_in_plane(angle: Jet, seen: Jet, line: Jet, normal: Jet | None = None) -> Jet:
     """Return the angle of a line, seen in a plane, NaN where it is seen along itself; vectors (components, ...).
 
     A plane that moves has a normal, in the axes of the line, unit length: what is seen moves as either does.
@@ -62,7 +64,7 @@ def told_in_plane(angle: Jet, seen: Jet, line: Jet, normal: Jet | None = None) -
     rate = growth(whole[1:], whole[0])
     if normal is not None:
         rate = jnp.maximum(rate, growth(sizes(normal, batch)[1:], jnp.ones_like(rate)))
-    return told(angle, growth(flat[1:], flat[0]), rate, also=flat[0] > SMALLEST * whole[0])
+    return nan_where_rounding(angle, growth(flat[1:], flat[0]), rate, also=flat[0] > SMALLEST * whole[0])
 
 
 def rates_of(speed: Jet, scale: Rates, batch: int) -> tuple[Rates, Rates]:
@@ -75,11 +77,11 @@ def rates_of(speed: Jet, scale: Rates, batch: int) -> tuple[Rates, Rates]:
     scale : array of shape (...)
         The size of the quantity itself: an angle has 1 rad.
     """
-    found = sizes(speed, batch)
-    own = [size / k for k, size in enumerate(found, 1)][:LOOKED_AT]
+    speed_sizes = sizes(speed, batch)
+    own = [size / k for k, size in enumerate(speed_sizes, 1)][:COEFFICIENTS]
     rate = growth([jnp.zeros_like(own[0]), *own[1:]], scale)
     later = [growth(own[k + 1 :], own[k]) for k in (1, 2) if len(own) > k + 1]
     if later:
-        beside = jnp.min(jnp.stack([jnp.where(jnp.isnan(x), 0.0, x) for x in later]), axis=0)
-        rate = jnp.maximum(rate, jnp.where(jnp.isfinite(beside), beside, 0.0))
-    return growth(found[1:LOOKED_AT], found[0]), rate
+        least = jnp.min(jnp.stack([jnp.where(jnp.isnan(x), 0.0, x) for x in later]), axis=0)
+        rate = jnp.maximum(rate, jnp.where(jnp.isfinite(least), least, 0.0))
+    return growth(speed_sizes[1:COEFFICIENTS], speed_sizes[0]), rate

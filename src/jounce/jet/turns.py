@@ -15,7 +15,7 @@ WHOLE_TURN = 2 * math.pi
 
 
 def whole_periods(value: Real, period: Real = WHOLE_TURN) -> Any:
-    """Return the whole number of periods (turns unless told) nearest to a value, in the unit of the value."""
+    """Return the whole number of periods (turns by default) nearest to a value, in the unit of the value."""
     count: Any = value / period
     return period * (jnp if isinstance(count, jax.Array) else np).round(count)
 
@@ -46,7 +46,7 @@ def counted_on(
     angles : array of shape (..., places)
         rad.
     rises : array of shape (..., places - 1), optional
-        By how much each is expected to exceed the one before, to within half a turn; zero unless told.
+        By how much each is expected to exceed the one before, to within half a turn; zero by default.
     """
     turns = np.cumsum(whole_periods(np.diff(angles, axis=-1) - rises), axis=-1)
     return np.concatenate([angles[..., :1], angles[..., 1:] - turns], axis=-1)

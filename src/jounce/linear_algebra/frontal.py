@@ -40,8 +40,8 @@ class FrontalFactor(Module):
             front, own, rights, rows, taken = plan
             known = left.reshape(count * (height - width), columns - width, lanes)
             inherited = known.at[rows[:, None], taken].get(mode="fill", fill_value=0.0)
-            *found, rest = _eliminated(entries[own] * scale[rights][:, :, None] + inherited, width)
-            return _put(left, rest, front), tuple(found)
+            *factors, rest = _eliminated(entries[own] * scale[rights][:, :, None] + inherited, width)
+            return _put(left, rest, front), tuple(factors)
 
         left = jnp.zeros((count, height - width, columns - width, lanes))
         plans = (np.arange(count), fronts.entries, fronts.rights, fronts.left_rows, fronts.left_columns)
@@ -73,8 +73,8 @@ class FrontalFactor(Module):
             return _put(left, y[width:], front), y[:width]
 
         def backward(known: Any, level: Any) -> Any:
-            front, beside, triangle, inverted, y = level
-            y = y - jnp.sum(triangle[:, width:] * known[beside].reshape(1, columns - width, lanes), axis=1)
+            front, neighbors, triangle, inverted, y = level
+            y = y - jnp.sum(triangle[:, width:] * known[neighbors].reshape(1, columns - width, lanes), axis=1)
             x: list[Any] = [None] * width
             for i in reversed(range(width)):
                 x[i] = (y[i] - sum(triangle[i, j] * x[j] for j in range(i + 1, width))) * inverted[i]
@@ -97,14 +97,14 @@ class FrontalFactor(Module):
         order = jnp.argsort(plan.of_body)
 
         def forward(owed: Any, level: Any) -> Any:
-            front, beside, body, triangle, inverted = level
+            front, neighbors, body, triangle, inverted = level
             w = blocks[body] - owed[front]
             u: list[Any] = []
             for i in range(width):
                 u.append((w[i] - sum(triangle[j, i] * u[j] for j in range(i))) * inverted[i])
-            found = jnp.stack(u)
-            share = jnp.sum(triangle[:, width:] * found[:, None], axis=0).reshape(-1, width, lanes)
-            return owed.at[beside].add(share, mode="drop"), found
+            solved = jnp.stack(u)
+            share = jnp.sum(triangle[:, width:] * solved[:, None], axis=0).reshape(-1, width, lanes)
+            return owed.at[neighbors].add(share, mode="drop"), solved
 
         owed = jnp.zeros((len(count), width, lanes))
         _, u = jax.lax.scan(forward, owed, (count, plan.neighbors, order, self.triangle, self.inverted))
@@ -138,8 +138,8 @@ class FrontalFactor(Module):
         return jnp.prod(jnp.sign(jnp.where(jnp.isinf(self.inverted), 0.0, self.inverted)), axis=(0, 1))
 
 
-def _put(whole: Any, part: Any, place: Any) -> Any:
-    return jax.lax.dynamic_update_index_in_dim(whole, part, place, 0)
+def _put(whole: Any, part: Any, index: Any) -> Any:
+    return jax.lax.dynamic_update_index_in_dim(whole, part, index, 0)
 
 
 def _reflected(y: Any, reflections: Any) -> Any:

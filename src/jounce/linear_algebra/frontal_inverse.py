@@ -48,19 +48,19 @@ class InversePlan(Module):
         left_height, nothing = height - width, count * height * columns
         inherited = fronts.left_rows < count * left_height
         sources = np.where(inherited, size + 1 + fronts.left_rows, fronts.rights).astype(np.int32)
-        wanted = np.concatenate([np.arange(count)[:, None], fronts.neighbors], axis=1)  # of a block, its bodies
+        needed = np.concatenate([np.arange(count)[:, None], fronts.neighbors], axis=1)  # of a block, its bodies
         responses = np.full((count, columns - width, left_height), nothing, np.int32)
         for front, at in np.argwhere(inherited).tolist():
             child, row = divmod(int(fronts.left_rows[front, at]), left_height)
             for slot, body in enumerate(fronts.neighbors[child].tolist()):
                 if body < count:
-                    column = int(np.flatnonzero(wanted[front] == body)[0]) * width + np.arange(width)
+                    column = int(np.flatnonzero(needed[front] == body)[0]) * width + np.arange(width)
                     responses[child, slot * width : (slot + 1) * width, row] = (front * columns + column) * height + at
         diagonal = np.full(size, nothing, np.int32)
         for front, at in np.argwhere(fronts.rights < size).tolist():
             row = int(fronts.rights[front, at])
-            body, place = divmod(row, width)
-            column = int(np.flatnonzero(wanted[front] == fronts.of_body[body])[0]) * width + place
+            body, offset = divmod(row, width)
+            column = int(np.flatnonzero(needed[front] == fronts.of_body[body])[0]) * width + offset
             diagonal[row] = (front * columns + column) * height + at
         return cls(fronts, sources, responses, diagonal)
 
@@ -112,16 +112,18 @@ class FrontalInverse(Module):
         def inwards(known: Any, level: Any) -> tuple[Any, Any]:
             front, sources, inward = level
             y = known.at[sources].get(mode="promise_in_bounds")
-            found = total(inward[j] * y[j][None] for j in range(height))
-            return jax.lax.dynamic_update_slice_in_dim(known, found[width:], size + 1 + front * left, 0), found[:width]
+            updates = total(inward[j] * y[j][None] for j in range(height))
+            return jax.lax.dynamic_update_slice_in_dim(known, updates[width:], size + 1 + front * left, 0), updates[
+                :width
+            ]
 
         known = jnp.concatenate([right, jnp.zeros((1 + count * left, lanes))])
         _, begun = jax.lax.scan(inwards, known, (numbers, plan.sources, self.inward))
 
         def outwards(known: Any, level: Any) -> tuple[Any, None]:
             front, neighbors, outward, own = level
-            beside = known.at[neighbors].get(mode="promise_in_bounds").reshape(-1, lanes)
-            own = own - total(outward[j] * beside[j][None] for j in range(len(outward)))
+            at_neighbors = known.at[neighbors].get(mode="promise_in_bounds").reshape(-1, lanes)
+            own = own - total(outward[j] * at_neighbors[j][None] for j in range(len(outward)))
             return jax.lax.dynamic_update_index_in_dim(known, own, front, 0), None
 
         known = jnp.zeros((count + 1, width, lanes))
@@ -137,9 +139,9 @@ class FrontalInverse(Module):
 
         def step(known: Any, level: Any) -> tuple[Any, None]:
             front, responses, inward, outward = level
-            beside = known.at[responses].get(mode="promise_in_bounds")  # of what is left over
+            at_neighbors = known.at[responses].get(mode="promise_in_bounds")  # of what is left over
             given = inward[:, width:]
-            others = total(beside[:, k, None] * given[None, :, k] for k in range(height - width))
+            others = total(at_neighbors[:, k, None] * given[None, :, k] for k in range(height - width))
             own = jnp.swapaxes(inward[:, :width], 0, 1)
             own = own - total(outward[j][:, None] * others[j][None] for j in range(columns - width))
             block = jnp.concatenate([own, others]).reshape(size, lanes)

@@ -65,18 +65,18 @@ class Fronts(Module):
     @classmethod
     def of(cls, pattern: Pattern) -> "Fronts":
         """Plan the elimination of matrices of a pattern, which holds arrays of NumPy."""
-        bodies, places, count, width = pattern.bodies, pattern.places, pattern.body_count, pattern.width
+        bodies, indices, count, width = pattern.bodies, pattern.entry_indices, pattern.body_count, pattern.width
         entry_count = pattern.entry_count
         order, separators, held = _ordered(pattern)
         position = np.argsort(order)
         height = max(width + 1, *map(len, held))  # no empty arrays
-        beside = max(1, *map(len, separators))
-        columns, left_height = width * (1 + beside), height - width
+        most_neighbors = max(1, *map(len, separators))
+        columns, left_height = width * (1 + most_neighbors), height - width
         entries = np.full((count, height, columns), entry_count, np.int32)
         rights = np.full((count, height), len(bodies), np.int32)
         left_rows = np.full((count, height), count * left_height, np.int32)
-        left_columns = np.full((count, height, columns), width * beside, np.int32)
-        neighbors = np.full((count, beside), count, np.int32)
+        left_columns = np.full((count, height, columns), width * most_neighbors, np.int32)
+        neighbors = np.full((count, most_neighbors), count, np.int32)
         ordered = [sorted(position[list(s)]) if s else [] for s in separators]
         for front, members in enumerate(held):
             neighbors[front, : len(ordered[front])] = ordered[front]
@@ -87,7 +87,7 @@ class Fronts(Module):
                     for slot, body in enumerate(bodies[row]):
                         if body < count:
                             first = block[position[body]] * width
-                            entries[front, at, first : first + width] = places[row, slot]
+                            entries[front, at, first : first + width] = indices[row, slot]
                 else:
                     left_rows[front, at] = source * left_height + row
                     for k, p in enumerate(ordered[source]):
@@ -102,33 +102,33 @@ def _ordered(pattern: Pattern) -> tuple[Int[np.ndarray, " body"], list[set[int]]
     Of bodies with as many neighbors, one with the fewest rows is the first.
     """
     count, width = pattern.body_count, pattern.width
-    beside: list[set[int]] = [set() for _ in range(count)]
+    adjacent: list[set[int]] = [set() for _ in range(count)]
     rows: list[set[Row]] = [set() for _ in range(count)]
     for row, slots in enumerate(pattern.bodies.tolist()):
         touched = {body for body in slots if body < count}
         for body in touched:
-            beside[body] |= touched - {body}
+            adjacent[body] |= touched - {body}
             rows[body].add((-1, row))
-    waiting = [(len(beside[body]), len(rows[body]), body) for body in range(count)]
+    waiting = [(len(adjacent[body]), len(rows[body]), body) for body in range(count)]
     heapq.heapify(waiting)
     order: list[int] = []
     separators, held, done = [], [], np.zeros(count, bool)
     while waiting:
-        *told, body = heapq.heappop(waiting)
-        if done[body] or told != [len(beside[body]), len(rows[body])]:
+        *key, body = heapq.heappop(waiting)
+        if done[body] or key != [len(adjacent[body]), len(rows[body])]:
             continue  # it was put in again since, with what it has now
         done[body] = True
-        around, mine = beside[body], sorted(rows[body])
+        around, mine = adjacent[body], sorted(rows[body])
         left = {(len(order), k) for k in range(len(mine) - width)}
         order.append(body)
         separators.append(set(around))
         held.append(mine)
         for other in around:
-            beside[other] |= around
-            beside[other] -= {other, body}
+            adjacent[other] |= around
+            adjacent[other] -= {other, body}
             rows[other] -= rows[body]
             rows[other] |= left
-            heapq.heappush(waiting, (len(beside[other]), len(rows[other]), other))
+            heapq.heappush(waiting, (len(adjacent[other]), len(rows[other]), other))
     return np.array(order, int), separators, held
 
 

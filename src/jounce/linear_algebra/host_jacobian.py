@@ -49,7 +49,7 @@ class HostJacobian:
         """Return the Jacobian with these entries in places of a pattern."""
         padded = np.zeros(pattern.entry_count + 1)
         padded[:-1] = entries
-        return cls(np.asarray(pattern.bodies), padded.take(pattern.places), pattern.body_count)
+        return cls(np.asarray(pattern.bodies), padded.take(pattern.entry_indices), pattern.body_count)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -92,9 +92,9 @@ class HostJacobian:
 
         width = self.blocks.shape[-1]
         columns = self.bodies[:, :, None] * width + np.arange(width)
-        row, slot, place = np.nonzero((self.blocks != 0) & (columns < self.shape[1]))
-        where = row, columns[row, slot, place]
-        return coo_array((self.blocks[row, slot, place], where), shape=self.shape).tocsr()
+        row, slot, column = np.nonzero((self.blocks != 0) & (columns < self.shape[1]))
+        where = row, columns[row, slot, column]
+        return coo_array((self.blocks[row, slot, column], where), shape=self.shape).tocsr()
 
     def step(self, residual: Float[np.ndarray, " row"]) -> Float[np.ndarray, " column"] | None:
         """Return the shortest step that closes the residual to first order, by rows of one size; None if not finite."""
@@ -203,9 +203,9 @@ def _augmented(matrix: Any, damping: float) -> Any:
 def _shortest(matrix: Any, right: Float[np.ndarray, " row"]) -> Float[np.ndarray, " column"]:
     """Return the shortest solution; of least squares, damped, where rows depend on one another."""
     columns = matrix.shape[1]
-    found, smallest = _solved(matrix, right[:, None])
+    shortest, smallest = _solved(matrix, right[:, None])
     if smallest > STEP_TOLERANCE * _largest_size(matrix):
-        return found[:, 0]
+        return shortest[:, 0]
     damped = _factored(_augmented(matrix, (DAMPING * _largest_size(matrix)) ** 2))
     return damped.solve(np.concatenate([np.zeros(columns), right]))[:columns]
 
@@ -221,12 +221,12 @@ def _solved(matrix: Any, right: Float[np.ndarray, "row k"]) -> tuple[Float[np.nd
     if factors is None:
         return np.zeros((columns, count)), 0.0
     right = np.column_stack([right, _probes(rows, PROBES)])
-    wanted = right if square else np.concatenate([np.zeros((columns, count + PROBES)), right])
-    found = factors.solve(wanted)
-    if not np.isfinite(found).all():
+    right_sides = right if square else np.concatenate([np.zeros((columns, count + PROBES)), right])
+    solutions = factors.solve(right_sides)
+    if not np.isfinite(solutions).all():
         return np.zeros((columns, count)), 0.0
-    growth = float(np.max(np.linalg.norm(found[-rows:, count:], axis=0) / np.linalg.norm(right[:, count:], axis=0)))
-    return found[:columns, :count], 1 / growth if square else growth**-0.5
+    growth = float(np.max(np.linalg.norm(solutions[-rows:, count:], axis=0) / np.linalg.norm(right[:, count:], axis=0)))
+    return solutions[:columns, :count], 1 / growth if square else growth**-0.5
 
 
 def is_clearly_regular(matrix: Float[np.ndarray, "size size"], tolerance: float) -> bool:
@@ -238,9 +238,9 @@ def is_clearly_regular(matrix: Float[np.ndarray, "size size"], tolerance: float)
 
     if len(matrix) <= MOST_DENSE or not np.isfinite(matrix).all():
         return False
-    places = np.flatnonzero(matrix != 0.0)  # ten times as fast as SciPy looks for them
-    where = np.divmod(places.astype(np.int32), np.int32(len(matrix)))
-    whole = csr_array((matrix.ravel()[places], where), shape=matrix.shape)
+    nonzero = np.flatnonzero(matrix != 0.0)  # ten times as fast as SciPy looks for them
+    where = np.divmod(nonzero.astype(np.int32), np.int32(len(matrix)))
+    whole = csr_array((matrix.ravel()[nonzero], where), shape=matrix.shape)
     return _solved(whole, np.zeros((len(matrix), 0)))[1] > 10 * tolerance * _largest_size(whole)
 
 
@@ -283,6 +283,6 @@ def _null_space(
         block = nearest(min(columns, width))
         _, sizes, turned = np.linalg.svd(np.linalg.qr(matrix @ block, mode="r"))
         if width >= columns or sizes[0] > 10 * DAMPING * size:
-            found = np.count_nonzero(sizes > tolerance * size) if count is None else len(turned) - count
-            return block @ turned[found:].T
+            rank = np.count_nonzero(sizes > tolerance * size) if count is None else len(turned) - count
+            return block @ turned[rank:].T
         width *= 4

@@ -1,7 +1,7 @@
 """Least squares for batches of small matrices with dependent rows, the batch last: orthonormal bases and triangles.
 
 Where constraints are redundant but agree, the equations of every order have more rows than unknowns and one solution
-all the same: that of least squares. The multipliers of the rows are many then; those of least norm are told.
+all the same: that of least squares. The multipliers of the rows are many then; those of least norm are returned.
 """
 
 from typing import Any
@@ -35,7 +35,7 @@ class LeastSquaresFactor(Module):
         """Factor matrices of shape (rows, columns, batch), with at least as many rows as columns."""
         _, columns, lanes = matrix.shape
         at, put = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim
-        places = np.arange(columns)[:, None]
+        rows = np.arange(columns)[:, None]
 
         def orthogonalize(k: Any, carry: Any) -> Any:
             basis, triangle = carry
@@ -45,7 +45,7 @@ class LeastSquaresFactor(Module):
                 column, along = column - jnp.sum(basis * part[None], axis=1), along + part
             size = jnp.sqrt(jnp.sum(column * column, axis=0))
             basis = put(basis, column / jnp.where(size == 0, 1.0, size)[None], k, 1)
-            return basis, put(triangle, jnp.where(places == k, size[None], along), k, 1)
+            return basis, put(triangle, jnp.where(rows == k, size[None], along), k, 1)
 
         blank = cls.blank(matrix.shape, lanes)
         return cls(*jax.lax.fori_loop(0, columns, orthogonalize, (blank.basis, blank.triangle)))
@@ -65,13 +65,13 @@ class LeastSquaresFactor(Module):
         """Return the solutions of least norm with the transposed matrices, shape (rows, batch)."""
         at, put, columns = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim, len(self.triangle)
 
-        def substitute(k: Any, found: Any) -> Any:
+        def substitute(k: Any, solved: Any) -> Any:
             column = at(self.triangle, k, 1, False)
-            rest = at(right, k, 0, False) - jnp.sum(column * found, axis=0)
-            return put(found, rest / at(column, k, 0, False), k, 0)
+            rest = at(right, k, 0, False) - jnp.sum(column * solved, axis=0)
+            return put(solved, rest / at(column, k, 0, False), k, 0)
 
-        found = jax.lax.fori_loop(0, columns, substitute, jnp.zeros(right.shape))
-        return jnp.sum(self.basis * found[None], axis=1)
+        solved = jax.lax.fori_loop(0, columns, substitute, jnp.zeros(right.shape))
+        return jnp.sum(self.basis * solved[None], axis=1)
 
     def applied_inverse(self, matrix: Float[Numbers, "row k"]) -> Float[Numbers, "column k"]:
         """Return the products of the pseudo-inverse of the first matrix with the columns of another, (columns, k)."""
@@ -95,11 +95,11 @@ class LeastSquaresFactor(Module):
     def _back(self, right: Float[Numbers, "column batch"]) -> Float[Numbers, "column batch"]:
         at, put, columns = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim, len(self.triangle)
 
-        def substitute(i: Any, found: Any) -> Any:
+        def substitute(i: Any, solved: Any) -> Any:
             k = columns - 1 - i
             row = at(self.triangle, k, 0, False)
-            rest = at(right, k, 0, False) - jnp.sum(row * found, axis=0)
-            return put(found, rest / at(row, k, 0, False), k, 0)
+            rest = at(right, k, 0, False) - jnp.sum(row * solved, axis=0)
+            return put(solved, rest / at(row, k, 0, False), k, 0)
 
         return jax.lax.fori_loop(0, columns, substitute, jnp.zeros(right.shape))
 

@@ -127,9 +127,9 @@ class DenseFactor(Module):
 
     def _rank(self) -> Int[Numbers, "row batch"]:
         """Return which pivot is that of each row; `argsort` would call a library of XLA's."""
-        places = np.arange(len(self.order), dtype=np.int32)
-        matches = self.order[None] == places[:, None, None]
-        return jnp.sum(jnp.where(matches, places[None, :, None], 0), axis=1)
+        positions = np.arange(len(self.order), dtype=np.int32)
+        matches = self.order[None] == positions[:, None, None]
+        return jnp.sum(jnp.where(matches, positions[None, :, None], 0), axis=1)
 
     def _regular(self) -> Float[Numbers, "1 batch"]:
         return jnp.where(jnp.all(self.pivots != 0, axis=0, keepdims=True), 1.0, jnp.nan)
@@ -169,19 +169,19 @@ def singular_values(
     if rows > columns:
         v, s, u = singular_values(jnp.swapaxes(matrix, 0, 1))
         return u, s, v
-    first, second = (jnp.asarray(places) for places in np.triu_indices(rows, 1))
+    first, second = (jnp.asarray(indices) for indices in np.triu_indices(rows, 1))
 
     def rotate(k: Any, carry: Any) -> Any:
         p, q = (pairs[k % len(pairs)] for pairs in (first, second))
         at, put = jax.lax.dynamic_index_in_dim, jax.lax.dynamic_update_index_in_dim
-        a, b = (at(carry[0], place, 0, False) for place in (p, q))
+        a, b = (at(carry[0], index, 0, False) for index in (p, q))
         product, excess = 2 * jnp.sum(a * b, axis=0), jnp.sum(b * b - a * a, axis=0)
         root = jnp.abs(excess) + jnp.hypot(excess, product)
         tangent = jnp.where(excess < 0, -1.0, 1.0) * product / jnp.where(root == 0, 1.0, root)
         cosine = 1 / jnp.hypot(1.0, tangent)
 
         def turned(part: Any) -> Any:
-            a, b = (at(part, place, 0, False) for place in (p, q))
+            a, b = (at(part, index, 0, False) for index in (p, q))
             c, s = cosine[None], (cosine * tangent)[None]
             return put(put(part, c * a - s * b, p, 0), s * a + c * b, q, 0)
 

@@ -20,14 +20,14 @@ class Pattern(Module):
     ----------
     bodies : array of int, shape (rows, slots)
         The number of bodies where a row touches fewer.
-    places : array of int, shape (rows, slots, width)
+    entry_indices : array of int, shape (rows, slots, width)
         Of the entries in the columns of that body; the number of entries where there are none.
     body_count, entry_count : int
         Number of bodies, and of entries.
     """
 
     bodies: Int[Numbers, "row slot"]
-    places: Int[Numbers, "row slot width"]
+    entry_indices: Int[Numbers, "row slot width"]
     body_count: int = eqx.field(static=True)
     entry_count: int = eqx.field(static=True)
 
@@ -50,23 +50,23 @@ class Pattern(Module):
         touching = [len(group.moving_slots) for group in groups]
         entry_count = width * sum(map(math.prod, zip(blocks, touching, strict=True)))
         bodies = np.full((sum(blocks), max(touching, default=1)), body_count)
-        places = np.full((*bodies.shape, width), entry_count)
-        row = place = 0
+        entry_indices = np.full((*bodies.shape, width), entry_count)
+        row = first = 0
         for block, count, group in zip(blocks, row_counts, groups, strict=True):
             its = slice(row, row + block)
             for k, slot in enumerate(group.moving_slots):
                 touched = np.tile(group.bodies[slot], count) - 1
                 bodies[its, k] = np.where(touched < 0, body_count, touched)
-                there = place + np.arange(width * block).reshape(width, block).T
-                places[its, k] = np.where(touched[:, None] < 0, entry_count, there)
-                place += width * block
+                there = first + np.arange(width * block).reshape(width, block).T
+                entry_indices[its, k] = np.where(touched[:, None] < 0, entry_count, there)
+                first += width * block
             row += block
-        return cls(bodies.astype(np.int32), places.astype(np.int32), body_count, entry_count)
+        return cls(bodies.astype(np.int32), entry_indices.astype(np.int32), body_count, entry_count)
 
     @property
     def width(self) -> int:
         """Columns of a body."""
-        return self.places.shape[-1]
+        return self.entry_indices.shape[-1]
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -76,8 +76,10 @@ class Pattern(Module):
     def dense(self, entries: Float[Numbers, "entry batch"]) -> Float[Numbers, "row column batch"]:
         """Return the matrices with these entries."""
         bodies = np.arange(self.body_count, dtype=np.int32)[None, None, :, None]
-        places = jnp.where(self.bodies[:, :, None, None] == bodies, self.places[:, :, None], self.entry_count)
-        return _with_zero(entries)[jnp.min(places, axis=1).reshape(self.shape)]
+        entry_indices = jnp.where(
+            self.bodies[:, :, None, None] == bodies, self.entry_indices[:, :, None], self.entry_count
+        )
+        return _with_zero(entries)[jnp.min(entry_indices, axis=1).reshape(self.shape)]
 
     def product(
         self, entries: Float[Numbers, "entry #batch"], columns: Float[Numbers, "column batch"]
@@ -85,7 +87,7 @@ class Pattern(Module):
         """Return the products of the matrices with these entries and columns."""
         by_body = jnp.reshape(columns, (self.body_count, self.width, -1))
         touched = by_body.at[self.bodies].get(mode="fill", fill_value=0.0)
-        return jnp.sum(_with_zero(entries)[self.places] * touched, axis=(1, 2))
+        return jnp.sum(_with_zero(entries)[self.entry_indices] * touched, axis=(1, 2))
 
 
 def _with_zero(entries: Float[Numbers, "entry batch"]) -> Float[Numbers, "entry+1 batch"]:

@@ -20,9 +20,9 @@ def polarized(
     """
     first, second = np.triu_indices(count)
     unit = np.eye(count)
-    found = values(np.where((first == second)[:, None], unit[first], unit[first] + unit[second]))
-    alone = found[:, first == second]
-    forms = np.zeros((len(found), count, count))
-    mixed = np.where(first == second, found, 0.5 * (found - alone[:, first] - alone[:, second]))
+    evaluated = values(np.where((first == second)[:, None], unit[first], unit[first] + unit[second]))
+    pure = evaluated[:, first == second]
+    forms = np.zeros((len(evaluated), count, count))
+    mixed = np.where(first == second, evaluated, 0.5 * (evaluated - pure[:, first] - pure[:, second]))
     forms[:, first, second] = forms[:, second, first] = mixed
     return forms

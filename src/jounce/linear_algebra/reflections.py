@@ -105,8 +105,8 @@ def _substituted(factor: ReflectedFactor, right: Columns) -> Columns:
         column = factor.reduced[k:, k]
         part = jnp.sum(column * right[k:], axis=0) * factor.shares[k]
         right = jnp.concatenate([right[:k], right[k:] - column * part[None]])
-    found = right[:0]
+    solved = right[:0]
     for k in reversed(range(size)):
-        rest = right[k] - jnp.sum(factor.reduced[k, k + 1 :] * found, axis=0)
-        found = jnp.concatenate([(rest / factor.pivots[k])[None], found])
-    return found
+        rest = right[k] - jnp.sum(factor.reduced[k, k + 1 :] * solved, axis=0)
+        solved = jnp.concatenate([(rest / factor.pivots[k])[None], solved])
+    return solved

@@ -1,4 +1,4 @@
-"""Laws of angles that likely stand in degrees: told once, when a file is read or a mechanism is first solved."""
+"""Laws of angles that are likely in degrees: a warning, once, when a file is read or a mechanism is first solved."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -44,7 +44,7 @@ class AngleLaw(NamedTuple):
 
 
 def laws_of_angles(mechanism: Mechanism) -> Iterator[AngleLaw]:
-    """Yield the laws of drivers that turn something, those that are wrong left out: it is told where they are used."""
+    """Yield the laws of drivers that turn something, without invalid ones, which their use refuses."""
     try:
         held, parameters = with_output_drivers(mechanism), mechanism.parameter_values
     except JounceError:
@@ -62,12 +62,12 @@ def laws_of_angles(mechanism: Mechanism) -> Iterator[AngleLaw]:
 
 
 def degrees_doubt(law: AbstractMotion, first: float, last: float) -> str:
-    """Word why the law of an angle is likely in degrees by what it is from a first to a last instant, s; or nothing."""
+    """Say why the law of an angle is likely in degrees, by its values from a first to a last instant, s; or nothing."""
     values = values_of(law, first, last)
     if values is not None and (why := degrees_meant(values)):
         return why
-    if (span := _angle_of_leader(law)) and looks_like_degrees(span):
-        return f"goes on over {span:g} rad of its leader, {span / TURN:.2g} turns: degrees?"
+    if (interval := _angle_of_leader(law)) and looks_like_degrees(interval):
+        return f"goes on over {interval:g} rad of its leader, {interval / TURN:.2g} turns: degrees?"
     return ""
 
 
@@ -79,7 +79,7 @@ def names_angle(of: AngleLaw, angles: frozenset[str] = frozenset()) -> bool:
 
 
 def settle(driver: AbstractConstraint) -> None:
-    """Note that nothing more is to be told of the law of a driver."""
+    """Note that the law of a driver needs no further warning."""
     _settled[id(driver)] = driver
 
 
@@ -98,25 +98,25 @@ def warn_of_degrees(mechanism: Mechanism, first: float, last: float) -> None:
     UnitWarning
         With the name of the driver, what its law is over the run, and the unit that may be meant.
     """
-    spans = mechanism.spans_looked_at
+    spans = mechanism.checked_intervals
     if (first, last) in spans:
         return
     spans.add((first, last))
-    for found in laws_of_angles(mechanism):
-        if _settled.get(id(found.driver)) is found.driver or names_angle(found):
+    for angle_law in laws_of_angles(mechanism):
+        if _settled.get(id(angle_law.driver)) is angle_law.driver or names_angle(angle_law):
             continue
-        if why := _constant_doubt(found.law) or degrees_doubt(found.law, first, last):
-            settle(found.driver)
-            warn_caller(UnitWarning(f"drivers.{found.name}.motion: {why} {IN_SI}"))
+        if why := _constant_doubt(angle_law.law) or degrees_doubt(angle_law.law, first, last):
+            settle(angle_law.driver)
+            warn_caller(UnitWarning(f"drivers.{angle_law.name}.motion: {why} {IN_SI}"))
 
 
 def _constant_doubt(law: AbstractMotion) -> str:
-    """Word why what a formula is at time zero is likely in degrees, as that of a file is asked; or nothing."""
+    """Say why a formula is likely in degrees, by its value at time zero; or nothing."""
     if not isinstance(law, ExpressionMotion) or "pi" in law.expression.text:
         return ""
     try:
         value = float(law.expression.evaluate({**law.parameters, "t": 0.0}))
-    except (JounceError, TypeError, ValueError):  # told where the law is used
+    except (JounceError, TypeError, ValueError):  # the use of the law raises it
         return ""
     return number_doubt(value)
 

@@ -44,55 +44,55 @@ class AttitudeHistory(NamedTuple):
 
     Attributes
     ----------
-    quaternion : array of shape (4, bodies, places)
+    quaternion : array of shape (4, bodies, samples)
         The ground first.
-    time : array of shape (places,)
+    time : array of shape (samples,)
         When, s; zeros where it was no motion.
     period, repeated : int
-        The last places make a turn, of which so many more follow.
+        The last samples make a turn, of which so many more follow.
     between : callable, optional
         Returns the attitudes at any instants, (4, bodies, instants).
     """
 
-    quaternion: Float[np.ndarray, "4 bodies place"]
-    time: Float[np.ndarray, " place"]
+    quaternion: Float[np.ndarray, "4 bodies sample"]
+    time: Float[np.ndarray, " sample"]
     period: int = 1
     repeated: int = 0
     between: Callable[[Float[np.ndarray, " time"]], Float[np.ndarray, "4 bodies time"]] | None = None
 
-    def looked_at(
-        self, measure: Callable[[Float[np.ndarray, "4 bodies place"]], Float[np.ndarray, "angle place"]]
-    ) -> tuple[Float[np.ndarray, " place"], Float[np.ndarray, "angle place"]]:
+    def sampled(
+        self, measure: Callable[[Float[np.ndarray, "4 bodies sample"]], Float[np.ndarray, "angle sample"]]
+    ) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, "angle sample"]]:
         """Return instants, and angles there that are known up to whole turns, so close that none is lost in between.
 
         Parameters
         ----------
         measure : callable
-            Returns the angles, rad, of attitudes of all bodies, (4, bodies, places).
+            Returns the angles, rad, of attitudes of all bodies, (4, bodies, samples).
         """
         between, known = self.between, measure(self.quaternion)
         if between is None:
             return self.time, known
         whole = np.zeros(len(self.time), int)  # one path, along which instants are measured
-        found = refined_samples(lambda _, instants: measure(between(instants)), whole, self.time, known)
-        return found.share, found.angle
+        samples = refined_samples(lambda _, instants: measure(between(instants)), whole, self.time, known)
+        return samples.share, samples.angle
 
-    def angles(self, group: Group) -> tuple[Float[np.ndarray, " place"], Float[np.ndarray, "instance place"]]:
+    def angles(self, group: Group) -> tuple[Float[np.ndarray, " sample"], Float[np.ndarray, "instance sample"]]:
         """Return instants, and the angles about axes that a group measures there, counted on from its datum."""
-        time, raw = self.looked_at(lambda quaternion: raw_angles([group], {"quaternion": quaternion})[0])
+        time, raw = self.sampled(lambda quaternion: raw_angles([group], {"quaternion": quaternion})[0])
         begun = np.asarray(group.element.datum.near)[..., 0]
         return time, counted_on(np.column_stack([begun, raw]))[:, 1:]
 
     def last_angles(self, groups: Sequence[Group]) -> list[np.ndarray]:
         """Return the angles at the end, (instances, 1) each, with the turns that are repeated."""
-        found = [self.angles(group)[1] for group in groups if measures_angle(group)]
+        angles = [self.angles(group)[1] for group in groups if measures_angle(group)]
         if not self.repeated:
-            return [angle[:, -1:] for angle in found]
-        ends = [(angle[:, -1:], angle[:, -1 - self.period, None]) for angle in found]
+            return [angle[:, -1:] for angle in angles]
+        ends = [(angle[:, -1:], angle[:, -1 - self.period, None]) for angle in angles]
         return [last + self.repeated * whole_periods(last - before) for last, before in ends]
 
     def counting(self, groups: Sequence[Group], instants: Float[np.ndarray, " time"]) -> tuple[Group, ...]:
-        """Return groups that have the turns of each instant, from the place nearest to it in time."""
+        """Return groups that have the turns of each instant, from the sample nearest to it in time."""
         counted = []
         for time, angles in (self.angles(group) for group in groups if measures_angle(group)):
             backward = time[-1] < time[0]
@@ -165,8 +165,8 @@ def with_turns(groups: Sequence[Group], near: Sequence[Any]) -> tuple[Group, ...
 
 def _with_data(groups: Sequence[Group], values: Sequence[Any], put: Callable[[Datum, Any], Datum]) -> tuple[Group, ...]:
     """Return groups with other data, one value for each that measures an angle about an axis."""
-    found = iter(values)
-    return tuple(holding(g, "datum", put(g.element.datum, next(found))) if measures_angle(g) else g for g in groups)
+    remaining = iter(values)
+    return tuple(holding(g, "datum", put(g.element.datum, next(remaining))) if measures_angle(g) else g for g in groups)
 
 
 def at_lanes(groups: Sequence[Group], lanes: Int[np.ndarray, " lane"]) -> tuple[Group, ...]:
@@ -183,14 +183,14 @@ def _with_datum(group: Group, coordinates: Coordinates, prescribed: Sequence[Pre
     elif keep:
         angle = before
     else:
-        angle, told = angle_of(attitude, axis)
-        angle = np.where(told, angle, before)
+        angle, is_defined = angle_of(attitude, axis)
+        angle = np.where(is_defined, angle, before)
     angle = before + principal(angle - before) if known is not None else principal(angle)
     for k, bodies in enumerate(zip(*group.bodies, strict=True)):
         for given in prescribed:
-            sense = _sense(bodies, turned(coordinates["quaternion"][:, bodies[0], 0], axis[:, k, 0]), given)
-            if sense:
-                expected = sense * given.angle
+            sign = _relative_sign(bodies, turned(coordinates["quaternion"][:, bodies[0], 0], axis[:, k, 0]), given)
+            if sign:
+                expected = sign * given.angle
                 angle[k] = expected + principal(angle[k] - expected)
     # a driver or a force acts about the axis, wherever its vector on body j points beside it
     acts = element.vector_i is not None and hasattr(element, "role")
@@ -225,12 +225,12 @@ def prescribed_angles(
     groups: Sequence[Group], coordinates: Coordinates, laws: Sequence[np.ndarray]
 ) -> list[PrescribedAngle]:
     """Return the angles that drivers prescribe at a position, in space; `laws` holds the values for each such group."""
-    found = []
+    prescribed = []
     for group, values in zip((g for g in groups if measures_angle(g)), laws, strict=True):
         for k, bodies in enumerate(zip(*group.bodies, strict=True)):
             axis = turned(coordinates["quaternion"][:, bodies[0], 0], axis_of(group)[:, k, 0])
-            found.append(PrescribedAngle(bodies, axis, float(np.broadcast_to(values, (group.instances, 1))[k, 0])))
-    return [given for given in found if np.isfinite(given.angle)]
+            prescribed.append(PrescribedAngle(bodies, axis, float(np.broadcast_to(values, (group.instances, 1))[k, 0])))
+    return [given for given in prescribed if np.isfinite(given.angle)]
 
 
 def lost_count(groups: Sequence[Group], history: AttitudeHistory) -> tuple[int, int, float] | None:
@@ -242,7 +242,7 @@ def lost_count(groups: Sequence[Group], history: AttitudeHistory) -> tuple[int, 
         whole = getattr(group.element, "whole", None)
         if whole is None:
             continue
-        time, raw = history.looked_at(lambda quaternion, g=group: _shaft_angles(g, quaternion))
+        time, raw = history.sampled(lambda quaternion, g=group: _shaft_angles(g, quaternion))
         first, second = np.split(counted_on(raw), 2)
         excess = second - np.asarray(group.element.ratio) * first
         lost = np.abs(excess - excess[:, :1]) > np.pi / 2 / np.asarray(whole)
@@ -252,15 +252,15 @@ def lost_count(groups: Sequence[Group], history: AttitudeHistory) -> tuple[int, 
     return None
 
 
-def _shaft_angles(group: Group, quaternion: Float[np.ndarray, "4 bodies place"]) -> Float[np.ndarray, "angle place"]:
+def _shaft_angles(group: Group, quaternion: Float[np.ndarray, "4 bodies sample"]) -> Float[np.ndarray, "angle sample"]:
     """Return how far shafts of a group are turned in their frames, up to whole turns: the first, then the second."""
-    element, frame, found = group.element, quaternion[:, list(group.bodies[2])], []
+    element, frame, angles = group.element, quaternion[:, list(group.bodies[2])], []
     for bodies, axis, held in zip(
         group.bodies[:2], (element.axis_i, element.axis_j), (element.held_i, element.held_j), strict=True
     ):
         axis = np.asarray(axis) / np.linalg.norm(axis, axis=0)
-        found.append(-since(held, _product(_inverse(quaternion[:, list(bodies)]), frame), axis))
-    return np.concatenate(found)
+        angles.append(-since(held, _product(_inverse(quaternion[:, list(bodies)]), frame), axis))
+    return np.concatenate(angles)
 
 
 def axis_of(group: Group) -> Float[np.ndarray, "3 instance 1"]:
@@ -277,15 +277,15 @@ def relative_attitude(group: Group, coordinates: Coordinates) -> Quaternions:
 
 
 def attitudes_of(
-    bodies: Sequence[int], quaternion: Float[np.ndarray, "4 bodies place"]
-) -> Float[np.ndarray, "4 place"]:
-    """Return the Euler parameters, (4, places), of a body, or of the second body relative to the first.
+    bodies: Sequence[int], quaternion: Float[np.ndarray, "4 bodies sample"]
+) -> Float[np.ndarray, "4 sample"]:
+    """Return the Euler parameters, (4, samples), of a body, or of the second body relative to the first.
 
     Parameters
     ----------
     bodies : sequence of int
         One or two indices of bodies.
-    quaternion : array of shape (4, bodies, places)
+    quaternion : array of shape (4, bodies, samples)
         Of all bodies, the ground first.
     """
     *base, body = (quaternion[:, k] for k in bodies)
@@ -310,7 +310,7 @@ def _across(second: Numbers, attitude: Quaternions, axis: Vectors) -> Numbers:
     return second - (second * along).sum(axis=0) * along
 
 
-def _sense(bodies: tuple[int, ...], axis: Float[np.ndarray, " 3"], given: PrescribedAngle) -> int:
+def _relative_sign(bodies: tuple[int, ...], axis: Float[np.ndarray, " 3"], given: PrescribedAngle) -> int:
     """Return 1 where an angle follows that of a driver, -1 where it runs against it, else 0."""
     if sorted(bodies) != sorted(given.bodies) or np.linalg.norm(_cross(axis, given.axis)) > PARALLEL:
         return 0

@@ -1,4 +1,4 @@
-"""Where belts run: strands, wraps and length, from the places of their pulleys."""
+"""Courses of belts: strands, wraps and length, from the centers of their pulleys."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -10,7 +10,7 @@ from jounce.constraints.planar import Belt
 from jounce.errors import MechanismError
 from jounce.mechanism.builder import group_rows
 
-Places = Float[np.ndarray, "2 *batch"]
+Points = Float[np.ndarray, "2 *batch"]
 
 
 class BeltCourse(NamedTuple):
@@ -37,7 +37,7 @@ class BeltCourse(NamedTuple):
     length: Any
 
 
-def belt_course(first: Places, second: Places, radii: Sequence[float], crossed: bool) -> BeltCourse:
+def belt_course(first: Points, second: Points, radii: Sequence[float], crossed: bool) -> BeltCourse:
     """Return where a belt runs around two pulleys.
 
     Parameters
@@ -58,10 +58,10 @@ def belt_course(first: Places, second: Places, radii: Sequence[float], crossed: 
     """
     x, y = second - first
     distance, (one, two) = np.hypot(x, y), radii
-    apart = one + two if crossed else one - two
+    radial = one + two if crossed else one - two
     with np.errstate(invalid="ignore", divide="ignore"):
-        strand = np.sqrt(np.where(distance > one + two, distance**2 - apart**2, np.nan))
-        leaving = np.arccos(apart / distance)
+        strand = np.sqrt(np.where(distance > one + two, distance**2 - radial**2, np.nan))
+        leaving = np.arccos(radial / distance)
     on_first = 2 * (np.pi - leaving)
     on_second = on_first if crossed else 2 * leaving
     return BeltCourse(
@@ -69,7 +69,7 @@ def belt_course(first: Places, second: Places, radii: Sequence[float], crossed: 
     )
 
 
-def belt_outline(course: BeltCourse, centers: Sequence[Places], radii: Sequence[float], crossed: bool) -> Any:
+def belt_outline(course: BeltCourse, centers: Sequence[Points], radii: Sequence[float], crossed: bool) -> Any:
     """Return points around a belt, (..., points, 2), m: of the strand on the left, around the second pulley, and back.
 
     The first half of the points is on the second pulley, the other half on the first.

@@ -86,14 +86,14 @@ class Model:
 
 def group_rows(model: Model) -> list[slice]:
     """Return where the rows of each group stand: those of all its instances in turn, once for each row of the joint."""
-    found, first = [], 0
+    slices, first = [], 0
     for group in model.system.groups:
         names, last = model.rows[first : first + group.instances], first
         while model.rows[last : last + group.instances] == names:
             last += group.instances
-        found.append(slice(first, last))
+        slices.append(slice(first, last))
         first = last
-    return found
+    return slices
 
 
 def build(mechanism: Mechanism, like: Model | None = None, *, initial: bool = False) -> Model:
@@ -120,7 +120,7 @@ def build(mechanism: Mechanism, like: Model | None = None, *, initial: bool = Fa
     (groups, names), (forces, force_names), (outputs, output_names) = grouped_elements(mechanism, initial=initial)
     if like is not None:
         parts = {"groups": groups, "forces": forces, "outputs": outputs}
-        known = {name: tuple(map(_with_found_of, part, getattr(like.system, name))) for name, part in parts.items()}
+        known = {name: tuple(map(_with_derived_of, part, getattr(like.system, name))) for name, part in parts.items()}
         return dataclasses.replace(like, system=with_fields(like.system, **known))
 
     pose_type = PlanarPose if components == 2 else SpatialPose
@@ -138,13 +138,13 @@ def released(model: Model) -> Model:
     system, groups, names = model.system, [], []
     for group, rows in zip(model.system.groups, group_rows(model), strict=True):
         its = model.rows[rows][: group.instances]
-        kept = [k for k, name in enumerate(its) if not name.startswith("initial.")]
-        if len(kept) < len(its):  # drivers of the same kind may be among them
-            element = jax.tree.map(lambda values, kept=kept: values[..., kept, :], group.element)
-            group = with_fields(group, element=element, bodies=tuple(tuple(s[k] for k in kept) for s in group.bodies))
-        if kept:
+        stay = [k for k, name in enumerate(its) if not name.startswith("initial.")]
+        if len(stay) < len(its):  # drivers of the same kind may be among them
+            element = jax.tree.map(lambda values, stay=stay: values[..., stay, :], group.element)
+            group = with_fields(group, element=element, bodies=tuple(tuple(s[k] for k in stay) for s in group.bodies))
+        if stay:
             groups.append(group)
-            names.append(tuple(its[k] for k in kept))
+            names.append(tuple(its[k] for k in stay))
     parts = ((tuple(groups), tuple(names)), ((), ()), ((), ()))
     own = sum(not name.endswith(ENDING) for name in model.bodies) + 1  # carriages follow the bodies
     length = _size(tuple(groups), model.guess["position"][:, :own])
@@ -248,7 +248,7 @@ def counted_as_in(groups: tuple[Group, ...], model: Model) -> tuple[Group, ...]:
     """Return groups with angles about axes counted as if they had been in the model when it was put together."""
     if model.history is None or not any(map(measures_angle, groups)):
         return groups
-    first, last = ({"quaternion": model.history.quaternion[..., place]} for place in (slice(1), slice(-1, None)))
+    first, last = ({"quaternion": model.history.quaternion[..., instant]} for instant in (slice(1), slice(-1, None)))
     groups = with_datums(groups, first)
     groups = with_angles(with_datums(groups, last), model.history.last_angles(groups))
     return with_datums(groups, model.reference, model.prescribed)
@@ -333,8 +333,8 @@ def with_sense(group: Group, pose_type: type[Pose], guess: dict[str, Any]) -> Gr
     return holding(group, "sense", sense if sense is None or isinstance(sense, Tracer) else np.asarray(sense))
 
 
-def _with_found_of(group: Group, known: Group) -> Group:
-    """Take over what was not given, but found from a position, from a group that has it."""
+def _with_derived_of(group: Group, known: Group) -> Group:
+    """Return a group with offsets and signs that another one has derived from a position."""
     if measures_angle(group):
         return with_datum_of(group, known)
     if hasattr(group.element, "sense"):
@@ -344,9 +344,9 @@ def _with_found_of(group: Group, known: Group) -> Group:
     return holding(group, "offset", known.element.offset)
 
 
-def _size(groups: tuple[Group, ...], places: Float[Numbers, "component body 1"]) -> float:
+def _size(groups: tuple[Group, ...], positions: Float[Numbers, "component body 1"]) -> float:
     """Return the largest distance among the points of the joints and the bodies of the guess, 1 if there is none."""
-    points, sizes = [places[..., 0]], []
+    points, sizes = [positions[..., 0]], []
     for group in groups:
         facts = facts_of(type(group.element))
         for name, kind in field_kinds(type(group.element)).items():

@@ -67,7 +67,7 @@ def leader_name(mechanism: Mechanism, cam: Cam) -> str | None:
 def cams_in_time(mechanism: Mechanism) -> Iterator[tuple[str, FollowingMotion]]:
     """Yield the laws of cams whose leaders are driven, as laws of time, by the names of the cams.
 
-    Laws that are wrong are left out: it is told where they are used.
+    Invalid laws are left out: their use refuses them.
     """
     values = mechanism.parameter_values
     for name, cam in mechanism.joints.items():

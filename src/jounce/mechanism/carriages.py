@@ -1,4 +1,4 @@
-"""Carriages: bodies without mass whose places are the hidden coordinates of joints, such as the parameter of a curve.
+"""Carriages: bodies without mass whose positions are the hidden coordinates of joints, such as a curve parameter.
 
 The carriage of a joint is a body of the mechanism beside those of its user. Its first coordinates are the parameters,
 in units of the curve, and its last one is that unit, so that their ratio is known from its pose alone.
@@ -19,7 +19,7 @@ from jounce.trajectory.curve_checks import derivatives_at
 from jounce.trajectory.curves import HALF_WINDOW, CurveLaw, ParametricCurve, SampledCurve
 
 ENDING = ".s"
-PLACES = 721  # of a curve, and to each side of a surface its root, where it may be nearest
+SAMPLES = 721  # of a curve, and to each side of a surface its root, where it may be nearest
 ALIKE, SLIGHT = 1.25, 1e-6  # how much farther, and of the size of a curve, another part may be and count as near
 STEPS = 40
 
@@ -35,9 +35,9 @@ def carriage_of(joint: str) -> str:
     return joint + ENDING
 
 
-def carriages(place: str, element: Any) -> tuple[str, ...]:
-    """Return the names of the carriages that a joint has beside its bodies; `place` is its dotted name, or its name."""
-    return (carriage_of(place.partition(".")[2] or place),) if getattr(element, "hidden", ()) else ()
+def carriages(name: str, element: Any) -> tuple[str, ...]:
+    """Return the names of the carriages that a joint has beside its bodies; `name` is its dotted name, or its name."""
+    return (carriage_of(name.partition(".")[2] or name),) if getattr(element, "hidden", ()) else ()
 
 
 def joint_of(carriage: str) -> str:
@@ -50,7 +50,7 @@ def curve_in(values: Mapping[str, Any]) -> CurveLaw:
     return next(value for value in values.values() if isinstance(value, CurveLaw))
 
 
-def carriage_guess(curve: CurveLaw, start: Any, place: Any) -> Any:
+def carriage_guess(curve: CurveLaw, start: Any, point: Any) -> Any:
     """Return where a carriage starts.
 
     Parameters
@@ -59,7 +59,7 @@ def carriage_guess(curve: CurveLaw, start: Any, place: Any) -> Any:
         Of the joint.
     start : list of float or None
         Guess of the parameters; None for what is nearest.
-    place : array of shape (components,)
+    point : array of shape (components,)
         Where the point is, at the starting guess of the bodies, in the frame of the curve, m.
 
     Raises
@@ -67,9 +67,9 @@ def carriage_guess(curve: CurveLaw, start: Any, place: Any) -> Any:
     MechanismError
         If the start is beyond an end, or if several parts of the curve are as near.
     """
-    count = len(place)
+    count = len(point)
     if start is None:
-        start = [_nearest(curve, place)] if len(curve.components) and _is_curve(curve) else [0.0, 0.0]
+        start = [_nearest(curve, point)] if len(curve.components) and _is_curve(curve) else [0.0, 0.0]
     elif curve.ends is not None and not any(isinstance(x, Tracer) for x in (*curve.ends, *start)):
         for k, value in enumerate(start):
             low, high = (float(x) for x in curve.ends[2 * k : 2 * k + 2])
@@ -88,48 +88,50 @@ def _is_curve(curve: CurveLaw) -> bool:
     return len(names) == 1
 
 
-def _nearest(curve: CurveLaw, place: Any) -> Any:
-    """Return the parameter where a curve is nearest to a place."""
+def _nearest(curve: CurveLaw, point: Any) -> Any:
+    """Return the parameter of the point of a curve nearest to a given point."""
     low, high = (-HALF_WINDOW, HALF_WINDOW)
     if curve.ends is not None:
         low, high = _plain(curve.ends)
     elif curve.lap is not None:
         low, high = 0.0, _plain((curve.lap,))[0]
-    grid = np.linspace(low, high, PLACES)
-    if any(isinstance(x, Tracer) for x in jax.tree.leaves((curve, place))):  # it was looked at before JAX traced it
+    grid = np.linspace(low, high, SAMPLES)
+    if any(isinstance(x, Tracer) for x in jax.tree.leaves((curve, point))):  # it was looked at before JAX traced it
         points = curve(Jet([jnp.asarray(grid)])).coefficients[0]
-        far = jnp.sum((points - jnp.asarray(place)[:, None]) ** 2, axis=0)
+        far = jnp.sum((points - jnp.asarray(point)[:, None]) ** 2, axis=0)
         return jnp.asarray(grid)[jnp.nanargmin(far)]
 
     away = partial(derivatives_at, curve.components)
     points = away(grid)[0]
     size = float(np.ptp(np.where(np.isfinite(points), points, 0.0), axis=1).max()) or 1.0
-    far = np.linalg.norm(points - np.asarray(place)[:, None], axis=0)
+    far = np.linalg.norm(points - np.asarray(point)[:, None], axis=0)
     far = np.where(np.isfinite(far), far, np.inf)
     before, after = np.append(np.inf, far[:-1]), np.append(far[1:], np.inf)
     near = np.flatnonzero((far <= before) & (far <= after) & np.isfinite(far))
-    step = (high - low) / (PLACES - 1)
+    step = (high - low) / (SAMPLES - 1)
     lower, upper = np.maximum(grid[near] - step, low), np.minimum(grid[near] + step, high)
     for _ in range(STEPS):  # by thirds
         a, b = lower + (upper - lower) / 3, upper - (upper - lower) / 3
-        sizes = np.split(np.linalg.norm(away(np.concatenate([a, b]))[0] - np.asarray(place)[:, None], axis=0), 2)
+        sizes = np.split(np.linalg.norm(away(np.concatenate([a, b]))[0] - np.asarray(point)[:, None], axis=0), 2)
         nearer = sizes[0] < sizes[1]
         lower, upper = np.where(nearer, lower, a), np.where(nearer, b, upper)
-    found = 0.5 * (lower + upper)
-    points = away(found)[0]
-    distances = np.linalg.norm(points - np.asarray(place)[:, None], axis=0)
-    ranked = np.lexsort((np.abs(found), np.round(distances / (SLIGHT * size))))
+    parameter = 0.5 * (lower + upper)
+    points = away(parameter)[0]
+    distances = np.linalg.norm(points - np.asarray(point)[:, None], axis=0)
+    ranked = np.lexsort((np.abs(parameter), np.round(distances / (SLIGHT * size))))
     best = int(ranked[0])
     for k in ranked[1:]:
         elsewhere = np.linalg.norm(points[:, k] - points[:, best]) > 100 * SLIGHT * size
         crossing = (
-            not elsewhere and distances[best] < SLIGHT * size and _turned(away, float(found[best]), float(found[k]))
+            not elsewhere
+            and distances[best] < SLIGHT * size
+            and _turned(away, float(parameter[best]), float(parameter[k]))
         )
         if (elsewhere or crossing) and distances[k] <= ALIKE * distances[best] + SLIGHT * size:
-            names = " and ".join(f"s = {found[j]:.4g}" for j in sorted((best, int(k)), key=lambda j: found[j]))
+            names = " and ".join(f"s = {parameter[j]:.4g}" for j in sorted((best, int(k)), key=lambda j: parameter[j]))
             message = f"two parts of the curve are about as near to the starting guess, at {names}; give start"
             raise MechanismError(message, name="start")
-    return float(found[best])
+    return float(parameter[best])
 
 
 def _plain(values: Any) -> list[Any]:
@@ -164,11 +166,11 @@ def with_carriages(bodies: Mapping[str, Any], joints: Mapping[str, Any], kind: t
 
     `kind` is the class of carriages; the place of a new one is None, as it follows from the guess of the bodies.
     """
-    wanted = [carriage for name, joint in joints.items() for carriage in carriages(name, joint)]
+    names = [carriage for name, joint in joints.items() for carriage in carriages(name, joint)]
     own = {name: body for name, body in bodies.items() if not isinstance(body, kind)}
-    if not wanted and len(own) == len(bodies):
+    if not names and len(own) == len(bodies):
         return bodies
-    for name in (name for name in wanted if name in own):
+    for name in (name for name in names if name in own):
         message = "this name is that of the carriage of a joint; give the body another one"
         raise MechanismError(message, name=f"bodies.{name}")
-    return {**own, **{name: bodies.get(name) or kind(None) for name in wanted}}
+    return {**own, **{name: bodies.get(name) or kind(None) for name in names}}

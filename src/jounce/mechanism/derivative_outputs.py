@@ -16,14 +16,14 @@ from jounce.constraints.base import Nested, Whole
 from jounce.errors import MechanismError, no_such, whole_number
 from jounce.jet import Jet
 from jounce.jet.algebra import stacked
-from jounce.jet.rounding import rates_of, told
+from jounce.jet.rounding import nan_where_rounding, rates_of
 from jounce.mechanism.outputs import AbstractMotionOutput, AbstractOutput, AbstractQuantity
 from jounce.modules import is_ours, unchecked, with_fields
 from jounce.shapes import Numbers
 
 HIGHEST = 10  # derivative with respect to an output
 OFF_ZERO = 1e-3  # sizes of what moves: the least size of a quantity that is zero where it stands still
-MOST_TOLD = 4  # instants
+MOST_NAMED = 4  # instants
 RATES = ("derivative", "rate", "second rate", "third rate", "fourth rate")
 
 
@@ -51,7 +51,7 @@ class DerivativeOutput(AbstractMotionOutput):
     of: str = eqx.field(static=True)
     by: str = eqx.field(static=True)
     order: Whole = eqx.field(static=True, default=1)
-    found: Any = eqx.field(default=None, init=False)  # the operands, once it is an output of a mechanism
+    bound_operands: Any = eqx.field(default=None, init=False)  # the operands, once it is an output of a mechanism
 
     source: ClassVar[str] = "of"
     rate_names = RATES
@@ -62,10 +62,10 @@ class DerivativeOutput(AbstractMotionOutput):
     @property
     def operands(self) -> tuple[Operand, Operand]:
         """The outputs that it is of, in a mechanism."""
-        if self.found is None:
+        if self.bound_operands is None:
             message = "its outputs are found when it is an output of a mechanism, and `evaluate` is given one"
             raise MechanismError(message, name="of", value=self.of)
-        return self.found
+        return self.bound_operands
 
     @property
     def unit(self) -> str:  # type: ignore[override] - of an instance, as it depends on the outputs
@@ -93,8 +93,8 @@ class DerivativeOutput(AbstractMotionOutput):
         missing = ~np.isfinite(values).all(axis=1) & (np.asarray(motion.status) == 0)
         if not missing.any():
             return ""
-        where = ", ".join(f"{t:.6g} s" for t in motion.time[missing][:MOST_TOLD])
-        more = ", ..." if missing.sum() > MOST_TOLD else ""
+        where = ", ".join(f"{t:.6g} s" for t in motion.time[missing][:MOST_NAMED])
+        more = ", ..." if missing.sum() > MOST_NAMED else ""
         return f"undefined at t = {where}{more}, where '{self.by}' stands still or '{self.of}' is undefined"
 
 
@@ -155,7 +155,7 @@ def derivative_by(y: Jet, x: Jet, order: int, scale: Any) -> Jet:
     nearness, rate = rates_of(speed, scale, jnp.ndim(scale))
     for _ in range(order):
         y = y.differentiate() / speed
-    return told(y, nearness, rate, lost=order - 1)
+    return nan_where_rounding(y, nearness, rate, lost=order - 1)
 
 
 def _scale(x: Jet, unit: str, reach: Any) -> Any:
@@ -170,8 +170,8 @@ def _component(jet: Jet, component: int) -> Jet:
 
 def _series(motion: Any, operand: Operand) -> Jet:
     """Return the series of an output of a motion, or of a component, of shape (time,)."""
-    found = motion.series(operand.output)
-    return Jet(tuple(found[:, max(operand.component, 0)]))
+    series = motion.series(operand.output)
+    return Jet(tuple(series[:, max(operand.component, 0)]))
 
 
 def bound(outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> Mapping[str, AbstractQuantity]:
@@ -186,10 +186,10 @@ def bound(outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> Mapping[st
     """
     if not any(form_of(output) is DerivativeOutput for output in outputs.values()):
         return outputs
-    found: dict[str, AbstractQuantity] = {}
+    bound_outputs: dict[str, AbstractQuantity] = {}
     for name in outputs:
-        _bind(name, outputs, mechanism, found, ())
-    return {name: found[name] for name in outputs}
+        _bind(name, outputs, mechanism, bound_outputs, ())
+    return {name: bound_outputs[name] for name in outputs}
 
 
 def bound_alone(output: AbstractQuantity, mechanism: Any) -> AbstractQuantity:
@@ -206,24 +206,24 @@ def _bind(
     name: str,
     outputs: Mapping[str, AbstractQuantity],
     mechanism: Any,
-    found: dict[str, AbstractQuantity],
+    bound_outputs: dict[str, AbstractQuantity],
     waiting: tuple[str, ...],
 ) -> AbstractQuantity:
     """Return an output with those that it names, which are put among those found before it."""
     output: Any = outputs[name]
-    if name in found or form_of(output) is not DerivativeOutput:
-        return found.setdefault(name, output)
+    if name in bound_outputs or form_of(output) is not DerivativeOutput:
+        return bound_outputs.setdefault(name, output)
     if name in waiting:
         raise MechanismError("this derivative is one of itself", name=f"outputs.{name}.of", value=output.of)
     stems = [_stem(given, outputs, mechanism) for given in (output.of, output.by)]
-    if all(stems) or getattr(output, "found", output) is None:
-        own = {stem: _bind(stem, outputs, mechanism, found, (*waiting, name)) for stem in stems if stem}
+    if all(stems) or getattr(output, "bound_operands", output) is None:
+        own = {stem: _bind(stem, outputs, mechanism, bound_outputs, (*waiting, name)) for stem in stems if stem}
         try:
             output = _with_operands(output, {**outputs, **own}, mechanism)
         except MechanismError as error:
             error.name = f"outputs.{name}.{error.name}"
             raise
-    return found.setdefault(name, output)
+    return bound_outputs.setdefault(name, output)
 
 
 def _stem(name: str, outputs: Mapping[str, AbstractQuantity], mechanism: Any) -> str:
@@ -239,7 +239,7 @@ def _with_operands(output: Any, outputs: Mapping[str, AbstractQuantity], mechani
     of, by = (_operand(key, getattr(output, key), outputs, mechanism) for key in ("of", "by"))
     words = {"of": output.of, "by": output.by, "order": output.order}
     if not (_posed(of.output) and _posed(by.output)):
-        return with_fields(DerivativeOutput(**words), found=(of, by))
+        return with_fields(DerivativeOutput(**words), bound_operands=(of, by))
     values = {
         "bodies": (*of.output.bodies, *by.output.bodies),
         "first": of.output,
@@ -264,7 +264,7 @@ def _operand(key: str, name: str, outputs: Mapping[str, AbstractQuantity], mecha
 
 
 def _posed(output: Any) -> bool:
-    """Tell whether an output is a function of poses alone, which knows no place that it is counted from."""
+    """Tell whether an output is a function of poses alone, without a reference position."""
     if not isinstance(output, AbstractOutput) or not is_ours(type(output)):
         return False
     return not hasattr(output, "datum") or output.vector_i is not None

@@ -26,7 +26,7 @@ class _DriverCoordinateOutput(AbstractMotionOutput):
     source = "driver"
 
     def check(self, mechanism: Any) -> None:
-        """Raise MechanismError unless there is the driver, its class says what its coordinate is, and the unit fits."""
+        """Raise MechanismError unless the driver exists, its class defines its coordinate, and the unit fits."""
         check_name("driver", self.driver, mechanism.drivers, MechanismError, name="driver")
         driver = mechanism.drivers[self.driver]
         if not hasattr(driver, "evaluate"):

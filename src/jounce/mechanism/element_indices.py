@@ -17,12 +17,12 @@ class ElementIndex:
 
 def element_indices(model: Model) -> dict[str, ElementIndex]:
     """Return the indices of all joints and drivers, by name."""
-    found = {}
+    indices = {}
     for index, (group, rows) in enumerate(zip(model.system.groups, group_rows(model), strict=True)):
         for instance, name in enumerate(model.rows[rows][: group.instances]):
             own = range(rows.start + instance, rows.stop, group.instances)
-            found[name.partition(".")[2]] = ElementIndex(index, instance, rows, own)
-    return found
+            indices[name.partition(".")[2]] = ElementIndex(index, instance, rows, own)
+    return indices
 
 
 def force_names(model: Model) -> list[str]:

@@ -66,8 +66,8 @@ def _check_belts(belts: planar.Belt, names: Sequence[str]) -> None:
     """Raise MechanismError where belts cannot count the turns of their lines of centers."""
     if isinstance(belts.ratio, Tracer):
         return
-    apart = np.abs(1.0 - np.asarray(belts.ratio)).ravel()
-    odd = np.flatnonzero((apart > 0) & (apart < LEAST_DIFFERENCE))
+    differences = np.abs(1.0 - np.asarray(belts.ratio)).ravel()
+    odd = np.flatnonzero((differences > 0) & (differences < LEAST_DIFFERENCE))
     if odd.size:
         message = (
             "radii that are nearly the same need one body that carries both pulleys, which counts the turns of the "

@@ -67,11 +67,11 @@ def on_line(element: Any) -> bool:
 def grouped_with_frames(mechanism: Mechanism, elements: Mapping[str, Any]) -> Grouped:
     """Return the groups of some elements of a mechanism, by name with their kinds; gears with what carries them."""
     index = {name: k for k, name in enumerate((GROUND, *mechanism.bodies))}
-    arms = _arms(mechanism, elements)
+    arms = _find_arms(mechanism, elements)
     given = _with_arms(_with_slots(elements), arms)
     groups, names = group_elements(given, mechanism.parameter_values, index, POSITION_COMPONENTS[mechanism.space])
-    found = zip(groups, names, strict=True)
-    return tuple(_carried(group, members, arms, mechanism, elements) for group, members in found), names
+    named_groups = zip(groups, names, strict=True)
+    return tuple(_with_carriers(group, members, arms, mechanism, elements) for group, members in named_groups), names
 
 
 def check_distances(mechanism: Mechanism) -> None:
@@ -81,15 +81,15 @@ def check_distances(mechanism: Mechanism) -> None:
     joints = {f"joints.{name}": joint for name, joint in mechanism.joints.items()}
     if any(isinstance(joint, Rope) for joint in joints.values()):
         check_ropes(*grouped_with_frames(mechanism, joints))
-    _arms(mechanism, joints)
+    _find_arms(mechanism, joints)
 
 
 def carriers(mechanism: Mechanism) -> set[str]:
     """Return the bodies that carry gears with teeth, or both pulleys of a belt; the ground may be among them."""
-    return {arm.body for arm in _arms(mechanism, mechanism.joints).values()}
+    return {arm.body for arm in _find_arms(mechanism, mechanism.joints).values()}
 
 
-def _arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, Arm]:
+def _find_arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, Arm]:
     """Return what carries the toothed gears and the belts among some elements, by their names; none that is not found.
 
     Raises
@@ -100,16 +100,16 @@ def _arms(mechanism: Mechanism, elements: Mapping[str, Any]) -> dict[str, Arm]:
     toothed = {name: element for name, element in elements.items() if on_line(element)}
     if not toothed:
         return {}
-    pins = _joined(mechanism, _pinned)
-    found = {name: _arm(name, element, mechanism.parameter_values, pins) for name, element in toothed.items()}
-    return {name: arm for name, arm in found.items() if arm is not None}
+    pins = _joined_vectors(mechanism, _pinned)
+    arms = {name: _find_arm(name, element, mechanism.parameter_values, pins) for name, element in toothed.items()}
+    return {name: arm for name, arm in arms.items() if arm is not None}
 
 
-def _arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[str, Any], pins: Joined) -> Arm | None:
+def _find_arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[str, Any], pins: Joined) -> Arm | None:
     try:
         radii = [resolve(radius, parameters) for radius in (gear.radius_i, gear.radius_j)]
         points = [
-            _place(body, p, parameters) for body, p in zip(gear.bodies, (gear.point_i, gear.point_j), strict=True)
+            _body_vector(body, p, parameters) for body, p in zip(gear.bodies, (gear.point_i, gear.point_j), strict=True)
         ]
     except JounceError:
         return None  # which is told where all values of the gear are
@@ -125,7 +125,7 @@ def _arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[str, An
         pairs = zip(a.value, b.value, a.given, b.given, strict=True)
         return all(_same(x, y, of_x, of_y, same) for x, y, of_x, of_y in pairs)
 
-    first, second = (_reached(point, pins, coincide) for point in points)
+    first, second = (_on_joined_bodies(point, pins, coincide) for point in points)
     shared = [body for body in first if body in second and body not in gear.bodies]
     if not shared:
         return None
@@ -135,25 +135,28 @@ def _arm(name: str, gear: planar.Gear | planar.Belt, parameters: Mapping[str, An
         check = _check_gap if is_toothed(gear) else _check_overlap
         check(name, body, math.hypot(*line), [float(radius) for radius in radii])
         return Arm(body, math.atan2(line[1], line[0]))
-    apart = jnp.abs(radii[0] + radii[1])  # of a design that JAX traces: it fails where there is a gap, or an overlap
-    gap = jnp.hypot(*line) - apart
-    meshes = jnp.abs(gap) <= LARGEST_GAP * apart if is_toothed(gear) else gap > 0
+    center_distance = jnp.abs(
+        radii[0] + radii[1]
+    )  # of a design that JAX traces: it fails where there is a gap, or an overlap
+    gap = jnp.hypot(*line) - center_distance
+    meshes = jnp.abs(gap) <= LARGEST_GAP * center_distance if is_toothed(gear) else gap > 0
     return Arm(body, jnp.where(meshes, jnp.arctan2(line[1], line[0]), jnp.nan))
 
 
 def _check_gap(name: str, body: str, distance: float, radii: Sequence[float]) -> None:
     """Raise MechanismError unless centers are as far apart on a body as pitch radii say."""
-    apart = abs(sum(radii))
+    center_distance = abs(sum(radii))
     if radii[0] < 0 and radii[1] < 0:
         raise MechanismError("one gear at most is a ring, of a radius below zero", name=f"{name}.radii", value=radii)
-    if apart <= LARGEST_GAP * max(map(abs, radii)) or min(radii) < 0 < sum(radii):
+    if center_distance <= LARGEST_GAP * max(map(abs, radii)) or min(radii) < 0 < sum(radii):
         message = "a ring is larger than the gear in it, or they do not turn against each other"
         raise MechanismError(message, name=f"{name}.radii", value=radii)
-    if not abs(distance - apart) <= LARGEST_GAP * apart:
+    if not abs(distance - center_distance) <= LARGEST_GAP * center_distance:
         kind = "of a ring less that of the gear in it" if min(radii) < 0 else "together"
         message = (
-            f"the centers are {distance:.9g} m apart on '{body}', and the pitch radii {kind} are {apart:.9g} m, a gap "
-            f"of {distance - apart:.3g} m: move a center, or change a radius (a ring has one below zero)"
+            f"the centers are {distance:.9g} m apart on '{body}', and the pitch radii {kind} are "
+            f"{center_distance:.9g} m, a gap of {distance - center_distance:.3g} m: move a center, or change a radius "
+            "(a ring has one below zero)"
         )
         raise MechanismError(message, name=f"{name}.radii", value=radii)
 
@@ -170,20 +173,20 @@ def _check_overlap(name: str, body: str, distance: float, radii: Sequence[float]
 
 def _with_slots(elements: Mapping[str, Any]) -> dict[str, Any]:
     """Return elements of which ropes with several points on a body have it once."""
-    found = dict(elements)
+    changed = dict(elements)
     for name, element in elements.items():
         if shares_points(element):
             bodies, slots = distinct(element.bodies)
-            found[name] = unchecked_copy(element, bodies=bodies, slots=slots)
-    return found
+            changed[name] = unchecked_copy(element, bodies=bodies, slots=slots)
+    return changed
 
 
 def _with_arms(elements: Mapping[str, Any], arms: Mapping[str, Arm]) -> dict[str, Any]:
     """Return elements of which gears with teeth and belts have a third body, that carries them."""
-    found = dict(elements)
+    changed = dict(elements)
     for name, arm in arms.items():
-        found[name] = unchecked_copy(found[name], bodies=(*found[name].bodies, arm.body))
-    return found
+        changed[name] = unchecked_copy(changed[name], bodies=(*changed[name].bodies, arm.body))
+    return changed
 
 
 def unchecked_copy(element: Any, **changed: Any) -> Any:
@@ -194,7 +197,7 @@ def unchecked_copy(element: Any, **changed: Any) -> Any:
     return copy
 
 
-def _carried(
+def _with_carriers(
     group: Group, members: Sequence[str], arms: Mapping[str, Arm], mechanism: Mechanism, elements: Mapping[str, Any]
 ) -> Group:
     """Return a group of gears with what is found of what carries them; others as they are."""
@@ -215,19 +218,19 @@ def _number(value: Any) -> Any:
 
 def _on_frames(group: Group, gears: Sequence[spatial.Gear], mechanism: Mechanism) -> Group:
     """Return shafts with the axes that they turn about in their frames, where these are found, and whole turns."""
-    hinges, parameters = _joined(mechanism, _held_parallel), mechanism.parameter_values
+    hinges, parameters = _joined_vectors(mechanism, _held_parallel), mechanism.parameter_values
     for slot, field in enumerate(("held_i", "held_j")):
         data = []
         for gear in gears:
-            axis = _place(gear.bodies[slot], (gear.axis_i, gear.axis_j)[slot], parameters)
-            there = _reached(axis, hinges, _parallel).get(gear.bodies[2])
+            axis = _body_vector(gear.bodies[slot], (gear.axis_i, gear.axis_j)[slot], parameters)
+            there = _on_joined_bodies(axis, hinges, _parallel).get(gear.bodies[2])
             if there is None:
                 break
             data.append((_vector(axis.value), _vector(there.value)))
         if len(data) == len(gears):
             axis, there = (along_instances(*vectors) for vectors in zip(*data, strict=True))
             group = holding(group, field, _coaxial(axis, there))
-    return holding(group, "whole", _whole(group.element.ratio))
+    return holding(group, "whole", _whole_multiples(group.element.ratio))
 
 
 def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group:
@@ -236,10 +239,13 @@ def _on_hinges(group: Group, cams: Sequence[Cam], mechanism: Mechanism) -> Group
     for field in ("follower", "leader"):
         if not turns_in_space(getattr(group.element, field)):
             continue
-        hinges = _joined(mechanism, _held_parallel) if hinges is None else hinges
+        hinges = _joined_vectors(mechanism, _held_parallel) if hinges is None else hinges
         parts = [getattr(cam, field) for cam in cams]
-        axes = [_place(part.bodies[0], part.axis_i, mechanism.parameter_values) for part in parts]
-        found = [_reached(axis, hinges, _parallel).get(part.bodies[1]) for axis, part in zip(axes, parts, strict=True)]
+        axes = [_body_vector(part.bodies[0], part.axis_i, mechanism.parameter_values) for part in parts]
+        found = [
+            _on_joined_bodies(axis, hinges, _parallel).get(part.bodies[1])
+            for axis, part in zip(axes, parts, strict=True)
+        ]
         if any(there is None for there in found):
             continue
         first, second = (along_instances(*(_vector(x.value) for x in its if x)) for its in (axes, found))
@@ -256,13 +262,13 @@ def _across(vector: Any, axis: Any) -> Any:
 
 
 def _coaxial(axis: Any, there: Any) -> Datum:
-    found = coaxial(axis, there)
+    datum = coaxial(axis, there)
     if any(isinstance(x, Tracer) for x in (axis, there)):
-        return found
-    return Datum(*(np.asarray(x) for x in (found.attitude, found.angle, found.near)))
+        return datum
+    return Datum(*(np.asarray(x) for x in (datum.attitude, datum.angle, datum.near)))
 
 
-def _whole(ratio: Any) -> Any:
+def _whole_multiples(ratio: Any) -> Any:
     """Return the smallest whole numbers, (instances, 1), by which ratios become whole; NaN where there are none."""
     namespace = jnp if isinstance(ratio, Tracer) else np
     counts = np.arange(1.0, LARGEST_WHOLE + 1)
@@ -273,22 +279,22 @@ def _whole(ratio: Any) -> Any:
     return namespace.where(fits.any(axis=-1), 1.0 + namespace.argmax(fits, axis=-1), np.nan)
 
 
-def _joined(
+def _joined_vectors(
     mechanism: Mechanism, pairs_of: Callable[[Any], Sequence[tuple[str, str]]]
 ) -> list[tuple[BodyVector, BodyVector]]:
     """Return the places that joints hold together, by the pairs of fields that say so."""
-    found = []
+    pairs = []
     for joint in mechanism.joints.values():
         for names in pairs_of(joint):
             try:
                 first, second = (
-                    _place(body, getattr(joint, name), mechanism.parameter_values)
+                    _body_vector(body, getattr(joint, name), mechanism.parameter_values)
                     for body, name in zip(joint.bodies, names, strict=False)
                 )
             except JounceError:
                 continue
-            found.append((first, second))
-    return found
+            pairs.append((first, second))
+    return pairs
 
 
 def _pinned(joint: Any) -> list[tuple[str, str]]:
@@ -300,7 +306,7 @@ def _held_parallel(joint: Any) -> Sequence[tuple[str, str]]:
     return facts_of(type(joint)).held_parallel
 
 
-def _place(body: str, given: Any, parameters: Mapping[str, Any]) -> BodyVector:
+def _body_vector(body: str, given: Any, parameters: Mapping[str, Any]) -> BodyVector:
     entries = tuple(given.tolist() if isinstance(given, np.ndarray) else given)
     return BodyVector(body, tuple(resolve(entry, parameters) for entry in entries), entries)
 
@@ -322,22 +328,22 @@ def _parallel(a: BodyVector, b: BodyVector) -> int:
     return int(np.sign(u @ v)) if np.linalg.norm(np.cross(u, v)) <= SAME_DIRECTION else 0
 
 
-def _reached(
+def _on_joined_bodies(
     start: BodyVector, joined: Joined, alike: Callable[[BodyVector, BodyVector], int | bool]
 ) -> dict[str, BodyVector]:
     """Return where a place is on each body that joints hold to it, one after the other."""
-    found, waiting = {start.body: start}, [start]
+    reached, waiting = {start.body: start}, [start]
     while waiting:
         here = waiting.pop(0)
         for pair in joined:
             for near, far in (pair, pair[::-1]):
-                if near.body != here.body or far.body in found:
+                if near.body != here.body or far.body in reached:
                     continue
-                if sense := int(alike(here, near)):
-                    there = far if sense > 0 else BodyVector(far.body, tuple(-x for x in far.value), far.given)
-                    found[far.body] = there
+                if sign := int(alike(here, near)):
+                    there = far if sign > 0 else BodyVector(far.body, tuple(-x for x in far.value), far.given)
+                    reached[far.body] = there
                     waiting.append(there)
-    return found
+    return reached
 
 
 def _vector(value: tuple[Any, ...]) -> Any:

@@ -15,7 +15,7 @@ from jounce.mechanism.mechanism import Mechanism
 from jounce.mechanism.output_drivers import with_output_drivers
 from jounce.mechanism.resolve import resolve_motion
 from jounce.settings import under_own_settings
-from jounce.trajectory.breaks import apart, law_breaks, may_break
+from jounce.trajectory.breaks import distinct_instants, law_breaks, may_break
 from jounce.trajectory.motion import AbstractMotion, ExpressionMotion
 from jounce.units.expression import Expression
 
@@ -50,11 +50,11 @@ def breaks_of_laws(
     >>> breaks_of_laws(press, 0.0, 1.2, 3).round(9).tolist()
     [0.05, 0.35, 0.55, 0.65, 0.75, 1.15]
     """
-    found = law_breaks(laws_of(mechanism), first, last, order)
+    breaks = law_breaks(laws_of(mechanism), first, last, order)
     if order < OF_FORCES or not (_shows_forces(mechanism) if forces is None else forces):
-        return found
+        return breaks
     of_forces = law_breaks(laws_of_forces(mechanism), first, last, order - OF_FORCES)
-    return apart(np.concatenate([found, of_forces]), first, last)
+    return distinct_instants(np.concatenate([breaks, of_forces]), first, last)
 
 
 @under_own_settings
@@ -95,17 +95,17 @@ def laws_of(mechanism: Mechanism) -> list[AbstractMotion]:
     """Return the laws of drivers, and of cams that these lead, with numbers in the place of parameters."""
     values, drivers = mechanism.parameter_values, with_output_drivers(mechanism).drivers.values()
     motions = (getattr(driver, "motion", None) for driver in drivers)
-    found = [resolve_motion(motion, values) for motion in motions if motion is not None]
-    return [*found, *(law for _, law in cams_in_time(mechanism))]
+    laws = [resolve_motion(motion, values) for motion in motions if motion is not None]
+    return [*laws, *(law for _, law in cams_in_time(mechanism))]
 
 
 def laws_of_forces(mechanism: Mechanism) -> list[AbstractMotion]:
     """Return the laws of forces that depend on time, as laws of time alone."""
-    found = []
+    laws = []
     for force in mechanism.forces.values():
         fields = [name for name, kind in field_kinds(type(force)).items() if kind in ("law", "laws")]
-        found += [law for name in fields for law in _in_time(getattr(force, name), force, mechanism.parameter_values)]
-    return found
+        laws += [law for name in fields for law in _in_time(getattr(force, name), force, mechanism.parameter_values)]
+    return laws
 
 
 def _shows_forces(mechanism: Mechanism) -> bool:

@@ -1,4 +1,4 @@
-"""What the laws of a mechanism say of the instants that are asked for: checked before any computing."""
+"""Checks of the laws of a mechanism at the requested instants, before any computing."""
 
 from collections.abc import Iterator
 
@@ -27,7 +27,7 @@ def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces
     order : int
         Highest derivative of the motion.
     forces : bool
-        Whether the applied forces bear on what is wanted.
+        Whether the applied forces matter for the result.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces
     Warns
     -----
     UnitWarning
-        A law of an angle is likely in degrees, told once for each driver.
+        A law of an angle is likely in degrees: a warning, once for each driver.
     SampleWarning
         The estimated error of a derivative of samples exceeds a tenth of its peak, as for a `JointTrajectory`.
     """
@@ -50,22 +50,22 @@ def check_laws(mechanism: Mechanism, instants: np.ndarray, order: int, *, forces
     for kind, since, until, orders in parts:
         for name, element in getattr(mechanism, kind).items():
             for field, law in _motions(element):
-                place = f"{kind}.{name}.{field}"
+                location = f"{kind}.{name}.{field}"
                 try:
                     law = law.resolved(mechanism.parameter_values)
                     law.check_instants(since, until)
                 except JounceError as error:
-                    raise error.located(name=place) from None
+                    raise error.located(name=location) from None
                 if orders >= 0 and isinstance(law, SplineMotion):
-                    _warn(place, law, orders)
+                    _warn(location, law, orders)
     for name, law in cams_in_time(mechanism):
-        place = f"joints.{name}.motion"
+        location = f"joints.{name}.motion"
         try:
             law.check_instants(first, last)
         except JounceError as error:
-            raise error.located(name=place) from None
+            raise error.located(name=location) from None
         if isinstance(law.parts[0], SplineMotion):
-            _warn(place, law.parts[0], order)
+            _warn(location, law.parts[0], order)
 
 
 def _motions(element: AbstractConstraint | AbstractForce) -> Iterator[tuple[str, AbstractMotion]]:
@@ -81,8 +81,8 @@ def _motions(element: AbstractConstraint | AbstractForce) -> Iterator[tuple[str,
                 yield field, law
 
 
-def _warn(place: str, law: SplineMotion, order: int) -> None:
+def _warn(location: str, law: SplineMotion, order: int) -> None:
     """Warn of the lowest derivative that the samples of a law do not support."""
     if (doubt := unsupported_derivative(law.errors, order)) is not None:
-        words = unsupported_words(place, *doubt, law.degree)
+        words = unsupported_words(location, *doubt, law.degree)
         warn_caller(SampleWarning(words))

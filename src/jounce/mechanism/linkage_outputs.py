@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jounce.constraints.base import Vector
 from jounce.constraints.planar import length_of
 from jounce.jet import Jet, atan2, cross, dot, stack
-from jounce.jet.rounding import SMALLEST, rates_of, sizes, told, told_in_plane
+from jounce.jet.rounding import SMALLEST, nan_where_rounding, nan_where_rounding_in_plane, rates_of, sizes
 from jounce.mechanism.outputs import AbstractOutput
 from jounce.rigid import PlanarPose, SpatialPose
 from jounce.rigid.planar import perpendicular
@@ -41,7 +41,7 @@ class ProjectedAngleOutput(AbstractOutput):
         first = self.vector_i - dot(self.vector_i, normal)[None] * normal
         first = first / length_of(first)[None]
         along, across = seen.dot(first), seen.dot(cross(normal, first))
-        return told_in_plane(atan2(across, along), stack([along, across]), seen)
+        return nan_where_rounding_in_plane(atan2(across, along), stack([along, across]), seen)
 
 
 class _CenterOutput(AbstractOutput):
@@ -65,11 +65,11 @@ class InstantCenterOutput(_CenterOutput):
     choices = {"frame": ("global", "body")}
 
     def evaluate(self, body_i: PlanarPose, body_j: PlanarPose) -> Jet:
-        place = body_i.to_body(body_j.position - body_i.position)
+        position = body_i.to_body(body_j.position - body_i.position)
         turning = (body_j.angle - body_i.angle).differentiate()
-        arm = place.differentiate() / turning
-        center = place.truncate(arm.order) + perpendicular(arm)
-        center = _where_turning(center, turning)
+        arm = position.differentiate() / turning
+        center = position.truncate(arm.order) + perpendicular(arm)
+        center = _nan_without_rotation(center, turning)
         if self.frame == "body":
             return center
         return (body_i.position + body_i.direction(center)).truncate(center.order)
@@ -94,17 +94,17 @@ class SpatialInstantCenterOutput(_CenterOutput):
 
     def evaluate(self, body_i: SpatialPose, body_j: SpatialPose) -> Jet:
         normal = body_i.direction(self.normal / length_of(self.normal)[None])
-        place, turning = body_i.point(self.point_i), _spin(body_j) - _spin(body_i)
+        position, turning = body_i.point(self.point_i), _spin(body_j) - _spin(body_i)
         # both bodies have a point here, at rest in body i; that of body j moves on
         velocity = (
             body_j.position.differentiate()
-            + _spin(body_j).cross(place - body_j.position)
+            + _spin(body_j).cross(position - body_j.position)
             - body_i.position.differentiate()
-            - _spin(body_i).cross(place - body_i.position)
+            - _spin(body_i).cross(position - body_i.position)
         )
         about = normal.dot(turning)
-        center = place + normal.cross(velocity) / about
-        center = _where_turning(center, about)
+        center = position + normal.cross(velocity) / about
+        center = _nan_without_rotation(center, about)
         if self.frame == "body":
             offset = center - body_i.position
             return stack([axis.dot(offset) for axis in body_i.axes])
@@ -130,8 +130,8 @@ class RollCenterOutput(_CenterOutput):
 
     def evaluate(self, body_i: SpatialPose, body_j: SpatialPose, body_m: SpatialPose) -> Jet:
         normal = self.normal / length_of(self.normal)[None]
-        left, right = _seen(body_i, body_j.point(self.point_j)), _seen(body_i, body_m.point(self.point_m))
-        center = _meeting(normal, left, right, left.differentiate(), right.differentiate())
+        left, right = _in_frame(body_i, body_j.point(self.point_j)), _in_frame(body_i, body_m.point(self.point_m))
+        center = _intersection(normal, left, right, left.differentiate(), right.differentiate())
         return (body_i.position + body_i.direction(center)).truncate(center.order)
 
 
@@ -152,33 +152,33 @@ class SymmetricRollCenterOutput(_CenterOutput):
     def evaluate(self, body: SpatialPose) -> Jet:
         normal = self.normal / length_of(self.normal)[None]
         lateral = self.vector_i / length_of(self.vector_i)[None]
-        place = body.point(self.point)
+        position = body.point(self.point)
 
         def mirrored(vector: Jet) -> Jet:
             return vector - 2.0 * (vector.dot(lateral) * lateral)
 
-        velocity = place.differentiate()
-        return _meeting(normal, place, mirrored(place), velocity, mirrored(velocity))
+        velocity = position.differentiate()
+        return _intersection(normal, position, mirrored(position), velocity, mirrored(velocity))
 
 
 def _spin(body: SpatialPose) -> Jet:
     return body.global_angular_velocity()
 
 
-def _seen(frame: SpatialPose, place: Jet) -> Jet:
-    """Return a place in the frame of a body."""
-    offset = place - frame.position
+def _in_frame(frame: SpatialPose, position: Jet) -> Jet:
+    """Return a position in the frame of a body."""
+    offset = position - frame.position
     return stack([axis.dot(offset) for axis in frame.axes])
 
 
-def _where_turning(center: Jet, turning: Jet) -> Jet:
+def _nan_without_rotation(center: Jet, turning: Jet) -> Jet:
     """Return a center with NaN where the rate of turning that it was divided by vanishes."""
     batch = jnp.ndim(turning.coefficients[0])
-    return told(center, *rates_of(turning, jnp.ones_like(turning.coefficients[0]), batch))
+    return nan_where_rounding(center, *rates_of(turning, jnp.ones_like(turning.coefficients[0]), batch))
 
 
-def _meeting(normal: Any, first: Jet, second: Jet, first_rate: Jet, second_rate: Jet) -> Jet:
-    """Return where lines through two places, perpendicular to velocities, meet in a plane midway between them."""
+def _intersection(normal: Any, first: Jet, second: Jet, first_rate: Jet, second_rate: Jet) -> Jet:
+    """Return where lines through two points, perpendicular to velocities, meet in a plane midway between them."""
 
     def flat(vector: Jet) -> Jet:
         return vector - vector.dot(normal) * normal
@@ -193,5 +193,7 @@ def _meeting(normal: Any, first: Jet, second: Jet, first_rate: Jet, second_rate:
     scale = sizes(between, batch)[0]
     slow, fast = sizes(v, batch)[0], sizes(w, batch)[0]
     for speed in (v, w):
-        center = told(center, *rates_of(speed, scale, batch))
-    return told(center, jnp.zeros_like(scale), scale, also=jnp.abs(area.coefficients[0]) > SMALLEST * slow * fast)
+        center = nan_where_rounding(center, *rates_of(speed, scale, batch))
+    return nan_where_rounding(
+        center, jnp.zeros_like(scale), scale, also=jnp.abs(area.coefficients[0]) > SMALLEST * slow * fast
+    )

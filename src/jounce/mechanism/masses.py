@@ -1,4 +1,4 @@
-"""Masses of bodies in numbers, checked: what no real body can have is refused."""
+"""Masses of bodies in numbers; impossible ones are refused."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -43,22 +43,22 @@ def body_mass(
     >>> mass, center.tolist(), inertia
     (3.0, [0.1, 0.0], 2.0)
     """
-    place = f"bodies.{name}"
+    location = f"bodies.{name}"
     kind, zero = ("scalar", 0.0) if components == 2 else ("tensor", [0.0] * 3)
-    mass = resolved(0.0 if body.mass is None else body.mass, f"{place}.mass", "scalar", 0, parameters)
+    mass = resolved(0.0 if body.mass is None else body.mass, f"{location}.mass", "scalar", 0, parameters)
     center = [0.0] * components if body.center_of_mass is None else body.center_of_mass
-    center = resolved(center, f"{place}.center_of_mass", "vector", components, parameters)
+    center = resolved(center, f"{location}.center_of_mass", "vector", components, parameters)
     inertia = zero if body.inertia is None else body.inertia
-    inertia = resolved(inertia, f"{place}.inertia", kind, components, parameters)
+    inertia = resolved(inertia, f"{location}.inertia", kind, components, parameters)
     for field, value in (("mass", mass), ("inertia", inertia)):
         if np.shape(value) == () and not isinstance(value, Tracer) and value < 0:
-            raise MechanismError("must not be negative", name=f"{place}.{field}", value=float(value))
+            raise MechanismError("must not be negative", name=f"{location}.{field}", value=float(value))
     if solid and components == 3 and not isinstance(inertia, Tracer):
         try:
             whole = Inertia(1.0, tensor=inertia, strict=False)
         except RobotError as error:
-            raise MechanismError(error.message, name=f"{place}.inertia", value=error.value) from None
+            raise MechanismError(error.message, name=f"{location}.inertia", value=error.value) from None
         if fault := whole.fault:
-            raise MechanismError(f"{fault.words}; {ADVICE}", name=f"{place}.inertia", value=fault.value)
+            raise MechanismError(f"{fault.words}; {ADVICE}", name=f"{location}.inertia", value=fault.value)
         inertia = whole.tensor
     return mass, center, inertia

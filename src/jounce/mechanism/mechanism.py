@@ -42,7 +42,7 @@ RATE_COLUMN = re.compile(r".*_d[0-9]+", re.DOTALL)
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """A rigid body: where it is guessed to start, and its mass where forces are wanted.
+    """A rigid body: where it is guessed to start, and its mass where forces are requested.
 
     Parameters
     ----------
@@ -89,18 +89,18 @@ class Body:
                 raise MechanismError(message, name="inertia")
             whole, planar = self.inertia, len(self.position) == 2
             tensor = float(whole.tensor[2, 2]) if planar else whole.tensor
-            found = {"mass": whole.mass, "center_of_mass": whole.center_of_mass[: 2 if planar else 3]}
-            for name, value in {**found, "inertia": tensor}.items():
+            derived = {"mass": whole.mass, "center_of_mass": whole.center_of_mass[: 2 if planar else 3]}
+            for name, value in {**derived, "inertia": tensor}.items():
                 object.__setattr__(self, name, value)
 
 
 class Carriage(Body):
-    """What has the hidden coordinates of a joint, such as the parameter of a curve: see `carriages`."""
+    """A body without mass for the hidden coordinates of a joint, such as the parameter of a curve: see `carriages`."""
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Mechanism(Displayed):
-    """Bodies, the joints and drivers between them, and what is to be known of their motion.
+    """Bodies, the joints and drivers between them, and outputs of their motion.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ class Mechanism(Displayed):
         Drivers that hold at the start of a simulation only: they give the position and the velocity there, by value and
         first derivative of their law, and are then released.
     outputs : dict of str to AbstractQuantity, optional
-        Quantities wanted, by name.
+        Quantities requested, by name.
     parameters : dict of str to number or expression, optional
         Named values, SI.
     gravity : sequence, optional
@@ -196,7 +196,7 @@ class Mechanism(Displayed):
 
     def __repr__(self) -> str:
         kinds = {"bodies": self.rigid_bodies, **self.elements}
-        counts = ", ".join(f"{kind} {len(found)}" for kind, found in kinds.items() if found)
+        counts = ", ".join(f"{kind} {len(members)}" for kind, members in kinds.items() if members)
         return f"<Mechanism {self.title}{': ' if self.title else ''}{self.space}; {counts}>"
 
     @property
@@ -236,21 +236,21 @@ class Mechanism(Displayed):
             raise MechanismError(message, name="assembly", value=wish)
 
     def _check_element(self, kind: str, name: str, element: Any) -> None:
-        place = f"{kind}.{name}"
-        wanted = CLASSES.get(kind, AbstractConstraint)
-        if not isinstance(element, wanted):
-            raise MechanismError(f"must be one of the classes of {kind}", name=place, value=element)
+        location = f"{kind}.{name}"
+        expected = CLASSES.get(kind, AbstractConstraint)
+        if not isinstance(element, expected):
+            raise MechanismError(f"must be one of the classes of {kind}", name=location, value=element)
         if kind == "initial" and element.role != "driver":
             message = "an initial condition is given by a driver"
-            raise MechanismError(message, name=place, value=element.type_name or type(element).__name__)
+            raise MechanismError(message, name=location, value=element.type_name or type(element).__name__)
         if kind == "forces" and not set(element.bodies) - {GROUND}:
-            raise MechanismError("acts on the ground alone, which never moves", name=f"{place}.bodies")
-        self.check_fit(element, place)
+            raise MechanismError("acts on the ground alone, which never moves", name=f"{location}.bodies")
+        self.check_fit(element, location)
         if kind == "outputs":
             try:
                 element.check(self)
             except MechanismError as error:
-                error.name = f"{place}.{error.name}"  # it knows its fields only
+                error.name = f"{location}.{error.name}"  # it knows its fields only
                 raise
 
     def _check_columns(self) -> None:
@@ -261,13 +261,13 @@ class Mechanism(Displayed):
                 message = f"this name is taken by a component of the output '{stem}'; give another one"
                 raise MechanismError(message, name=f"outputs.{name}")
 
-    def check_fit(self, element: AbstractConstraint | AbstractForce | AbstractQuantity, place: str) -> None:
+    def check_fit(self, element: AbstractConstraint | AbstractForce | AbstractQuantity, location: str) -> None:
         """Raise MechanismError unless an element exists in this space and names bodies that there are."""
         if element.space and element.space != self.space:
-            raise MechanismError(f"is {element.space}, in a {self.space} mechanism", name=place)
+            raise MechanismError(f"is {element.space}, in a {self.space} mechanism", name=location)
         for body in getattr(element, "bodies", ()):
             if body not in self.bodies:
-                check_name("body", body, (GROUND, *self.bodies), MechanismError, name=f"{place}.bodies")
+                check_name("body", body, (GROUND, *self.bodies), MechanismError, name=f"{location}.bodies")
 
     @property
     def elements(self) -> dict[str, Mapping[str, Any]]:
@@ -307,7 +307,7 @@ class Mechanism(Displayed):
         return values
 
     @cached_property
-    def spans_looked_at(self) -> set[tuple[float, float]]:
+    def checked_intervals(self) -> set[tuple[float, float]]:
         """The first and last instants between which its laws were looked at for units other than of SI, s."""
         return set()
 
@@ -360,26 +360,26 @@ def names_column(name: str) -> bool:
     return name in RESERVED_OUTPUTS or RATE_COLUMN.fullmatch(name) is not None
 
 
-def check_body_name(given: object, error: type[JounceError], **place: Any) -> None:
-    """Raise an error unless a moving body may have a name; `place` says where it stands."""
+def check_body_name(given: object, error: type[JounceError], **location: Any) -> None:
+    """Raise an error unless a moving body may have a name; `location` is that of the name."""
     if given == GROUND:
-        raise error("the body 'ground' always exists and never moves; give another name", **place)
+        raise error("the body 'ground' always exists and never moves; give another name", **location)
 
 
-def check_output_name(given: object, error: type[JounceError], **place: Any) -> None:
-    """Raise an error unless an output may have a name; `place` says where it stands.
+def check_output_name(given: object, error: type[JounceError], **location: Any) -> None:
+    """Raise an error unless an output may have a name; `location` is that of the name.
 
     Spaces, brackets and quotes are allowed: tables keep them. Files of mechanisms allow less.
     """
     if not isinstance(given, str) or not given:
-        raise error("the name of an output is text that is not empty", value=given, **place)
+        raise error("the name of an output is text that is not empty", value=given, **location)
     if names_column(given):
         rate = RATE_COLUMN.fullmatch(given) is not None
         why = f", where '_d' and a number mean a derivative of '{given.rpartition('_d')[0]}'" if rate else ""
-        raise error(f"the name '{given}' is reserved for columns of the results{why}; give another one", **place)
+        raise error(f"the name '{given}' is reserved for columns of the results{why}; give another one", **location)
 
 
 def check_mechanism(given: object) -> None:
-    """Raise MechanismError for what is no mechanism, such as the name of a file."""
+    """Raise MechanismError for anything but a mechanism, such as the name of a file."""
     if not isinstance(given, Mechanism):
         raise MechanismError("must be a jn.Mechanism; jn.load reads one from a file", name="mechanism", value=given)

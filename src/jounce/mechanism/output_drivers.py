@@ -38,8 +38,8 @@ def with_outputs(mechanism: Mechanism, outputs: Mapping[str, AbstractQuantity]) 
     """Return the mechanism with other outputs, and with those of its own that drivers follow from."""
     followed = {motion.output for motion in output_laws(mechanism).values()}
     followed |= {name.rpartition("_")[0] for name in followed}
-    kept = {name: output for name, output in mechanism.outputs.items() if name in followed}
-    return dataclasses.replace(mechanism, outputs={**kept, **outputs})
+    followed_outputs = {name: output for name, output in mechanism.outputs.items() if name in followed}
+    return dataclasses.replace(mechanism, outputs={**followed_outputs, **outputs})
 
 
 def without_output_laws(mechanism: Mechanism) -> Mechanism:
@@ -64,23 +64,25 @@ def with_output_drivers(mechanism: Mechanism) -> Mechanism:
         return mechanism
     held = dict(mechanism.drivers)
     for name, motion in led.items():
-        place = f"drivers.{name}.motion"
+        location = f"drivers.{name}.motion"
         if not hasattr(mechanism.drivers[name], "evaluate"):
             message = "the class of this driver does not define its coordinate; give it a method evaluate"
-            raise MechanismError(message, name=place, value=type(mechanism.drivers[name]).__name__)
+            raise MechanismError(message, name=location, value=type(mechanism.drivers[name]).__name__)
         twice = [other for other, its in led.items() if its.output == motion.output and other != name]
         if twice:
             raise MechanismError(
-                f"the driver '{twice[0]}' follows from this output already", name=f"{place}.output", value=motion.output
+                f"the driver '{twice[0]}' follows from this output already",
+                name=f"{location}.output",
+                value=motion.output,
             )
-        held[name] = driver_of_output(mechanism, motion, f"{place}.output")
+        held[name] = driver_of_output(mechanism, motion, f"{location}.output")
     outputs = {name: x for name, x in mechanism.outputs.items() if not isinstance(x, AbstractMotionOutput)}
     return dataclasses.replace(mechanism, drivers=held, outputs=outputs)
 
 
-def driver_of_output(mechanism: Any, motion: OutputMotion, place: str) -> AbstractConstraint:
+def driver_of_output(mechanism: Any, motion: OutputMotion, location: str) -> AbstractConstraint:
     """Return the driver that holds an output to a law; of a mechanism its space and outputs count."""
-    output, component = _named(mechanism, motion.output, place)
+    output, component = _named(mechanism, motion.output, location)
     law, spatial = motion.law, mechanism.space == "spatial"
     match output:
         case AngleOutput():
@@ -102,10 +104,10 @@ def driver_of_output(mechanism: Any, motion: OutputMotion, place: str) -> Abstra
         kind = SpatialSlideDriver if spatial else SlideDriver
         return kind(output.bodies, output.point_i, output.point_j, output.vector_i, law)
     message = "cannot be held to a law; name an angle, a distance, a slide, or a component of a point, such as C_y"
-    raise MechanismError(message, name=place, value=motion.output)
+    raise MechanismError(message, name=location, value=motion.output)
 
 
-def _named(mechanism: Any, name: str, place: str) -> tuple[Any, int | None]:
+def _named(mechanism: Any, name: str, location: str) -> tuple[Any, int | None]:
     """Return an output by its name, and which component of it is meant, if one is."""
     if name in mechanism.outputs:
         return mechanism.outputs[name], None
@@ -119,4 +121,4 @@ def _named(mechanism: Any, name: str, place: str) -> tuple[Any, int | None]:
         for output in mechanism.outputs
         for column in ([f"{output}_{label}" for label in labels] if output in points else [output])
     ]
-    raise MechanismError(no_such("output", name, known), name=place, value=name)
+    raise MechanismError(no_such("output", name, known), name=location, value=name)

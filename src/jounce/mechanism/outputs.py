@@ -1,4 +1,4 @@
-"""Outputs: what a user wants to know of a motion, each one function on the jets of its bodies."""
+"""Outputs of a motion, each one a function on the jets of its bodies."""
 
 import abc
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from jounce.constraints.facts import USUAL_DIMENSIONS, USUAL_SIGNS
 from jounce.constraints.planar import length_of
 from jounce.errors import MechanismError, check_name
 from jounce.jet import Jet, sqrt
-from jounce.jet.rounding import told_in_plane
+from jounce.jet.rounding import nan_where_rounding_in_plane
 from jounce.mechanism.carriages import carriage_of
 from jounce.modules import Module
 from jounce.rigid import PlanarPose, SpatialPose
@@ -22,7 +22,7 @@ from jounce.rigid.pose import Pose
 
 
 class AbstractQuantity(Module):
-    """What may be asked of a motion: a quantity with its unit, of the poses of some bodies or of the whole motion."""
+    """A quantity of a motion with its unit, of the poses of some bodies or of the whole motion."""
 
     unit: ClassVar[str] = "m"
     space: ClassVar[str] = ""  # planar or spatial where only one makes sense
@@ -66,7 +66,7 @@ class AbstractMotionOutput(AbstractQuantity):
         del motion
 
     def remark(self, motion: Any, values: Any) -> str:
-        """Return what is to be said of plain derivatives, time first, such as why they are NaN; nothing in general."""
+        """Return a remark on plain derivatives, time first, such as why they are NaN; nothing in general."""
         del motion, values
         return ""
 
@@ -133,10 +133,10 @@ class ParameterOutput(AbstractOutput):
     def check(self, mechanism: Any) -> None:
         """Raise MechanismError unless the joint holds a point on a curve, or on a surface."""
         check_name("joint", self.joint, mechanism.joints, MechanismError, name="joint")
-        found = len(mechanism.joints[self.joint].hidden)
-        if found != self.count:
+        number = len(mechanism.joints[self.joint].hidden)
+        if number != self.count:
             words = {0: "nothing with a parameter", 1: "a curve, of one parameter", 2: "a surface, of parameters"}
-            raise MechanismError(f"this joint has {words[found]}", name="quantity")
+            raise MechanismError(f"this joint has {words[number]}", name="quantity")
 
     def evaluate(self, carriage: Pose) -> Jet:
         return carriage.position[0] / carriage.position[-1]
@@ -187,7 +187,7 @@ class RelativeAngleOutput(AbstractOutput):
         if self.vector_j is None:
             return angle
         line, axis = body_j.direction(self.vector_j), body_i.direction(self.axis / length_of(self.axis)[None])
-        return told_in_plane(angle, line - line.dot(axis) * axis, line, axis)
+        return nan_where_rounding_in_plane(angle, line - line.dot(axis) * axis, line, axis)
 
 
 class PlanarRelativeAngleOutput(AbstractOutput):

@@ -1,4 +1,4 @@
-"""What a computation cannot start from, told at its door: values that JAX traces, a fork of a process that used JAX."""
+"""Preconditions of computations: no values that JAX traces, no fork of a process that used JAX."""
 
 import dataclasses
 import functools
@@ -51,16 +51,16 @@ def concrete(
     def door(*arguments: P.args, **keywords: P.kwargs) -> R:
         check_process()
         given = dict(zip(names, arguments, strict=False)) | keywords
-        if (place := _traced(given)) is not None and traced is not None:
+        if (location := _traced(given)) is not None and traced is not None:
             others = {name: value for name, value in given.items() if name != names[0]}
-            if (place := _traced(others)) is None:
+            if (location := _traced(others)) is None:
                 return traced(door, given)
-            raise UnsupportedError(WHAT_IS_NOT_TRACED.format(function.__name__), name=place)
-        if place is not None:
+            raise UnsupportedError(WHAT_IS_NOT_TRACED.format(function.__name__), name=location)
+        if location is not None:
             raise UnsupportedError(
                 f"jn.{function.__name__} cannot yet be used with values that jax.jit, jax.grad or jax.vmap trace, "
                 "because it decides by values; call it with numbers, one design after another",
-                name=place,
+                name=location,
             )
         with eval_context():  # ensure_compile_time_eval would compile each constant inside on its own
             return function(*arguments, **keywords)
@@ -92,11 +92,11 @@ def _traced(given: Mapping[str, Any]) -> str | None:
         return None
     pending: list[tuple[tuple[str | int, ...], Any]] = [((), given)]
     while pending:
-        place, value = pending.pop()
+        location, value = pending.pop()
         if isinstance(value, Tracer):
-            return "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in place).removeprefix(".")
+            return "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in location).removeprefix(".")
         entries = _entries(value)
-        pending += [((*place, name), entry) for name, entry in reversed(entries) if type(entry) not in PLAIN]
+        pending += [((*location, name), entry) for name, entry in reversed(entries) if type(entry) not in PLAIN]
     return None
 
 

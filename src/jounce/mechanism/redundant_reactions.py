@@ -1,4 +1,4 @@
-"""Which reactions are wanted where redundant constraints leave some open: checked, and with numbers for expressions."""
+"""The choice of reactions that redundant constraints leave open: checked, and with numbers for expressions."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -16,35 +16,35 @@ RedundantReactions = str | Mapping[str, Any]
 """One of the choices, or stiffnesses, force and torque, by the names of joints."""
 
 
-def check_redundant_reactions(wanted: RedundantReactions | Refused, names: Collection[str]) -> None:
+def check_redundant_reactions(choice: RedundantReactions | Refused, names: Collection[str]) -> None:
     """Raise MechanismError unless it is one of the choices, or stiffnesses by the names of joints."""
-    if not isinstance(wanted, Mapping):
-        if wanted not in CHOICES:
+    if not isinstance(choice, Mapping):
+        if choice not in CHOICES:
             message = f"must be one of {', '.join(CHOICES)}, or stiffnesses by the names of joints"
-            raise MechanismError(message, name=PLACE, value=wanted)
+            raise MechanismError(message, name=PLACE, value=choice)
         return
-    if not wanted:
-        raise MechanismError("must name a joint with its stiffness", name=PLACE, value=dict(wanted))
-    for name, stiffness in wanted.items():
+    if not choice:
+        raise MechanismError("must name a joint with its stiffness", name=PLACE, value=dict(choice))
+    for name, stiffness in choice.items():
         check_name("joint", name, names, MechanismError, name=PLACE)
         if not isinstance(stiffness, Mapping) or not stiffness or not set(stiffness) <= set(STIFFNESSES):
             message = "must be the stiffness of the joint: force, N/m, and torque, N m/rad, or one of them"
             raise MechanismError(message, name=f"{PLACE}.{name}", value=stiffness)
 
 
-def resolved_reactions(wanted: RedundantReactions, parameters: Mapping[str, Any]) -> str | dict[str, dict[str, float]]:
-    """Return what is wanted with numbers for expressions of the parameters.
+def resolved_reactions(choice: RedundantReactions, parameters: Mapping[str, Any]) -> str | dict[str, dict[str, float]]:
+    """Return the choice with numbers for expressions of the parameters.
 
     Raises
     ------
     MechanismError
         If a stiffness is no number above zero.
     """
-    if not isinstance(wanted, Mapping):
-        return wanted
+    if not isinstance(choice, Mapping):
+        return choice
     return {
         name: {key: _positive(value, f"{PLACE}.{name}.{key}", parameters) for key, value in stiffness.items()}
-        for name, stiffness in wanted.items()
+        for name, stiffness in choice.items()
     }
 
 

@@ -20,7 +20,14 @@ from jounce.constraints.ropes import Rope
 from jounce.errors import MechanismError
 
 ROUNDING = 1e-9  # of lengths, as written numbers are rounded
-HELD = (planar.Fixed, spatial.Spherical, spatial.Universal, spatial.Revolute, spatial.Fixed, spatial.ConstantVelocity)
+COINCIDENT = (
+    planar.Fixed,
+    spatial.Spherical,
+    spatial.Universal,
+    spatial.Revolute,
+    spatial.Fixed,
+    spatial.ConstantVelocity,
+)
 Bounds = Float[np.ndarray, "point point"]
 
 
@@ -30,22 +37,22 @@ def check_ropes(groups: Sequence[Any], names: Sequence[Sequence[str]]) -> None:
     Parameters
     ----------
     groups : sequence of Group
-        Of joints and drivers; nothing is told where JAX traces their values.
+        Of joints and drivers; nothing is checked where JAX traces their values.
     names : sequence of sequence of str
         Of the elements of each, with their kinds before them.
     """
     ropes = [(group, its) for group, its in zip(groups, names, strict=True) if isinstance(group.element, Rope)]
     if not ropes:
         return
-    known = _Points()
+    points = _Points()
     for group in groups:
-        distance = _held_apart(group.element)
+        distance = _fixed_distance(group.element)
         if distance is not None and not _is_traced((group.element.point_i, group.element.point_j, distance)):
-            known.hold(group, distance)
+            points.hold(group, distance)
     for group, its in ropes:
         if not _is_traced(group.element):
             for k in range(group.instances):
-                _check(group, k, its[k], known)
+                _check(group, k, its[k], points)
 
 
 def _is_traced(values: Any) -> bool:
@@ -57,8 +64,8 @@ class _Points:
 
     def __init__(self) -> None:
         self.bodies: list[int] = []
-        self.places: list[np.ndarray] = []
-        self.apart: list[tuple[int, int, float]] = []
+        self.positions: list[np.ndarray] = []
+        self.distances: list[tuple[int, int, float]] = []
 
     def hold(self, group: Any, distance: Any) -> None:
         """Add the points of all joints of a group, which hold them at a distance."""
@@ -67,17 +74,17 @@ class _Points:
         for k in range(group.instances):
             for slot, point in zip(group.bodies, (element.point_i, element.point_j), strict=False):
                 self.bodies.append(slot[k])
-                self.places.append(np.asarray(point)[:, k, 0])
-            self.apart.append((size + 2 * k, size + 2 * k + 1, float(distance[k, 0])))
+                self.positions.append(np.asarray(point)[:, k, 0])
+            self.distances.append((size + 2 * k, size + 2 * k + 1, float(distance[k, 0])))
 
-    def bounds(self, bodies: Sequence[int], places: Sequence[np.ndarray]) -> tuple[Bounds, Bounds]:
+    def bounds(self, bodies: Sequence[int], positions: Sequence[np.ndarray]) -> tuple[Bounds, Bounds]:
         """Return the least and the largest distances of these and some more points, which come first, m."""
-        whole, points = np.array([*bodies, *self.bodies]), np.stack([*places, *self.places])
+        whole, points = np.array([*bodies, *self.bodies]), np.stack([*positions, *self.positions])
         same = whole[:, None] == whole[None]
         known = np.linalg.norm(points[:, None] - points[None], axis=-1)
         least, largest = np.where(same, known, 0.0), np.where(same, known, np.inf)
-        for i, j, distance in self.apart:
-            pair = len(places) + i, len(places) + j
+        for i, j, distance in self.distances:
+            pair = len(positions) + i, len(positions) + j
             for at in (pair, pair[::-1]):
                 least[at], largest[at] = max(least[at], distance), min(largest[at], distance)
         for k in range(len(points)):
@@ -89,17 +96,17 @@ class _Points:
         return least, largest
 
 
-def _check(group: Any, instance: int, name: str, known: _Points) -> None:
+def _check(group: Any, instance: int, name: str, points: _Points) -> None:
     rope = group.element
     slots = rope.slots or range(len(rope.points))
     bodies = [group.bodies[slot][instance] for slot in slots]
-    places, length = list(np.asarray(rope.points)[:, :, instance, 0]), float(np.asarray(rope.length)[instance, 0])
-    least, largest = known.bounds(bodies, places)
-    for k in range(len(places) - 1):
+    positions, length = list(np.asarray(rope.points)[:, :, instance, 0]), float(np.asarray(rope.length)[instance, 0])
+    least, largest = points.bounds(bodies, positions)
+    for k in range(len(positions) - 1):
         if largest[k, k + 1] <= ROUNDING * length:
             message = "lies in one place with the point before it, where the rope has no direction; leave out one"
-            raise MechanismError(message, name=f"{name}.points", value=places[k + 1].tolist())
-    low, high = (float(sum(bound[i, j] for i, j in pairwise(range(len(places))))) for bound in (least, largest))
+            raise MechanismError(message, name=f"{name}.points", value=positions[k + 1].tolist())
+    low, high = (float(sum(bound[i, j] for i, j in pairwise(range(len(positions))))) for bound in (least, largest))
     if length < low * (1 - ROUNDING):
         message = (
             f"the rope is too short: along its points it is {low:.6g} m at least, wherever the bodies are; give a "
@@ -114,10 +121,10 @@ def _check(group: Any, instance: int, name: str, known: _Points) -> None:
         raise MechanismError(message, name=f"{name}.length", value=length)
 
 
-def _held_apart(joint: Any) -> Any:
+def _fixed_distance(joint: Any) -> Any:
     """Return how far joints hold their two points apart: zero for pins; None where they do not."""
     kind = type(joint)
     pair = facts_of(kind).pair
     if pair == "rod" or kind.residual is spatial.DoubleSpherical.residual:
         return joint.length
-    return 0.0 if pair == "revolute" or any(kind.residual is held.residual for held in HELD) else None
+    return 0.0 if pair == "revolute" or any(kind.residual is held.residual for held in COINCIDENT) else None

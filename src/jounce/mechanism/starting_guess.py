@@ -1,4 +1,4 @@
-"""The starting guess of a mechanism: where its bodies are said to be, the ground first."""
+"""The starting guess of a mechanism: the stated poses of its bodies, the ground first."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -20,25 +20,25 @@ def starting_guess(mechanism: Mechanism, parameters: dict[str, Any], components:
     positions, attitudes = [np.zeros(components)], [np.zeros(()) if components == 2 else np.array([1.0, 0, 0, 0])]
     whole = (GROUND, *mechanism.rigid_bodies)
     for name, body in mechanism.bodies.items():
-        place = f"bodies.{name}"
+        location = f"bodies.{name}"
         if isinstance(body, Carriage):
             poses = dict(zip(whole, zip(positions, attitudes, strict=False), strict=False))
-            positions.append(_carried(mechanism, name, body, poses, parameters, components))
+            positions.append(_carriage_guess(mechanism, name, body, poses, parameters, components))
             attitudes.append(attitudes[0])
             continue
-        positions.append(resolved(body.position, f"{place}.position", "vector", components, parameters))
+        positions.append(resolved(body.position, f"{location}.position", "vector", components, parameters))
         if components == 2:
-            attitudes.append(resolved(body.angle, f"{place}.angle", "scalar", components, parameters))
+            attitudes.append(resolved(body.angle, f"{location}.angle", "scalar", components, parameters))
         else:
-            attitudes.append(_attitude(body.orientation, f"{place}.orientation", parameters))
+            attitudes.append(_attitude(body.orientation, f"{location}.orientation", parameters))
     attitude = "angle" if components == 2 else "quaternion"
     return {"position": along_instances(*positions), attitude: along_instances(*attitudes)}
 
 
-def _carried(
+def _carriage_guess(
     mechanism: Mechanism, name: str, body: Carriage, poses: Any, parameters: dict[str, Any], components: int
 ) -> Any:
-    """Return the starting guess of the place of a carriage, from the poses of the bodies before it."""
+    """Return the starting guess of the position of a carriage, from the poses of the bodies before it."""
     if body.position is not None:
         return np.asarray(body.position, float)
     joint = joint_of(name)
@@ -50,9 +50,9 @@ def _carried(
         pose_at({"position": position, key: attitude}, pose_type)
         for position, attitude in (poses[its] for its in element.bodies)
     )
-    place = body_i.to_body(body_j.point(values["point_j"]) - body_i.position).coefficients[0]
+    point = body_i.to_body(body_j.point(values["point_j"]) - body_i.position).coefficients[0]
     try:
-        return carriage_guess(curve_in(values), None if any(x is None for x in start) else start, place)
+        return carriage_guess(curve_in(values), None if any(x is None for x in start) else start, point)
     except MechanismError as error:
         raise MechanismError(error.message, name=f"joints.{joint}.{error.name}", value=error.value) from None
 

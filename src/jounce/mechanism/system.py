@@ -114,9 +114,9 @@ class Group(Module):
         for slot in self.moving_slots:
 
             def slope(shift: Any, turn: Any, slot: int = slot) -> Any:
-                moved = list(still)
-                moved[slot] = poses[slot].extended(shift, turn)
-                value, rate = with_rows(self.element.residual(*moved, time)).coefficients
+                changed = list(still)
+                changed[slot] = poses[slot].extended(shift, turn)
+                value, rate = with_rows(self.element.residual(*changed, time)).coefficients
                 return jnp.zeros_like(value) if rate is None else rate
 
             def wide(direction: Any) -> Any:
@@ -165,10 +165,10 @@ def law_left_out(group: Group, *, told: bool = False) -> Group:
     """
     element = users_class(type(group.element))
     kind = next(kind for kind in element.__mro__ if "residual" in vars(kind))
-    apart = vars(kind).get("law_apart", False)
-    if apart and told:  # `evaluate` may have been changed by a class that keeps the residual
-        apart = getattr(kind, "evaluate", None) is getattr(element, "evaluate", object)
-    return holding(group, "motion", LeftOut()) if apart else group
+    is_separable = vars(kind).get("law_apart", False)
+    if is_separable and told:  # `evaluate` may have been changed by a class that keeps the residual
+        is_separable = getattr(kind, "evaluate", None) is getattr(element, "evaluate", object)
+    return holding(group, "motion", LeftOut()) if is_separable else group
 
 
 def with_rows(jet: Jet) -> Jet:
@@ -180,7 +180,7 @@ def group_elements(
     elements: Mapping[str, Any], parameters: Mapping[str, Any], body_index: Mapping[str, int], components: int
 ) -> tuple[tuple[Group, ...], tuple[tuple[str, ...], ...]]:
     """Return the groups of all elements, and the names of the instances in each."""
-    found: dict[Any, list[tuple[str, Any, dict]]] = {}
+    members_by_key: dict[Any, list[tuple[str, Any, dict]]] = {}
     for name, element in elements.items():
         values = resolve_element(element, parameters, components, name)
         try:
@@ -189,9 +189,9 @@ def group_elements(
             raise error.located(name=name) from None
         if readings:
             values[READINGS] = readings
-        found.setdefault(group_key(element, values), []).append((name, element, values))
+        members_by_key.setdefault(group_key(element, values), []).append((name, element, values))
     groups, names = [], []
-    for members in found.values():
+    for members in members_by_key.values():
         instance_names, instances, values = zip(*members, strict=True)
         named = zip(instance_names, instances, strict=True)
         slots = zip(*([body_index[b] for b in (*e.bodies, *carriages(n, e))] for n, e in named), strict=True)

@@ -51,14 +51,14 @@ class Angles(NamedTuple):
 
 def traced_values(tree: Any) -> list[Any]:
     """Return the values that JAX traces in a mechanism, or in any nesting of dataclasses, mappings and sequences."""
-    found: list[Any] = []
+    values: list[Any] = []
 
     def seen(value: Any) -> Any:
-        found.append(value)
+        values.append(value)
         return value
 
     _mapped(tree, seen)
-    return found
+    return values
 
 
 def with_values(tree: Any, values: Sequence[Any]) -> Any:
@@ -203,8 +203,8 @@ def _with_datum(group: Group, pose: SpatialPose, known: Any, near: Any) -> Group
     axis = jnp.asarray(element.axis if hasattr(element, "axis") else element.axis_i)
     axis = axis / length_of(axis)[None]
     if element.vector_i is None:
-        angle, told = angle_of(attitude, axis)
-        return holding(group, "datum", Datum(attitude, jnp.where(told, brought_near(angle, known), known), near))
+        angle, is_defined = angle_of(attitude, axis)
+        return holding(group, "datum", Datum(attitude, jnp.where(is_defined, brought_near(angle, known), known), near))
     across = None
     if hasattr(element, "role"):  # a driver or a force acts about the axis, see `axis_angles`
         second = jnp.asarray(element.vector_j)

@@ -1,7 +1,7 @@
-"""Whole turns of angles that attitudes tell only up to them, counted from place to place along paths.
+"""Whole turns of angles, which attitudes leave open, counted from sample to sample along paths.
 
-An angle may turn by half a turn at once, where bodies pass near an attitude that tells none: there, more places are
-looked at.
+An angle may change by half a turn at once near an attitude that leaves it undefined: there, more samples are
+taken.
 """
 
 from collections.abc import Callable
@@ -13,25 +13,25 @@ from jaxtyping import Float, Int
 from jounce.jet.turns import principal
 from jounce.mechanism.time import nearest_instants
 
-Paths = Int[np.ndarray, " place"]
-Shares = Float[np.ndarray, " place"]
-Angles = Float[np.ndarray, "angle place"]
+Paths = Int[np.ndarray, " sample"]
+Shares = Float[np.ndarray, " sample"]
+Angles = Float[np.ndarray, "angle sample"]
 Measure = Callable[[Paths, Shares], Angles]
 
-LARGEST_CHANGE = np.pi / 4  # of an angle from place to place: more, and it is looked at between them
-HALVINGS = 24  # of the way between two places: down to what passes 1e-9 beside an attitude that tells no angle
+LARGEST_CHANGE = np.pi / 4  # of an angle from sample to sample: more, and it is looked at between them
+HALVINGS = 24  # of the way between two samples: down to what passes 1e-9 beside an attitude that tells no angle
 
 
 class PathSamples(NamedTuple):
-    """Places along paths, in their order, and angles there.
+    """Samples along paths, in their order, and angles there.
 
     Attributes
     ----------
-    path : array of int, shape (places,)
-        On which path each place is.
-    share : array of shape (places,)
+    path : array of int, shape (samples,)
+        On which path each sample is.
+    share : array of shape (samples,)
         How far along it, in whatever measures the path.
-    angle : array of shape (angles, places)
+    angle : array of shape (angles, samples)
         rad.
     """
 
@@ -40,20 +40,20 @@ class PathSamples(NamedTuple):
     angle: Angles
 
     def near(self, path: Paths, share: Shares) -> Angles:
-        """Return the angles at the places that are nearest to others on the same paths, with shares from 0 to 1."""
+        """Return the angles at the samples that are nearest to others on the same paths, with shares from 0 to 1."""
         return self.angle[:, nearest_instants(2.0 * self.path + self.share, 2.0 * path + share)]
 
 
 def refined_samples(measure: Measure, path: Paths, share: Shares, angle: Angles | None = None) -> PathSamples:
-    """Return places between which no angle makes half a turn: those given, and more of them where an angle is fast.
+    """Return samples between which no angle makes half a turn: those given, and more of them where an angle is fast.
 
     Parameters
     ----------
     measure : callable
-        Returns angles, up to whole turns, at places given by path and share.
-    path, share : array of shape (places,)
+        Returns angles, up to whole turns, at samples given by path and share.
+    path, share : array of shape (samples,)
         Those to begin with, in their order.
-    angle : array of shape (angles, places), optional
+    angle : array of shape (angles, samples), optional
         What is measured there, if it is known.
     """
     angle = measure(path, share) if angle is None else angle
@@ -63,14 +63,14 @@ def refined_samples(measure: Measure, path: Paths, share: Shares, angle: Angles 
         if not wide.size:
             break
         middle = 0.5 * (share[wide] + share[wide + 1])
-        found = measure(path[wide], middle)
+        inserted = measure(path[wide], middle)
         path, share = np.insert(path, wide + 1, path[wide]), np.insert(share, wide + 1, middle)
-        angle = np.insert(angle, wide + 1, found, axis=1)
+        angle = np.insert(angle, wide + 1, inserted, axis=1)
     return PathSamples(path, share, angle)
 
 
 def counted_along(
-    measure: Measure, run: Int[np.ndarray, " step"], begun: Float[np.ndarray, "angle step"], places: int
+    measure: Measure, run: Int[np.ndarray, " step"], begun: Float[np.ndarray, "angle step"], samples: int
 ) -> PathSamples:
     """Count angles along the steps of many runs, each a path with shares from 0 to 1.
 
@@ -82,13 +82,13 @@ def counted_along(
         The run of each step; those of a run follow one another.
     begun : array of shape (angles, steps)
         The angles at the beginning of the first step of the same run, to within half a turn.
-    places : int
+    samples : int
         In a step, at least.
     """
-    step, share = np.repeat(np.arange(len(run)), places + 1), np.tile(np.arange(places + 1) / places, len(run))
+    step, share = np.repeat(np.arange(len(run)), samples + 1), np.tile(np.arange(samples + 1) / samples, len(run))
     step, share, angle = refined_samples(measure, step, share)
     begins = np.append(True, np.diff(run[step]) != 0)
     rise = np.where(begins, 0.0, np.nan_to_num(principal(np.diff(angle, axis=1, prepend=angle[:, :1]))))
-    first = np.flatnonzero(begins)[np.cumsum(begins) - 1]  # the place at which the run of each place begins
+    first = np.flatnonzero(begins)[np.cumsum(begins) - 1]  # the sample at which the run of each sample begins
     counted, known = np.cumsum(rise, axis=1), begun[:, step]
     return PathSamples(step, share, known + principal(angle[:, first] - known) + counted - counted[:, first])

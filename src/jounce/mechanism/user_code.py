@@ -90,12 +90,12 @@ def holds_users_code(elements: Iterable[Any]) -> bool:
 def users_code(groups: Sequence[Any]) -> tuple[Any, ...] | None:
     """Return what tells the code of users in the elements of groups from others; None where JAX traces its numbers."""
     read = ReadMotion, ReadLaw
-    found: list[Any] = []
+    parts_found: list[Any] = []
     for group in groups:
-        found.append(vars(group.element).get(READINGS))
+        parts_found.append(vars(group.element).get(READINGS))
         parts = jax.tree.leaves(group.element, is_leaf=lambda x: isinstance(x, read))
-        found += [part for part in parts if isinstance(part, read)]
-    leaves, structure = jax.tree.flatten(found)
+        parts_found += [part for part in parts if isinstance(part, read)]
+    leaves, structure = jax.tree.flatten(parts_found)
     if any(isinstance(x, Tracer) for x in leaves):
         return None
     return structure, tuple((np.shape(x), np.asarray(x).tobytes()) for x in leaves)
@@ -205,10 +205,10 @@ class _Reader:
 
     def __init__(self, element: Any, values: Mapping[str, Any], components: int):
         self.kind = type(element)
-        found = stack_elements([element], [values])
-        if "offset" in value_fields(self.kind) and found.offset is None:
-            found = with_fields(found, offset=np.zeros((1, 1)))  # found later, from the pose of the bodies
-        self.element, self.laws = found, _laws(found)
+        stacked = stack_elements([element], [values])
+        if "offset" in value_fields(self.kind) and stacked.offset is None:
+            stacked = with_fields(stacked, offset=np.zeros((1, 1)))  # found later, from the pose of the bodies
+        self.element, self.laws = stacked, _laws(stacked)
         self.settled = all(field.init for field in dataclasses.fields(self.kind))
         self.poses = [_example(components) for _ in element.bodies]
         self.time = _series((), ORDER)
@@ -222,10 +222,10 @@ class _Reader:
             return self.kind.residual(self.element, *poses)
 
         try:
-            found = jax.eval_shape(residual)
-        except Exception:  # noqa: BLE001 - what is wrong with it is told where it is used
+            shape = jax.eval_shape(residual)
+        except Exception:  # noqa: BLE001 - its use raises the error again
             return
-        if isinstance(found, Jet) and found.order < ORDER:
+        if isinstance(shape, Jet) and shape.order < ORDER:
             message = (
                 f"the residual of {self.kind.__qualname__} uses velocities, which no joint of your own may: it must "
                 "be a function of the positions and attitudes of its bodies and of time, such as body.point, "
@@ -253,8 +253,8 @@ class _Reader:
             if not self.settled:
                 raise ValueError("fields that are found later")
             moving, own = values[: len(values) - len(held)], values[len(values) - len(held) :]
-            found = called([*(Jet([x]) for x in moving), *own], itertools.repeat(None))
-            return found.coefficients[0] if isinstance(found, Jet) else found
+            outcome = called([*(Jet([x]) for x in moving), *own], itertools.repeat(None))
+            return outcome.coefficients[0] if isinstance(outcome, Jet) else outcome
 
         def whole() -> Any:
             return written(self.element, *jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), arguments))

@@ -28,7 +28,7 @@ __all__ = ["ANIMATION_SUFFIXES", "animate", "check_animation", "frame_instants"]
 
 ANIMATION_SUFFIXES = (".gif", ".mp4")
 FRAMES_PER_SECOND = 25  # a GIF counts in hundredths of a second
-LONGEST, SHORTEST = 20.0, 2.0  # s, of an animation whose speed is not told
+LONGEST, SHORTEST = 20.0, 2.0  # s, of an animation whose speed is not given
 MOST_FRAMES = 3000
 RESOLUTION = 110  # dots per inch
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from jounce.errors import MechanismError
 from jounce.kinematics import OscillatingFollower, PlateCam
-from jounce.kinematics.cams.plate_cam import SENSES
+from jounce.kinematics.cams.plate_cam import SIGNS
 from jounce.plot.labels import axis_range
 from jounce.plot.style import BLUE, GRAY, ORANGE, PALE_GRAY, VERMILION, blank_figure, set_ticks, shown_name, style
 from jounce.units.shown_units import ShownUnits
@@ -84,7 +84,7 @@ def _draw_profile(axes: Any, cam: PlateCam, shown: ShownUnits) -> None:
     axes.plot(np.where(lost | back, x, np.nan), np.where(lost | back, y, np.nan), color=VERMILION, linewidth=2.0)
     axes.plot(0, 0, marker="+", color=GRAY, markersize=8)
     _draw_follower(axes, cam, factor)
-    sign = SENSES[cam.sense]
+    sign = SIGNS[cam.sense]
     arc = np.linspace(0.35, 1.15, 31) * sign + (np.pi / 2 if sign < 0 else 0.0)
     radius = 0.45 * base
     tip, before = (radius * np.array([np.cos(a), np.sin(a)]) for a in (arc[-1], arc[-4]))

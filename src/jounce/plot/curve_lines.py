@@ -15,7 +15,7 @@ from jounce.trajectory.curves import HALF_WINDOW, CurveLaw
 
 __all__ = ["CurveLines", "curve_lines", "shown"]
 
-PLACES, ACROSS = 401, 9  # of a curve; lines of a surface in each direction, with as many places
+SAMPLES, ACROSS = 401, 9  # of a curve; lines of a surface in each direction, with as many places
 AROUND = 0.4  # of the way of a point: how far around it an endless curve is shown
 PERIODIC = 1e-6  # of its size: how nearly an endless curve comes back
 
@@ -46,7 +46,7 @@ def curve_lines(mechanism: Mechanism, name: str) -> CurveLines:
         low, high = (float(x) for x in curve.ends)
     elif curve.lap is not None:
         low, high = 0.0, float(curve.lap)
-    line = derivatives_at(curve.components, np.linspace(low, high, PLACES))[0].T
+    line = derivatives_at(curve.components, np.linspace(low, high, SAMPLES))[0].T
     bounded = curve.ends is not None or curve.lap is not None
     laps = np.linalg.norm(line[-1] - line[0]) <= PERIODIC * np.ptp(line, axis=0).max()
     return CurveLines((line,), bounded or bool(laps))
@@ -55,21 +55,21 @@ def curve_lines(mechanism: Mechanism, name: str) -> CurveLines:
 def _net(curve: CurveLaw, ends: list[float]) -> tuple[Float[np.ndarray, "place component"], ...]:
     """Return lines of a surface along both of its parameters."""
     (first, last), (low, high) = ends[:2], ends[2:]
-    u, v = np.linspace(first, last, PLACES // 8), np.linspace(low, high, PLACES // 8)
+    u, v = np.linspace(first, last, SAMPLES // 8), np.linspace(low, high, SAMPLES // 8)
     across = [(np.full(len(v), x), v) for x in np.linspace(first, last, ACROSS)]
     along = [(u, np.full(len(u), x)) for x in np.linspace(low, high, ACROSS)]
-    return tuple(derivatives_at(curve.components, *places)[0].T for places in (*across, *along))
+    return tuple(derivatives_at(curve.components, *parameters)[0].T for parameters in (*across, *along))
 
 
-def shown(found: CurveLines, visited: Float[np.ndarray, "time component"], least: float) -> list[Any]:
+def shown(lines: CurveLines, visited: Float[np.ndarray, "time component"], least: float) -> list[Any]:
     """Return lines as they are shown: of an endless curve what is near to the places visited, in the same frame."""
     known = visited[np.isfinite(visited).all(axis=1)]
-    if found.whole or not len(known):
-        return list(found.lines)
+    if lines.whole or not len(known):
+        return list(lines.lines)
     low, high = known.min(axis=0), known.max(axis=0)
     margin = max(AROUND * float(np.linalg.norm(high - low)), least)
     parts = []
-    for line in found.lines:
+    for line in lines.lines:
         inside = ((line >= low - margin) & (line <= high + margin)).all(axis=1)
         nearest = int(np.argmin(np.linalg.norm(line - known[0], axis=1)))
         first = last = nearest

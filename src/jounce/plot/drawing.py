@@ -173,7 +173,7 @@ class Drawing:
         return np.stack([self.toward(body, unit) for unit in frame_along(axis)], axis=1)
 
     def global_point(self, symbol: Symbol, slot: int | None = None) -> Float[np.ndarray, "time components"]:
-        """Return the point of a symbol on one of its bodies, one that moves unless it is told, in the global frame."""
+        """Return the point of a symbol on one of its bodies, a moving one by default, in the global frame."""
         slot = symbol.moving_slot if slot is None else slot
         return self.at(symbol.bodies[slot], symbol.points[slot])
 

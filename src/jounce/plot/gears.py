@@ -135,22 +135,22 @@ def shaft_wheels(mechanism: Mechanism, gear: Any) -> tuple[list[Center], list[fl
     """
     parameters, frames = mechanism.parameter_values, guessed(mechanism)
     ratio = abs(float(np.asarray(resolve(gear.ratio, parameters))))
-    places, axes = [], []
+    points, axes = [], []
     for body, given in zip(gear.bodies[:2], (gear.axis_i, gear.axis_j), strict=True):
         axis = np.asarray(resolve(given, parameters), float)
-        places.append(points_at(frames[body], _on_axis(mechanism, body, axis))[0])
+        points.append(points_at(frames[body], _on_axis(mechanism, body, axis))[0])
         axes.append(frames[body][0, :, 1:] @ axis / np.linalg.norm(axis))
-    apart, normal = places[1] - places[0], np.cross(*axes)
+    offset, normal = points[1] - points[0], np.cross(*axes)
     sine = float(np.linalg.norm(normal))
     if sine < 1e-9:
-        across = apart - (apart @ axes[0]) * axes[0]
-        centers = [places[0], places[0] + across]
+        across = offset - (offset @ axes[0]) * axes[0]
+        centers = [points[0], points[0] + across]
     else:  # the feet of the common perpendicular
-        along = [np.linalg.det(np.stack([apart, axis, normal])) / sine**2 for axis in axes[::-1]]
-        centers = [place + t * axis for place, t, axis in zip(places, along, axes, strict=True)]
+        along = [np.linalg.det(np.stack([offset, axis, normal])) / sine**2 for axis in axes[::-1]]
+        centers = [point + t * axis for point, t, axis in zip(points, along, axes, strict=True)]
     distance = float(np.linalg.norm(centers[1] - centers[0]))
-    reach = [float((place - center) @ axis) for place, center, axis in zip(places, centers, axes, strict=True)]
-    size = max(1e-300, *(float(np.max(np.abs(place))) for place in places))
+    reach = [float((point - center) @ axis) for point, center, axis in zip(points, centers, axes, strict=True)]
+    size = max(1e-300, *(float(np.max(np.abs(point))) for point in points))
     if distance > 1e-9 * size:
         thick = np.maximum(np.array([ratio, 1.0]) / (1.0 + ratio), THINNEST)
         radii = (thick / thick.sum() * distance).tolist()
@@ -161,8 +161,8 @@ def shaft_wheels(mechanism: Mechanism, gear: Any) -> tuple[list[Center], list[fl
         for k, other in enumerate((second, ratio * second)):
             side = axes[k] if reach[k] >= 0 else -axes[k]
             centers[k] = centers[k] + side * other / (sine or 1.0)
-    found = [within(frames[b], c[None])[0] for b, c in zip(gear.bodies, centers, strict=False)]
-    return found, radii
+    local_centers = [within(frames[b], c[None])[0] for b, c in zip(gear.bodies, centers, strict=False)]
+    return local_centers, radii
 
 
 def _on_axis(mechanism: Mechanism, body: str, axis: Center) -> Center:

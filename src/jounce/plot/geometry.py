@@ -1,4 +1,4 @@
-"""What a mechanism looks like: links through the points where something touches them, joints as symbols.
+"""Drawn geometry of a mechanism: links through the points of their joints, joints as symbols.
 
 A mechanism holds no shapes. What is drawn follows from the points, axes and radii of its joints, drivers, forces and
 outputs, whatever their types, one's own included.

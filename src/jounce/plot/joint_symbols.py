@@ -159,12 +159,12 @@ def _belt(drawing: Drawing, symbol: Symbol) -> None:
 
 def _rope(drawing: Drawing, symbol: Symbol) -> None:
     """Draw a rope through its points, with its ends, and the places where it goes round."""
-    places = [drawing.point(symbol, slot) for slot in range(len(symbol.bodies))]
-    drawing.line(*places, width=1.4, stroke="#8A5A2B", layer=GUIDES)
-    for k, (body, place) in enumerate(zip(symbol.bodies, places, strict=True)):
-        end = k in (0, len(places) - 1)
+    points = [drawing.point(symbol, slot) for slot in range(len(symbol.bodies))]
+    drawing.line(*points, width=1.4, stroke="#8A5A2B", layer=GUIDES)
+    for k, (body, point) in enumerate(zip(symbol.bodies, points, strict=True)):
+        end = k in (0, len(points) - 1)
         color = drawing.colors.get(body, INK)
-        drawing.disc(place, (0.35 if end else 0.7) * drawing.unit, stroke=color, fill=parts.PAPER, layer=SYMBOLS)
+        drawing.disc(point, (0.35 if end else 0.7) * drawing.unit, stroke=color, fill=parts.PAPER, layer=SYMBOLS)
 
 
 def _spherical(drawing: Drawing, symbol: Symbol) -> None:

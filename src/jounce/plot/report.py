@@ -78,7 +78,7 @@ def report(
     Parameters
     ----------
     motion : Motion
-        Instants that were not solved are told.
+        The report lists instants that were not solved.
     path : str or path
         An .html file.
     view : tuple of float, default (-60, 25)

@@ -68,7 +68,7 @@ def check_names(names: str) -> None:
 
 
 def paths_of(motion: Motion, selection: Sequence[str] | None, order: int, view: View) -> Paths | None:
-    """Return the paths of outputs of a motion: those wanted, or of all points; None where there are none.
+    """Return the paths of outputs of a motion: those requested, or of all points; None where there are none.
 
     Raises
     ------

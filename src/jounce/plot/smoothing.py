@@ -43,7 +43,7 @@ def draw_smoothing(given: JointTrajectory, motion: SmoothedTrajectory, title: st
     names = list(motion.joints)
     with style():
         figure = blank_figure(WIDTH, 2 * PANEL + 0.9, title or ", ".join(names), h_pad=0.06)
-        apart, jerk = figure.subplots(2, 1, sharex=True)
+        distance_axes, jerk = figure.subplots(2, 1, sharex=True)
         times = np.linspace(motion.start, motion.stop, DRAWN)
         jerks = motion.derivatives(times, 3)[:, 3]
         for k, name in enumerate(names):
@@ -51,16 +51,16 @@ def draw_smoothing(given: JointTrajectory, motion: SmoothedTrajectory, title: st
             own: dict[str, Any] = {"color": LINE_COLORS[index], "linestyle": DASHES[rounds % len(DASHES)]}
             at, values = _samples(given, name)
             positions = motion.derivatives(at, 0)[:, 0, motion.names.index(name)]
-            apart.plot(at, (values - positions) / motion.deviation, ".", markersize=1.2, color=own["color"])
+            distance_axes.plot(at, (values - positions) / motion.deviation, ".", markersize=1.2, color=own["color"])
             label = shown_name(name) if k < NAMED else None
             jerk.plot(times, jerks[:, motion.names.index(name)], label=label, linewidth=0.9, **own)
         for side in (-1, 1):
-            apart.axhline(side, color=GRAY, linewidth=1.0)
-        for axes in (apart, jerk):
+            distance_axes.axhline(side, color=GRAY, linewidth=1.0)
+        for axes in (distance_axes, jerk):
             for first, last in _common_dwells(motion):
                 axes.axvspan(first, last, color=PALE_GRAY, linewidth=0, zorder=0)
             set_ticks(axes.yaxis, 5)
-        apart.set_ylabel(f"from the samples\n(share of {motion.deviation:.3g} rad or m)")
+        distance_axes.set_ylabel(f"from the samples\n(share of {motion.deviation:.3g} rad or m)")
         jerk.set_ylabel("jerk  (rad/s$^3$ or m/s$^3$)")
         jerk.set_xlabel("time  $t$  (s)")
         jerk.set_xlim(motion.start, motion.stop)

@@ -1,1 +1,1 @@
-"""What a person is told of mechanisms, motions and robots: facts, and how a terminal, a notebook and JSON show them."""
+"""Reports of mechanisms, motions and robots: facts, and how a terminal, a notebook and JSON show them."""

@@ -1,4 +1,4 @@
-"""What is told of the ends of a trajectory, and of what it was taken to do between the points that were given."""
+"""Facts of the ends of a trajectory, and of what it is assumed to do between the given points."""
 
 from __future__ import annotations
 

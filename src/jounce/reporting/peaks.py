@@ -353,7 +353,7 @@ def _at(motion: Motion | ChunkedMotion, instants: Times) -> Curves:
             continue
         whole = np.unique(np.append(chunk, motion.time[0]))  # from the same start, on the same branch
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SampleWarning)  # told when the motion was solved
+            warnings.simplefilter("ignore", SampleWarning)  # warned of when the motion was solved
             solved = solve(motion.mechanism, whole, motion.order, strict=False)
         parts.append(_curves(solved)[np.searchsorted(whole, chunk)])
     return np.concatenate(parts)

@@ -1,4 +1,4 @@
-"""What is told of a trajectory that was retimed: how long it takes, and which limits bind it."""
+"""Facts of a trajectory that was retimed: how long it takes, and which limits bind it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from jounce.reporting.motion_ends import ends_words
 from jounce.reporting.text.summaries import count
 from jounce.reporting.text.tables import Table, number
 
-NEGLIGIBLE = 1e-9  # rad or m: how far from a trajectory its path is told to pass; less comes of rounding
+NEGLIGIBLE = 1e-9  # rad or m: a smaller distance of a path from a trajectory is rounding, and is not shown
 
 
 def binding_facts(retimed: RetimedTrajectory) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""What is told of a log that was smoothed: noise, distances, what was followed, and where it stands still."""
+"""Facts of a log that was smoothed: noise, distances, what was followed, and where it stands still."""
 
 from __future__ import annotations
 

@@ -209,8 +209,8 @@ def _numbers(times: ArrayLike, values: ArrayLike, name: str) -> tuple[np.ndarray
 
 def _check_times(times: np.ndarray, samples: np.ndarray, name: str, shape: tuple[int, ...], degree: int) -> None:
     if times.ndim != 1 or samples.shape != (*times.shape, *shape):
-        wanted = ", ".join(map(str, ("samples", *shape)))
-        message = f"samples need one entry for each time: times of shape (samples,) and {name} of shape ({wanted})"
+        expected = ", ".join(map(str, ("samples", *shape)))
+        message = f"samples need one entry for each time: times of shape (samples,) and {name} of shape ({expected})"
         raise TrajectoryError(message, name=name, value=f"shapes {times.shape} and {samples.shape}")
     for what, values in (("times", times), (name, samples)):
         finite = np.isfinite(values).reshape(len(values), -1).all(axis=1)

@@ -90,14 +90,14 @@ def euler_parameters(orientation: Any) -> Quaternion:
 def _numbers(values: Any, count: int, what: str) -> list[float]:
     """Return finite numbers, or raise a MechanismError that says what they are."""
     try:
-        found = [float(value) for value in values]
+        numbers = [float(value) for value in values]
     except (TypeError, ValueError):
-        found = []
-    if isinstance(values, str) or len(found) != count:
+        numbers = []
+    if isinstance(values, str) or len(numbers) != count:
         raise MechanismError(f"{what} must be {'one number' if count == 1 else f'{count} numbers'}", value=values)
-    if not all(map(math.isfinite, found)):
-        raise MechanismError(f"{what} must be finite", value=found)
-    return found
+    if not all(map(math.isfinite, numbers)):
+        raise MechanismError(f"{what} must be finite", value=numbers)
+    return numbers
 
 
 def _unit(vector: Sequence[float], what: str) -> tuple[float, ...]:

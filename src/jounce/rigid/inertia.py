@@ -73,9 +73,9 @@ class Inertia:
             raise RobotError("must be greater than zero", name="mass", value=self.mass)
         if not np.allclose(self.tensor, self.tensor.T, rtol=0, atol=1e-9 * float(np.abs(self.tensor).max())):
             raise RobotError("must be symmetric", name="inertia", value=self.tensor.tolist())
-        if strict and (found := self.fault):
-            message = f"{found.words}; {ADVICE}, or compute with the numbers as they are, by strict=False"
-            raise RobotError(message, name="inertia", value=found.value)
+        if strict and (fault := self.fault):
+            message = f"{fault.words}; {ADVICE}, or compute with the numbers as they are, by strict=False"
+            raise RobotError(message, name="inertia", value=fault.value)
 
     @property
     def fault(self) -> "Fault | None":
@@ -144,8 +144,8 @@ class Inertia:
         mass, density : float
             kg, or kg/m^3: one of them; thin solids take a mass.
         axis : str, optional
-            ``"x"``, ``"y"`` or ``"z"`` of the body, along which a rod (x unless told), cylinder, tube, capsule, cone,
-            or the normal of a disc (z unless told) stands.
+            ``"x"``, ``"y"`` or ``"z"`` of the body, along which a rod (x by default), cylinder, tube, capsule, cone,
+            or the normal of a disc (z by default) stands.
         center_of_mass : array_like of shape (3,), default zero
             In the frame of the body, m.
         **sizes
@@ -221,9 +221,9 @@ class Inertia:
         return (traced or cls)(mass, center, tensor, strict=False)
 
 
-def _of_point(mass: Any, place: Float[Numbers, " 3"]) -> Float[Numbers, "3 3"]:
+def _of_point(mass: Any, position: Float[Numbers, " 3"]) -> Float[Numbers, "3 3"]:
     """Return the inertia tensor of a mass at a place: what Steiner's theorem adds."""
-    return mass * (place @ place * np.eye(3) - place[:, None] * place[None])
+    return mass * (position @ position * np.eye(3) - position[:, None] * position[None])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -306,8 +306,8 @@ def finite_numbers(
     """
     array = np.array(read(name, value, error))
     if shapes and array.shape not in shapes:
-        wanted = " or ".join(map(str, shapes))
-        raise error(f"must have the shape {wanted}, not {array.shape}", name=name)
+        expected = " or ".join(map(str, shapes))
+        raise error(f"must have the shape {expected}, not {array.shape}", name=name)
     bad = array[~np.isfinite(array)]
     if bad.size:  # of many numbers the first that is not
         raise error("must be finite", name=name, value=array.tolist() if array.size <= MOST_SHOWN else bad[0].item())

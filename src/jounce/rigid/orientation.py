@@ -313,8 +313,8 @@ def euler_angles(sequence: str, attitude: JetLike) -> Any:
     regular = _regular(sequence, None, jnp.hypot(*(part.coefficients[0] for part in side)))
     distance = sqrt(side[0].square() + side[1].square())
     middle = atan2(distance, matrix[i, i]) if i == k else atan2(sign * matrix[i, k], distance)
-    found = [atan2(*side), middle, atan2(*end)]
-    angles = stack(found if is_moving(sequence) else found[::-1])
+    sequence_angles = [atan2(*side), middle, atan2(*end)]
+    angles = stack(sequence_angles if is_moving(sequence) else sequence_angles[::-1])
     return finish(_marked(angles, regular))
 
 
@@ -325,20 +325,20 @@ def check_rotation(matrix: Numbers, name: str = "attitude", tolerance: float = O
         raise JounceError(message, name=name, value=f"shape {tuple(np.shape(matrix))}")
     if is_traced(matrix):
         return
-    found = np.moveaxis(np.asarray(matrix).reshape(3, 3, -1), -1, 0)
+    matrices = np.moveaxis(np.asarray(matrix).reshape(3, 3, -1), -1, 0)
     with np.errstate(invalid="ignore"):  # what is not finite shows in the result
-        off = np.abs(np.swapaxes(found, 1, 2) @ found - np.eye(3)).max(axis=(1, 2))
-        bad = ~(off <= tolerance) | ~(np.linalg.det(found) > 0)
+        off = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2))
+        bad = ~(off <= tolerance) | ~(np.linalg.det(matrices) > 0)
     if bad.any():
         first = int(np.flatnonzero(bad)[0])
-        which = f" (number {first} of the batch)" if len(found) > 1 else ""
+        which = f" (number {first} of the batch)" if len(matrices) > 1 else ""
         if not np.isfinite(off[first]):
             what = "has entries that are not finite"
         elif off[first] > tolerance:
             what = f"is not orthonormal: an entry of R^T R is {off[first]:.3g} off, more than {tolerance:g}"
         else:
             what = "is a reflection: its determinant is negative"
-        raise JounceError(f"the matrix{which} {what}", name=name, value=found[first].tolist())
+        raise JounceError(f"the matrix{which} {what}", name=name, value=matrices[first].tolist())
 
 
 def _regular(sequence: str, angles: Numbers | None, distance: Numbers) -> Any:

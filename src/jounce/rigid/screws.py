@@ -56,8 +56,8 @@ class ScrewAxis:
 
     def __post_init__(self) -> None:
         checked_direction(self.axis, "axis")
-        place = real_or_traced("point", self.point, JounceError)
-        finite = is_traced(place) or np.isfinite(np.asarray(place, float)).all()
+        position = real_or_traced("point", self.point, JounceError)
+        finite = is_traced(position) or np.isfinite(np.asarray(position, float)).all()
         if np.shape(self.point) != (3,) or not finite:
             raise JounceError("a point needs three finite coordinates", name="point", value=self.point)
         check_choice("kind", self.kind, KINDS, JounceError)

@@ -96,7 +96,7 @@ def _check_releases(client: Any, timeout: float) -> None:
         releases = client.sync(client._get_versions, packages=names, callback_timeout=max(timeout, PATIENCE))
     except (OSError, TimeoutError) as error:
         raise _lost(error) from None
-    own = {name: releases["client"]["packages"].get(name) for name in names}  # told in the same way
+    own = {name: releases["client"]["packages"].get(name) for name in names}  # listed in the same way
     for address, worker in sorted(releases["workers"].items()):
         packages = worker["packages"] if isinstance(worker, dict) else {}
         for name, release in own.items():
@@ -127,7 +127,7 @@ def _compute(
         except TimeoutError:
             ended = set()
             idle = 0.0 if client.status == "running" and client.nthreads() else idle + POLL
-        except Exception as error:  # noqa: BLE001 - CancelledError and what else a lost connection is told by
+        except Exception as error:  # noqa: BLE001 - CancelledError and other exceptions of a lost connection
             raise _lost(error) from None
         for future in ended:
             if future.status != "finished":

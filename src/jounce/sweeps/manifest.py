@@ -18,7 +18,7 @@ from jounce.execution.backends import is_wanted
 from jounce.execution.device import on_processor
 from jounce.sweeps.fingerprints import fingerprint
 
-FORMAT = 3  # of 1, digests told nothing of the sweep and the place of a chunk; of 2, coordinates were compressed
+FORMAT = 3  # of 1, digests did not cover the sweep and the place of a chunk; of 2, coordinates were compressed
 LARGEST_CHUNK = 2**20  # that may be asked for
 COMPARED = ("vary", "options", "versions", "arithmetic")  # groups of a manifest, value by value
 LIBRARIES = ("jax", "jaxlib", "numpy")  # other versions may give other last bits
@@ -141,7 +141,7 @@ def _named(files: Mapping[str, str]) -> dict[str, str]:
 
 
 def check_same(there: Mapping[str, Any], expected: Mapping[str, Any], folder: str) -> None:
-    """Raise OutputError, with what differs, unless a sweep that was begun is the one that is wanted."""
+    """Raise OutputError, with what differs, unless a sweep that was begun has the requested settings."""
     differences = list(_differences(there, expected))
     if differences:
         message = (

@@ -213,8 +213,8 @@ class Simulations(_OfMechanism):
         first, last = sorted((float(self.instants[0]), float(self.instants[-1])))
         breaks, side_times = sides_of_designs(self.mechanism, designs, first, last, self.order, forces=True)
         parts = [
-            self._simulated({name: values[lot] for name, values in designs.items()}, side_times[lot])
-            for lot in _lots(side_times, MORE_INSTANTS * len(self.instants))
+            self._simulated({name: values[chunk] for name, values in designs.items()}, side_times[chunk])
+            for chunk in _chunks(side_times, MORE_INSTANTS * len(self.instants))
         ]
         values, others, status = zip(*parts, strict=True)
         return Histories(_joined(values), np.concatenate(status), sides=Sides(breaks, _joined(others)))
@@ -239,7 +239,7 @@ class Simulations(_OfMechanism):
         return {name: array[:, here] for name, array in whole.items()}, others, simulated.status[:, here]
 
 
-def _lots(side_times: Float[np.ndarray, "design side"], most: int) -> Iterator[slice]:
+def _chunks(side_times: Float[np.ndarray, "design side"], most: int) -> Iterator[slice]:
     """Yield designs that are simulated together, since each is at the instants of all: these are not many."""
     start, known = 0, set()
     for k, own in enumerate(side_times.tolist()):

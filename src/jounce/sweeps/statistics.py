@@ -43,7 +43,7 @@ class Variable:
 def variables_of(
     quantities: Sequence[Quantity], parameters: Sequence[str], levels: int, instants: int, *, histories: bool
 ) -> list[Variable]:
-    """Return the arrays that are kept: of parameters, outcomes and statistics, and of histories where they are wanted.
+    """Return the arrays to store: of parameters, outcomes and statistics, and of histories where requested.
 
     Raises
     ------

@@ -217,7 +217,7 @@ def run(
 
 
 def _whole(plan: Plan) -> Bool[np.ndarray, " chunk"]:
-    """Tell which chunks are on the disk as they were written; others are forgotten, and told in a warning.
+    """Tell which chunks are on the disk as they were written; others are forgotten, with a warning.
 
     So are descriptions and coordinates, which are written again.
     """

@@ -35,22 +35,22 @@ def copies(subject: Subject) -> None:
     several = (name for name, kind in field_kinds(type(element)).items() if kind == "points")
     given |= {name: tuple(map(tuple, getattr(element, name))) for name in several}
     element = dataclasses.replace(element, **given)  # of lists there is no hash
-    found = {"copy.copy": copy.copy(element), "copy.deepcopy": copy.deepcopy(element)}
+    copies_made = {"copy.copy": copy.copy(element), "copy.deepcopy": copy.deepcopy(element)}
     kind = type(element)
     if _by_name(kind) is kind:
-        found["pickle"] = pickle.loads(pickle.dumps(element))
-    for way, other in found.items():
+        copies_made["pickle"] = pickle.loads(pickle.dumps(element))
+    for method, other in copies_made.items():
         if type(other) is not kind or not bool(other == element) or hash(other) != hash(element):
-            raise Broken(f"what {way} makes of a joint is not equal to it, with its hash")
-    if "pickle" not in found:
+            raise Broken(f"what {method} makes of a joint is not equal to it, with its hash")
+    if "pickle" not in copies_made:
         raise LeftOut(f"copies are equal; pickle finds no class {kind.__qualname__} in the module {kind.__module__}")
 
 
 def _by_name(kind: type[Any]) -> Any:
-    found: Any = sys.modules.get(kind.__module__)
+    value: Any = sys.modules.get(kind.__module__)
     for name in kind.__qualname__.split("."):
-        found = getattr(found, name, None)
-    return found
+        value = getattr(value, name, None)
+    return value
 
 
 def files(subject: Subject) -> None:

@@ -23,10 +23,10 @@ from jounce.testing.samples import (
 from jounce.testing.subject import Broken, LeftOut, Subject, evaluated, random_start, residual
 
 STARTS, STEPS = 8, 40
-WANTED = 2  # positions
+NEEDED = 2  # positions
 CLOSED, NEARLY = 1e-13, 1e-10  # last corrections, m or rad: while they fall, and where rounding keeps them up
 DEPENDENT = 1e-9  # smallest singular value over the largest
-CHUNK = 3.0  # by which lengths, and directions, are multiplied
+FACTOR = 3.0  # by which lengths, and directions, are multiplied
 PAIRS = {"revolute": planar.Revolute, "rod": planar.DoubleRevolute, "prismatic": planar.Prismatic}
 
 
@@ -35,11 +35,11 @@ def rank(subject: Subject) -> None:
     group = group_of([_sample(subject)], subject.space)
     for _, slopes in _positions(subject, group):
         sizes = np.linalg.svd(slopes, compute_uv=False)
-        found, rows = int((sizes > DEPENDENT * sizes[0]).sum()), len(slopes)
+        count, rows = int((sizes > DEPENDENT * sizes[0]).sum()), len(slopes)
         equations = rows if subject.equations is None else subject.equations
-        if found != equations:
+        if count != equations:
             raise Broken(
-                f"where it holds, its {rows} rows are {found} independent equations, not {equations}; leave out rows "
+                f"where it holds, its {rows} rows are {count} independent equations, not {equations}; leave out rows "
                 "that follow from others, and square none that vanishes by itself"
             )
 
@@ -48,8 +48,8 @@ def facts(subject: Subject) -> None:
     """Check that what the class states is true: directions held parallel, a squared distance, a pair, dimensions."""
     element = _sample(subject)
     stated, group = facts_of(type(element)), group_of([element], subject.space)
-    found = _positions(subject, group)
-    for motion, _ in found:
+    positions = _positions(subject, group)
+    for motion, _ in positions:
         _held_parallel(group, motion)
         if stated.pair:
             _is_pair(subject, element, motion)
@@ -72,16 +72,16 @@ def _sample(subject: Subject) -> Any:
 
 def _positions(subject: Subject, group: Group) -> list[tuple[Motion, np.ndarray]]:
     """Return some positions in which a joint holds, with the Jacobian there, shape (rows, coordinates)."""
-    random, found = subject.random(), subject.positions
+    random, positions = subject.random(), subject.positions
     for _ in range(STARTS):
-        if len(found) == WANTED:
+        if len(positions) == NEEDED:
             break
         position = _closed(subject, group, random_start(subject, random))
         if position is not None:
-            found.append(position)
-    if not found:
+            positions.append(position)
+    if not positions:
         raise Broken(f"from {STARTS} random positions of its bodies none was found in which the joint holds")
-    return found
+    return positions
 
 
 def _closed(subject: Subject, group: Group, motion: Motion) -> tuple[Motion, np.ndarray] | None:
@@ -157,18 +157,18 @@ def _dimensions(subject: Subject, element: Any, motion: Motion) -> None:
         dimension = dimension_of_field(element, name)
         stretched = dimension in ("length", "length per angle", "direction")
         if kind == "curve" and dimension == "length":
-            changed[name] = tuple(f"{CHUNK}*({entry})" for entry in value)
+            changed[name] = tuple(f"{FACTOR}*({entry})" for entry in value)
             continue
         if kind not in ("scalar", "vector", "points", "motion") or (value is None and not stretched):
             continue
         if value is None or not (stretched or dimension in ("angle", "ratio")):
             return  # nothing is said of a field, or it stands for a length that is not seen
         if stretched:
-            changed[name] = f"{CHUNK}*({value})" if kind == "motion" else (CHUNK * np.asarray(value)).tolist()
-    wide = {**motion, "position": CHUNK * motion["position"]}
+            changed[name] = f"{FACTOR}*({value})" if kind == "motion" else (FACTOR * np.asarray(value)).tolist()
+    wide = {**motion, "position": FACTOR * motion["position"]}
     gap = residual(group_of([dataclasses.replace(element, **changed)], subject.space), wide)[0]
     if period := subject.period_of(group_of([element], subject.space)):
-        period = CHUNK * period if isinstance(subject.period, str) else period
+        period = FACTOR * period if isinstance(subject.period, str) else period
         gap[-1] -= period * np.round(gap[-1] / period)
     words = "dimensions: a joint that holds does not where all lengths are those in another unit"
     subject.same(gap, 0 * gap, 1e-10, words)

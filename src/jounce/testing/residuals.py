@@ -49,11 +49,11 @@ def jacobian(subject: Subject) -> None:
     lanes[1, ..., 2 * order :] = unit
     running = jnp.asarray(np.arange(lanes.shape[-1]) < 2 * order, float)[None]
     time = Jet((jnp.full_like(running, INSTANT), running, *[None] * (order - 1)))
-    found = evaluated(group, with_unknowns(motion, lanes), time)
+    derivative = evaluated(group, with_unknowns(motion, lanes), time)
 
-    slopes = found[1, ..., 2 * order :]
+    slopes = derivative[1, ..., 2 * order :]
     for k in range(1, order + 1):
-        change = found[k, ..., 2 * k - 2] - found[k, ..., 2 * k - 1]
+        change = derivative[k, ..., 2 * k - 2] - derivative[k, ..., 2 * k - 1]
         x = np.swapaxes(unknowns[k, :, 1:, 0], 0, 1).reshape(-1)
         words = f"coefficient {k} of the residual is not its Jacobian by the coordinates times theirs of that order"
         subject.same(change, slopes @ x, 1e-12, words)
@@ -159,14 +159,14 @@ def instances(subject: Subject) -> None:
     """Check that joints evaluated together are those evaluated alone."""
     random, samples = subject.random(), subject.samples
     count = samples.count
-    places = [BODIES[1 : 1 + count], BODIES[4 - count + 1 : 5][::-1], (*BODIES[: count - 1], BODIES[4])]
-    elements = [samples.element(random, bodies) for bodies in places]
+    slots = [BODIES[1 : 1 + count], BODIES[4 - count + 1 : 5][::-1], (*BODIES[: count - 1], BODIES[4])]
+    elements = [samples.element(random, bodies) for bodies in slots]
     motion = random_motion(random, subject.space, 1, batch=2)
     together = residual(group_of(elements, subject.space), motion)
     for k, element in enumerate(elements):
-        alone = residual(group_of([element], subject.space), motion)
-        bound = 1e-15 * (1.0 + np.abs(alone[:, :, 0]))
-        subject.same(together[:, :, k] / bound, alone[:, :, 0] / bound, 1.0, "joints side by side are not those alone")
+        single = residual(group_of([element], subject.space), motion)
+        bound = 1e-15 * (1.0 + np.abs(single[:, :, 0]))
+        subject.same(together[:, :, k] / bound, single[:, :, 0] / bound, 1.0, "joints side by side are not those alone")
 
 
 def expressions(subject: Subject) -> None:
@@ -189,9 +189,9 @@ def expressions(subject: Subject) -> None:
         raise LeftOut("it has no numbers")
     motion = random_motion(random, subject.space, 1)
     written = subject.samples.element(subject.random(), values={**_values(plain), **replaced})
-    found = residual(group_of([written], subject.space, parameters), motion)
+    values = residual(group_of([written], subject.space, parameters), motion)
     expected = residual(group_of([plain], subject.space), motion)
-    subject.same(found, expected, 1e-15, "values given as expressions of parameters are not the numbers")
+    subject.same(values, expected, 1e-15, "values given as expressions of parameters are not the numbers")
 
 
 def _values(element: Any) -> dict[str, Any]:

@@ -72,14 +72,14 @@ class Subject:
         largest = float(np.abs(residual(group, random_start(self, random))).max())
         return largest if largest > 10 else 1.0
 
-    def same(self, found: Any, expected: Any, tolerance: float, words: str) -> None:
+    def same(self, actual: Any, expected: Any, tolerance: float, words: str) -> None:
         """Raise Broken unless numbers agree within a tolerance, in sizes of the residual."""
-        found, expected = np.asarray(found, float), np.asarray(expected, float)
-        if found.shape != expected.shape:
-            raise Broken(f"{words}: shapes {found.shape} and {expected.shape}")
-        if not (np.isfinite(found) & np.isfinite(expected)).all():
+        actual, expected = np.asarray(actual, float), np.asarray(expected, float)
+        if actual.shape != expected.shape:
+            raise Broken(f"{words}: shapes {actual.shape} and {expected.shape}")
+        if not (np.isfinite(actual) & np.isfinite(expected)).all():
             raise Broken(f"{words}: there are values that are not finite")
-        worst = float(np.abs(found - expected).max(initial=0.0))
+        worst = float(np.abs(actual - expected).max(initial=0.0))
         if worst > tolerance * self.scale:
             raise Broken(f"{words}: they differ by {worst:.3g}, where {tolerance * self.scale:.3g} is allowed")
 

@@ -26,12 +26,12 @@ def check_within(first: float, last: float, start: float, stop: float, of: str) 
     """
     slack = SLACK * (stop - start)
     if first < start - slack or last > stop + slack:
-        asked = last if last > stop + slack else first
+        instant = last if last > stop + slack else first
         message = (
             f"the {of} go from {start:.9g} to {stop:.9g} s, and the law is not defined beyond them"
             "; stay within them, or choose beyond: hold, repeat or advance"
         )
-        raise MechanismError(message, value=float(asked))
+        raise MechanismError(message, value=float(instant))
 
 
 def continued(within: Callable[[Jet], Jet], time: Jet, start: Any, stop: Any, beyond: str, advance: Any) -> Jet:

@@ -17,8 +17,8 @@ from jounce.trajectory.stacking import law_derivatives
 
 BENDING = frozenset({"abs", "sign", "sqrt", "asin", "acos", "atan2"})  # functions that may have kinks or jumps
 LOOKS = 2001  # at a law that may bend anywhere
-BESIDE = 2e-11  # of a span of time: how far beside a break its sides are; kinks are found to half of that
-MOST = 1000  # breaks of the derivative above those asked for; of more, as of a spline through samples, none is told
+SIDE_OFFSET = 2e-11  # of a span of time: how far beside a break its sides are; kinks are found to half of that
+MOST = 1000  # breaks of the derivative above those asked for; of more, as of a spline through samples, none is used
 
 Times = Float[np.ndarray, " time"]
 Breaks = Float[np.ndarray, " break"]
@@ -49,16 +49,16 @@ def law_breaks(laws: Iterable[AbstractMotion], first: float, last: float, order:
     >>> law_breaks([ramp, bent], 0.0, 1.0, 4).round(9).tolist()
     [0.1, 0.25, 0.75]
     """
-    found, seen = [np.zeros(0)], SeenLeaders()
+    breaks, seen = [np.zeros(0)], SeenLeaders()
     every = {id(law): law for law in _with_leaders(laws)}.values()  # several laws may have one leader
     for law in every if last > first else ():
         level = min(order + 1, HIGHEST)
         instants, jumps, _ = known_jumps(law, first, last, level, seen)
         jump, bend = np.any(jumps[:-1] != 0, axis=0), jumps[-1] != 0
-        found.append(instants[jump | bend if np.sum(jump | bend) <= MOST else jump])
+        breaks.append(instants[jump | bend if np.sum(jump | bend) <= MOST else jump])
         if _may_bend(law):
-            found.append(_seen(law, first, last, order))
-    return apart(np.concatenate(found), first, last)
+            breaks.append(_seen(law, first, last, order))
+    return distinct_instants(np.concatenate(breaks), first, last)
 
 
 def both_sides(
@@ -72,7 +72,7 @@ def both_sides(
     >>> instants.round(9).tolist(), which.tolist()
     ([0.5, 0.5, 1.0], [0, 0, 1])
     """
-    away = _beside(first, last)
+    away = _side_offset(first, last)
     instants = (breaks[:, None] + away * np.array([-1.0, 1.0])).ravel()
     which = np.repeat(np.arange(len(breaks)), 2)
     inside = (instants > first) & (instants < last)
@@ -97,17 +97,17 @@ def at_breaks(instants: Times, breaks: Breaks, first: float, last: float) -> Tim
     after = np.clip(np.searchsorted(breaks, instants), 1, max(len(breaks) - 1, 1))
     pair = breaks[np.stack([after - 1, np.minimum(after, len(breaks) - 1)])]
     nearest = np.where(np.abs(pair[0] - instants) <= np.abs(pair[1] - instants), pair[0], pair[1])
-    return np.where(np.abs(nearest - instants) <= 1.5 * _beside(first, last), nearest, instants)
+    return np.where(np.abs(nearest - instants) <= 1.5 * _side_offset(first, last), nearest, instants)
 
 
-def _beside(first: float, last: float) -> float:
-    return max(BESIDE * (last - first), 8 * float(np.spacing(max(abs(first), abs(last)))))
+def _side_offset(first: float, last: float) -> float:
+    return max(SIDE_OFFSET * (last - first), 8 * float(np.spacing(max(abs(first), abs(last)))))
 
 
-def apart(instants: Float[np.ndarray, " instant"], first: float, last: float) -> Times:
+def distinct_instants(instants: Float[np.ndarray, " instant"], first: float, last: float) -> Times:
     """Return instants in their sequence without those that are others but for rounding."""
     instants = np.unique(instants)
-    return instants[np.diff(instants, prepend=-np.inf) > 2 * _beside(first, last)]
+    return instants[np.diff(instants, prepend=-np.inf) > 2 * _side_offset(first, last)]
 
 
 def _with_leaders(laws: Iterable[AbstractMotion]) -> Iterator[AbstractMotion]:
@@ -146,8 +146,8 @@ def _seen(law: AbstractMotion, first: float, last: float, order: int) -> Times:
     def evaluate(times: Times) -> Any:
         filled = np.full(max(16, 1 << (len(times) - 1).bit_length()), last)  # few shapes, so that few are compiled
         filled[: len(times)] = times
-        found = np.asarray(law_derivatives([law], jnp.asarray(filled), level))[..., : len(times)]
-        return np.nan_to_num(np.moveaxis(found, -1, 0))
+        derivatives = np.asarray(law_derivatives([law], jnp.asarray(filled), level))[..., : len(times)]
+        return np.nan_to_num(np.moveaxis(derivatives, -1, 0))
 
     looks = np.linspace(first, last, LOOKS)
     with np.errstate(over="ignore", invalid="ignore"):  # next to what grows without bound

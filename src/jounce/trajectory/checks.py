@@ -57,8 +57,8 @@ def check_samples(
     for name, entries in (("times", times), ("values", values)):
         bad = np.argwhere(~np.isfinite(entries))
         if len(bad):
-            place = "".join(f"[{k}]" for k in bad[0])
-            raise error("samples must be finite", name=f"{name}{place}", value=float(entries[tuple(bad[0])]))
+            index = "".join(f"[{k}]" for k in bad[0])
+            raise error("samples must be finite", name=f"{name}{index}", value=float(entries[tuple(bad[0])]))
     steps = np.diff(times)
     if (steps <= 0).any():
         first = int(np.argmax(steps <= 0))

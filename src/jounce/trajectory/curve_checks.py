@@ -1,4 +1,4 @@
-"""Whether a curve is smooth: corners, gaps, jumps of curvature and cusps are told by where they are."""
+"""Whether a curve is smooth: corners, gaps, jumps of curvature and cusps are reported with their locations."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -11,11 +11,11 @@ from jaxtyping import Float
 from jounce.errors import MechanismError
 from jounce.jet import Jet
 
-Places = Float[np.ndarray, " place"]
+Parameters = Float[np.ndarray, " place"]
 Values = Float[np.ndarray, "level component place"]
 
 LANES = 1024  # places that are evaluated together, whatever is asked: nothing is compiled for other numbers
-PLACES = 801  # of a curve that are looked at
+SAMPLES = 801  # of a curve that are looked at
 HALVINGS = 45  # of an interval, until nothing but a jump is left in it
 LEVELS = 4  # derivatives by the parameter that may not jump
 JUMP = 1e-6  # of the largest value: what is no rounding
@@ -53,37 +53,37 @@ def check_curve(formulas: Sequence[Any], window: Sequence[float], *, stated: boo
         Whether its end is its beginning.
     """
 
-    def at(places: Places) -> Values:
-        return derivatives_at(formulas, places)
+    def at(parameters: Parameters) -> Values:
+        return derivatives_at(formulas, parameters)
 
     low, high = window
-    places = np.linspace(low, high, PLACES)
-    values = at(places)
+    parameters = np.linspace(low, high, SAMPLES)
+    values = at(parameters)
     finite = np.isfinite(values[:2]).all(axis=(0, 1))
     if stated and not finite.all():
-        where = float(places[np.argmin(finite)])
+        where = float(parameters[np.argmin(finite)])
         raise MechanismError(f"the curve or its tangent is not finite at s = {where:.6g}; state a range where they are")
     known = np.where(finite)[0]
     if not known.size:
         return
-    _check_cusps(at, places[known], values[:, :, known])
+    _check_cusps(at, parameters[known], values[:, :, known])
     if any(_may_break(f.expression.text) for f in formulas):
-        _check_jumps(at, places, values)
+        _check_jumps(at, parameters, values)
     if closed:
         _check_seam(at, low, high, values)
 
 
-def derivatives_at(formulas: Sequence[Any], places: Places, *others: Places) -> Values:
+def derivatives_at(formulas: Sequence[Any], parameters: Parameters, *others: Parameters) -> Values:
     """Return coordinates of a curve, or of a surface along its first parameter, with their derivatives by it."""
-    found = []
-    for first in range(0, len(places), LANES):
-        given = [np.resize(x[first : first + LANES], LANES) for x in (places, *others)]
+    derivatives = []
+    for first in range(0, len(parameters), LANES):
+        given = [np.resize(x[first : first + LANES], LANES) for x in (parameters, *others)]
         moved, *still = (jnp.asarray(x) for x in given)
         jets = [Jet.variable(moved, LEVELS), *(Jet.constant(x, LEVELS) for x in still)]
-        count = len(places[first : first + LANES])
+        count = len(parameters[first : first + LANES])
         parts = [np.stack([np.asarray(c) for c in f(*jets).dense().derivatives()]) for f in formulas]
-        found.append(np.stack(parts, axis=1)[..., :count])
-    return np.concatenate(found, axis=-1)
+        derivatives.append(np.stack(parts, axis=1)[..., :count])
+    return np.concatenate(derivatives, axis=-1)
 
 
 def _may_break(text: str) -> bool:
@@ -91,7 +91,7 @@ def _may_break(text: str) -> bool:
     return "/" in text or "**" in text or not set(_FUNCTION.findall(text)) <= SMOOTH - {"tan"}
 
 
-def _check_cusps(at: Callable[[Places], Values], places: Places, values: Values) -> None:
+def _check_cusps(at: Callable[[Parameters], Values], parameters: Parameters, values: Values) -> None:
     speed = np.linalg.norm(values[1], axis=0)
     usual = float(np.median(speed))
     if usual == 0:
@@ -100,14 +100,14 @@ def _check_cusps(at: Callable[[Places], Values], places: Places, values: Values)
     least = np.flatnonzero((speed <= before) & (speed <= after) & (speed < SLOW * usual))
     if not least.size:
         return
-    low, high = places[np.maximum(least - 1, 0)], places[np.minimum(least + 1, len(places) - 1)]
+    low, high = parameters[np.maximum(least - 1, 0)], parameters[np.minimum(least + 1, len(parameters) - 1)]
     for _ in range(NARROWINGS):  # by thirds, where the tangent is longer
         near, far = low + (high - low) / 3, high - (high - low) / 3
         sizes = np.split(np.linalg.norm(at(np.concatenate([near, far]))[1], axis=0), 2)
         nearer = sizes[0] < sizes[1]
         low, high = np.where(nearer, low, near), np.where(nearer, far, high)
     middle = 0.5 * (low + high)
-    candidates = np.concatenate([middle, places[least]])
+    candidates = np.concatenate([middle, parameters[least]])
     sizes = np.linalg.norm(at(candidates)[1], axis=0)
     if sizes.min() < CUSP * usual:
         where = float(candidates[np.argmin(sizes)])
@@ -115,7 +115,7 @@ def _check_cusps(at: Callable[[Places], Values], places: Places, values: Values)
         raise MechanismError(f"{message} is determined; leave that place out by a range, or take another parameter")
 
 
-def _check_jumps(at: Callable[[Places], Values], places: Places, values: Values) -> None:
+def _check_jumps(at: Callable[[Parameters], Values], parameters: Parameters, values: Values) -> None:
     """Halve every interval between places, keeping the half in which values change more: a jump is what stays."""
     sizes = np.max(np.where(np.isfinite(values), np.abs(values), 0.0), axis=(1, 2))
 
@@ -123,7 +123,7 @@ def _check_jumps(at: Callable[[Places], Values], places: Places, values: Values)
         return np.nan_to_num(np.abs(a - b).max(axis=1), nan=0.0, posinf=1e300) / np.maximum(sizes, 1e-300)[:, None]
 
     for level in range(LEVELS + 1):
-        low, high, first, last = places[:-1], places[1:], values[..., :-1], values[..., 1:]
+        low, high, first, last = parameters[:-1], parameters[1:], values[..., :-1], values[..., 1:]
         for _ in range(HALVINGS):
             if not (change(first, last)[level] > JUMP).any():
                 break
@@ -148,7 +148,7 @@ _WORDS = (
 _ADVICE = "it must be smooth where a point moves along it: round it off, or leave that place out by a range"
 
 
-def _check_seam(at: Callable[[Places], Values], low: float, high: float, values: Values) -> None:
+def _check_seam(at: Callable[[Parameters], Values], low: float, high: float, values: Values) -> None:
     """Compare what follows the end of a closed curve with what follows its beginning."""
     since = np.linspace(0.0, 0.3 * (high - low), 7)
     begins, ends = at(low + since), at(high + since)
@@ -187,8 +187,8 @@ def check_points(points: np.ndarray, *, closed: bool, least: int) -> Float[np.nd
         raise MechanismError("this point repeats the one before", name=f"points[{row}]", value=points[row].tolist())
     if chords.max() > WIDEST * np.median(chords):
         row = int(np.argmax(chords))
-        places = " and ".join(str(points[k].tolist()) for k in (row, row + 1))
-        message = f"there is a gap of {chords[row]:.3g} m between {places}, where others are"
+        parameters = " and ".join(str(points[k].tolist()) for k in (row, row + 1))
+        message = f"there is a gap of {chords[row]:.3g} m between {parameters}, where others are"
         raise MechanismError(
             f"{message} {np.median(chords):.3g} m apart; give points between, all nearly evenly", name=f"points[{row}]"
         )

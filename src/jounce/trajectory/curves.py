@@ -102,15 +102,15 @@ class SampledCurve(Module):
     degree: int = eqx.field(static=True)
 
     def __init__(self, points: ArrayLike, closed: bool = False, degree: int = 5):
-        found = real_numbers("points", points, MechanismError)
+        samples = real_numbers("points", points, MechanismError)
         self.degree = whole_number("degree", degree, 1, 11, error=MechanismError)
         if not isinstance(closed, bool):
             raise MechanismError("must be true or false", name="closed", value=closed)
         if closed and self.degree % 2 == 0:
             raise MechanismError("a closed curve needs a spline of odd degree", name="degree", value=degree)
-        found = check_points(found, closed=closed, least=self.degree + 1)
-        chords = np.linalg.norm(np.diff(found, axis=0), axis=1)
-        self.parameter, self.points, self.closed = np.concatenate([[0.0], np.cumsum(chords)]), found, closed
+        samples = check_points(samples, closed=closed, least=self.degree + 1)
+        chords = np.linalg.norm(np.diff(samples, axis=0), axis=1)
+        self.parameter, self.points, self.closed = np.concatenate([[0.0], np.cumsum(chords)]), samples, closed
 
     @property
     def length(self) -> float:
@@ -229,7 +229,7 @@ def _range(given: Any, count: int, parameters: Mapping[str, Any]) -> tuple[Any, 
     if len(pairs) != count or not all(isinstance(pair, tuple | list) and len(pair) == 2 for pair in pairs):
         words = "[first, last]" if count == 1 else "[[first, last], [first, last]], of u and of v"
         raise MechanismError(f"must be {words}", name="range", value=given)
-    found = []
+    limits = []
     for pair in pairs:
         try:
             low, high = (_expression(x).evaluate(parameters) for x in pair)
@@ -239,8 +239,8 @@ def _range(given: Any, count: int, parameters: Mapping[str, Any]) -> tuple[Any, 
             raise MechanismError(
                 "the first value must be below the last", name="range", value=[float(low), float(high)]
             )
-        found += [low, high]
-    return tuple(found)
+        limits += [low, high]
+    return tuple(limits)
 
 
 @lru_cache(maxsize=200)
@@ -262,8 +262,8 @@ def _unit(formulas: tuple[_Formula, ...], window: tuple[Any, ...]) -> Any:
     """Return how far a point moves for a unit of the parameters, of several in the geometric mean, m."""
     count, shares, lengths = len(window) // 2, np.linspace(0.05, 0.95, LOOKS), []
     traced = any(isinstance(x, Tracer) for x in jax.tree.leaves((formulas, window)))
-    for moved in range(count):
-        turn = (moved, 1 - moved)[:count]
+    for varied in range(count):
+        turn = (varied, 1 - varied)[:count]
         spread = (shares, (shares * 7.3) % 1.0)[:count]
         given = [
             window[2 * k] + (window[2 * k + 1] - window[2 * k]) * share for k, share in zip(turn, spread, strict=True)
@@ -276,10 +276,10 @@ def _unit(formulas: tuple[_Formula, ...], window: tuple[Any, ...]) -> Any:
             speed = (derivatives_at(ordered, *map(np.asarray, given))[1] ** 2).sum(axis=0)
         namespace = jnp if traced else np
         lengths.append(namespace.sqrt(namespace.mean(namespace.where(namespace.isfinite(speed), speed, 0.0))))
-    found = lengths[0] if count == 1 else (lengths[0] * lengths[1]) ** 0.5
-    if isinstance(found, Tracer):
-        return found
-    return float(found) if float(found) > 0 else 1.0
+    unit = lengths[0] if count == 1 else (lengths[0] * lengths[1]) ** 0.5
+    if isinstance(unit, Tracer):
+        return unit
+    return float(unit) if float(unit) > 0 else 1.0
 
 
 def _turned(formula: _Formula, turn: tuple[int, ...], *jets: Jet) -> Jet:

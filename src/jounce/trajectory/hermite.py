@@ -98,14 +98,14 @@ def _mixed_pieces(
 ) -> Float[np.ndarray, "powers instants"]:
     """Return the powers of pieces between instants of which some have fewer derivatives than others."""
     levels = np.minimum(known[:-1].sum(axis=1), known[1:].sum(axis=1))
-    highest = int(levels.max())
-    result = np.zeros((highest + min(highest, MET), len(times)))
+    top = int(levels.max())
+    result = np.zeros((top + min(top, MET), len(times)))
     for count in np.unique(levels).tolist():
         (first,) = np.nonzero(levels == count)
         pairs = np.stack([first, first + 1], axis=1).reshape(-1)
         powers = hermite_pieces(times[pairs], derivatives[pairs, :count])[:, ::2]
         result[: len(powers), first] = powers
-    last = derivatives[-1, : known[-1].sum()][:highest]
+    last = derivatives[-1, : known[-1].sum()][:top]
     result[: len(last), -1] = last / np.array([math.factorial(k) for k in range(len(last))], float)
     return result
 

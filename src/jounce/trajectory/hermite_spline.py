@@ -82,19 +82,19 @@ def _spline(times: np.ndarray, table: np.ndarray) -> HermiteMotion:
     scale = steps ** (levels + 1)
     left, right = (known @ row[columns] / scale for row in (begin, end))  # at the beginning, at the end of each piece
     own = steps**levels / scale
-    bands, wanted = np.zeros((3, count)), np.zeros(count)
+    bands, right_side = np.zeros((3, count)), np.zeros(count)
     # inside: what the piece before ends with is what the next one begins with
     bands[1, 1:-1] = end[2 * levels + 1] * own[:-1] - begin[levels] * own[1:]
     bands[2, :-2] = end[levels] * own[:-1]
     bands[0, 2:] = -begin[2 * levels + 1] * own[1:]
-    wanted[1:-1] = left[1:] - right[:-1]
-    highest = _highest(levels)  # at the ends: the first and the last piece have no highest power
-    for row, piece, beside in ((0, 0, 1), (count - 1, -1, -2)):
+    right_side[1:-1] = left[1:] - right[:-1]
+    top = _highest_level(levels)  # at the ends: the first and the last piece have no highest power
+    for row, piece, neighbor in ((0, 0, 1), (count - 1, -1, -2)):
         mine, other = (levels, 2 * levels + 1) if row == 0 else (2 * levels + 1, levels)
-        bands[1, row] = highest[mine] * own[piece]
-        bands[0 if row == 0 else 2, beside] = highest[other] * own[piece]
-        wanted[row] = -known[piece] @ highest[columns] / scale[piece]
-    higher = solve_banded((1, 1), bands, wanted)
+        bands[1, row] = top[mine] * own[piece]
+        bands[0 if row == 0 else 2, neighbor] = top[other] * own[piece]
+        right_side[row] = -known[piece] @ top[columns] / scale[piece]
+    higher = solve_banded((1, 1), bands, right_side)
     return HermiteMotion(times, np.column_stack([table, higher]))
 
 
@@ -115,7 +115,7 @@ def _at_ends(levels: int) -> tuple[np.ndarray, np.ndarray]:
     return factors[order] * basis[order], factors @ basis
 
 
-def _highest(levels: int) -> Float[np.ndarray, " given"]:
+def _highest_level(levels: int) -> Float[np.ndarray, " given"]:
     return _basis(levels)[-1]
 
 
@@ -147,17 +147,17 @@ def _errors(times: np.ndarray, table: np.ndarray) -> Float[np.ndarray, " derivat
     grid = np.arange(WINDOW + 1.0)
     inside = np.linspace(WINDOW / 3, WINDOW - WINDOW / 3, 8 * LOOKS + 1)
     sigmas = [noise(times, column) for column in table.T]
-    span, least = float(times[-1] - times[0]), float(np.ptp(table[:, 0])) / 2
+    duration, least = float(times[-1] - times[0]), float(np.ptp(table[:, 0])) / 2
     errors = np.ones(degree + 1)
     influence = [_influence(grid, inside, levels, level, degree) for level in range(levels)]
     for k in range(degree + 1):
         curve = _derivative(fine, looks, k)
-        apart = float(np.abs(curve - _derivative(coarse, looks, k)).max()) / (2.0 ** max(degree - k, 1) - 1)
+        difference = float(np.abs(curve - _derivative(coarse, looks, k)).max()) / (2.0 ** max(degree - k, 1) - 1)
         spread = math.hypot(
             *(s * i[k] * step ** (j - k) for j, (s, i) in enumerate(zip(sigmas, influence, strict=True)))
         )
-        peak = max(float(np.abs(curve).max()), least * (2 * math.pi / span) ** k)
-        errors[k] = min(1.0, (INTERPOLATION_SAFETY * apart + NOISE_SAFETY * spread) / peak)
+        peak = max(float(np.abs(curve).max()), least * (2 * math.pi / duration) ** k)
+        errors[k] = min(1.0, (INTERPOLATION_SAFETY * difference + NOISE_SAFETY * spread) / peak)
     return errors
 
 

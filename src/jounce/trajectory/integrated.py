@@ -35,7 +35,7 @@ SHORTEST = 1e-13  # of the way so far: a panel that is taken as it is
 
 _NODES = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
 _BETWEEN = np.cos(np.pi * np.arange(1, DEGREE + 1) / (DEGREE + 1))
-_PLACES = np.concatenate([_NODES, _BETWEEN])[None]
+_ABSCISSAS = np.concatenate([_NODES, _BETWEEN])[None]
 _FITTED = np.linalg.inv(chebyshev.chebvander(_NODES, DEGREE))  # from values at the nodes to Chebyshev coefficients
 _SEEN = chebyshev.chebvander(_BETWEEN, DEGREE)
 _RAISED = np.stack([chebyshev.chebint(row, lbnd=-1) for row in np.eye(DEGREE + 1)], axis=1)
@@ -109,12 +109,12 @@ class IntegratedMotion(MadeOfOthers):
         if not self.is_open:
             return self
         _, law, given, start = self.recipe.value
-        found = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in (*given, start)]
+        numbers = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in (*given, start)]
         if isinstance(law, str | Expression):
             law = with_values(parsed_value(law), parameters)
         else:
             law = law.resolved(parameters)
-        return IntegratedMotion(law, self.derivative, found[:-1], found[-1])
+        return IntegratedMotion(law, self.derivative, numbers[:-1], numbers[-1])
 
     def check_instants(self, first: float, last: float) -> None:
         """Raise MechanismError if the derivative says nothing of instants between the start and those asked for."""
@@ -124,13 +124,13 @@ class IntegratedMotion(MadeOfOthers):
         self.parts[0].check_instants(min(first, start), max(last, start))
         ends = float(self.breakpoints[0]), float(self.breakpoints[-1] + 2 * self.halves[-1])
         slack = SLACK * (last - first)
-        for asked, least, most in ((first, ends[0] - slack, np.inf), (last, -np.inf, ends[1] + slack)):
-            if not least <= asked <= most:
+        for instant, least, most in ((first, ends[0] - slack, np.inf), (last, -np.inf, ends[1] + slack)):
+            if not least <= instant <= most:
                 message = (
                     f"the law with this derivative is integrated from {ends[0]:.6g} to {ends[1]:.6g} s only, "
                     "as it varies so finely or has no value beyond; choose another start"
                 )
-                raise TrajectoryError(message, value=asked)
+                raise TrajectoryError(message, value=instant)
 
     def __call__(self, time: Jet) -> Jet:
         """Return the jet of the law at the instants of the time jet; parameters need their values, see `resolved`."""
@@ -187,37 +187,37 @@ def _panels(law: AbstractMotion, start: Any) -> tuple[Numbers, Numbers, Numbers]
 
     def panel(sign: Any, state: Any, _: Any) -> tuple[Any, Any]:
         at, length, largest, total = state
-        way = jnp.abs(at - start)
-        shortest = SHORTEST * jnp.maximum(jnp.abs(at), way) + 1e-300
+        distance = jnp.abs(at - start)
+        shortest = SHORTEST * jnp.maximum(jnp.abs(at), distance) + 1e-300
         to_border = sign * (_next_border(fixed, at, sign, shortest) - at)
-        tried = jnp.minimum(jnp.minimum(2.0 * length, FIRST + WIDENED * way) * lengths, to_border)
+        tried = jnp.minimum(jnp.minimum(2.0 * length, FIRST + WIDENED * distance) * lengths, to_border)
         tried = jax.lax.stop_gradient(jnp.maximum(tried, shortest))
         half = tried / 2.0
         middle = at + sign * half
-        places = middle[:, None] + half[:, None] * _PLACES
-        found = values(fixed, places)
-        fitted = found[:, : DEGREE + 1] @ _FITTED.T
-        sizes = jnp.maximum(largest, jnp.max(jnp.abs(found), axis=1))
-        off = jnp.max(jnp.abs(found[:, DEGREE + 1 :] - fitted @ _SEEN.T), axis=1)
+        nodes = middle[:, None] + half[:, None] * _ABSCISSAS
+        samples = values(fixed, nodes)
+        fitted = samples[:, : DEGREE + 1] @ _FITTED.T
+        sizes = jnp.maximum(largest, jnp.max(jnp.abs(samples), axis=1))
+        off = jnp.max(jnp.abs(samples[:, DEGREE + 1 :] - fitted @ _SEEN.T), axis=1)
         known = jnp.isfinite(off)
         noise = 4.0 * jnp.min(jnp.where(known, off, jnp.inf))  # what shorter panels do not resolve, either
         fine = off <= jnp.maximum(RESOLVED * sizes, jnp.minimum(noise, ROUNDING * sizes))
-        own = jnp.max(jnp.abs(found), axis=1)
+        own = jnp.max(jnp.abs(samples), axis=1)
         jumps = (tried <= shortest) & known & (own <= STEEPER * jnp.maximum(own[0], largest))  # and no pole
         fine = known & (fine | jumps)
         any_fine = jnp.any(fine)
         pick = jnp.where(any_fine, jnp.argmax(fine), len(NARROWED) - 1)
         # the panel that is taken alone has slopes by parameters: others may have values without bounds
-        chosen = values(law, jnp.where(any_fine, places[pick, : DEGREE + 1], start))
+        chosen = values(law, jnp.where(any_fine, nodes[pick, : DEGREE + 1], start))
         raised = (_FITTED @ chosen) @ _RAISED.T * half[pick]
         gain = jnp.sum(raised)  # at its right end, every polynomial being one there
         begin = jnp.where(sign > 0, at, at - tried[pick])
         before = jnp.where(sign > 0, total, total - gain)
         end = jnp.where(any_fine, at + sign * tried[pick], at)
         after = jnp.where(any_fine, total + sign * gain, total)
-        kept = jnp.where(any_fine, raised.at[0].add(before), 0.0), jnp.where(any_fine, half[pick], 0.0)
+        accepted = jnp.where(any_fine, raised.at[0].add(before), 0.0), jnp.where(any_fine, half[pick], 0.0)
         size = jnp.where(any_fine, sizes[pick], largest)
-        return (end, tried[pick], size, after), (jnp.where(any_fine, begin, at), *kept)
+        return (end, tried[pick], size, after), (jnp.where(any_fine, begin, at), *accepted)
 
     state = start, jnp.asarray(FIRST), jnp.zeros(()), jnp.zeros(())
 
@@ -242,7 +242,7 @@ def _next_border(law: AbstractMotion, at: Any, sign: Any, least: Any) -> Any:
         repeats, inner = law.beyond, []
     else:
         return sign * jnp.inf
-    found = [sign * x for x in inner]
+    inside = [sign * x for x in inner]
     if borders is not None:
         shift = 0.0
         if repeats in ("repeat", "advance"):
@@ -250,5 +250,5 @@ def _next_border(law: AbstractMotion, at: Any, sign: Any, least: Any) -> Any:
             shift = jnp.floor((at + sign * 2 * least - borders[0]) / period) * period
             borders = jnp.concatenate([borders[:1] - period, borders, borders[-1:] + period])
         ahead = sign * (borders + shift - at)
-        found.append(jnp.min(jnp.where(ahead > 2 * least, ahead, jnp.inf)) + sign * at)
-    return sign * functools.reduce(jnp.minimum, found, jnp.inf)
+        inside.append(jnp.min(jnp.where(ahead > 2 * least, ahead, jnp.inf)) + sign * at)
+    return sign * functools.reduce(jnp.minimum, inside, jnp.inf)

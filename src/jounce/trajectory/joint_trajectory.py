@@ -231,7 +231,7 @@ class JointTrajectory(Displayed):
         time : Jet
             The time, s, with batch axes of any shape.
         names : iterable of str, optional
-            The joints, in the order wanted; all of them when not given.
+            The joints, in the order requested; all of them when not given.
 
         Returns
         -------
@@ -252,7 +252,7 @@ class JointTrajectory(Displayed):
         order : int
             Highest derivative.
         names : iterable of str, optional
-            The joints, in the order wanted; all of them when not given.
+            The joints, in the order requested; all of them when not given.
 
         Returns
         -------
@@ -273,8 +273,8 @@ class JointTrajectory(Displayed):
         order = whole_number("order", order, 0, MAX_ORDER)
         instants = self._inside(finite_row("times", times, seconds))
         self._warn(order, chosen)
-        found = law_derivatives([self.laws[name] for name in chosen], jnp.asarray(instants), order)
-        result = np.ascontiguousarray(np.moveaxis(np.asarray(found), -1, 0))
+        derivatives = law_derivatives([self.laws[name] for name in chosen], jnp.asarray(instants), order)
+        result = np.ascontiguousarray(np.moveaxis(np.asarray(derivatives), -1, 0))
         bad = np.argwhere(~np.isfinite(result))
         if len(bad):
             at, derivative, joint = bad[0]
@@ -287,7 +287,7 @@ class JointTrajectory(Displayed):
     def estimate_error(self, order: int, names: Iterable[str] | None = None) -> Float[np.ndarray, "derivative joint"]:
         """Estimate the errors of the derivatives that come from samples, relative to their peaks.
 
-        The error of interpolation is told by comparing the splines with others through every second sample; to it three
+        The error of interpolation is estimated from splines through every second sample; to it three
         standard deviations of the noise of the samples are added (rounding and quantization are noise too), as the
         splines amplify it. Meant to be on the safe side: 1 to 10 times the true error for the degrees 3 and 5, up to 30
         times for 7, measured on sines and Gaussians.
@@ -297,7 +297,7 @@ class JointTrajectory(Displayed):
         order : int
             Highest derivative.
         names : iterable of str, optional
-            The joints, in the order wanted; all of them when not given.
+            The joints, in the order requested; all of them when not given.
 
         Returns
         -------
@@ -338,17 +338,17 @@ class JointTrajectory(Displayed):
         int
             -1 when not even the positions are; 30, the highest order there is, for laws that are not from samples.
         """
-        kept = (self.estimate_error(MAX_ORDER, names) <= tolerance).all(axis=1)
-        return MAX_ORDER if kept.all() else int(np.argmin(kept)) - 1
+        supported = (self.estimate_error(MAX_ORDER, names) <= tolerance).all(axis=1)
+        return MAX_ORDER if supported.all() else int(np.argmin(supported)) - 1
 
     def _warn(self, order: int, names: Sequence[str]) -> None:
-        found = []
+        phrases = []
         for name in names:
             law = self.laws[name]
             if isinstance(law, SplineMotion) and (doubt := unsupported_derivative(law.errors, order)):
-                found.append((doubt[0], -doubt[1], name, law.degree))
-        if found:
-            worst, error, name, degree = min(found)
+                phrases.append((doubt[0], -doubt[1], name, law.degree))
+        if phrases:
+            worst, error, name, degree = min(phrases)
             warnings.warn(SampleWarning(unsupported_words(name, worst, -error, degree)), stacklevel=3)
 
     def _chosen(self, names: Iterable[str] | None) -> tuple[str, ...]:
@@ -396,13 +396,13 @@ def _bounds(start: float, stop: float) -> tuple[float, float]:
 
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:
-    found = (names,) if isinstance(names, str) else tuple(names)
-    if not found or not all(isinstance(name, str) for name in found):
-        raise TrajectoryError("names of joints are needed, as a list of text", name="names", value=list(found))
-    if len(set(found)) < len(found):
-        twice = next(name for k, name in enumerate(found) if name in found[:k])
+    result = (names,) if isinstance(names, str) else tuple(names)
+    if not result or not all(isinstance(name, str) for name in result):
+        raise TrajectoryError("names of joints are needed, as a list of text", name="names", value=list(result))
+    if len(set(result)) < len(result):
+        twice = next(name for k, name in enumerate(result) if name in result[:k])
         raise TrajectoryError("a joint is named twice", name="names", value=twice)
-    return found
+    return result
 
 
 def _limits(limits: ArrayLike, count: int) -> list[Any]:

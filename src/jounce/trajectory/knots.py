@@ -26,22 +26,22 @@ def knot_jumps(law: SplineMotion, order: int) -> Jumps:
     sines = np.asarray(getattr(law, "sines", np.zeros((3, len(begins)))), float)
     left, right = (_derivatives(powers, sines, at, order) for at in (lengths, np.zeros(len(begins))))
     before, after, instants = left[:, :-1], right[:, 1:], begins[1:]
-    found = after - before
+    jumps = after - before
     smooth = law.joined
-    found[: smooth + 1] = 0.0  # a spline is smooth within: what is left is rounding
+    jumps[: smooth + 1] = 0.0  # a spline is smooth within: what is left is rounding
     if law.beyond == "repeat":
         wrapped = left[:, -1:] - np.append(float(law.advance), np.zeros(order))[:, None]
         closing = right[:, :1] - wrapped
         closing[: smooth + 1] = 0.0
-        found, instants = np.column_stack([closing, found]), begins
+        jumps, instants = np.column_stack([closing, jumps]), begins
     elif law.beyond == "hold":
         rest = np.zeros((order + 1, 1))
         ends = right[:, :1] - rest, rest - left[:, -1:]
         for end in ends:
             end[0] = 0.0
-        found, instants = np.column_stack([ends[0], found, ends[1]]), np.concatenate([begins[:1], instants, [stop]])
+        jumps, instants = np.column_stack([ends[0], jumps, ends[1]]), np.concatenate([begins[:1], instants, [stop]])
     peaks = _largest(powers, sines, lengths, law, order)[:, None]
-    return instants, np.where(np.abs(found) <= SMOOTH * peaks, 0.0, found)
+    return instants, np.where(np.abs(jumps) <= SMOOTH * peaks, 0.0, jumps)
 
 
 def derivative_sizes(law: AbstractMotion, first: float, last: float, order: int) -> Float[np.ndarray, " levels"]:
@@ -50,8 +50,8 @@ def derivative_sizes(law: AbstractMotion, first: float, last: float, order: int)
     The derivatives where two laws meet are no measure of rounding there: one that vanishes is nothing but rounding.
     """
     looks = np.linspace(first, last, INSTANTS)
-    found = [np.abs(np.asarray(x, float)) for x in law(Jet.variable(looks, order)).dense().derivatives()]
-    return np.array([np.max(x, initial=0.0, where=np.isfinite(x)) for x in found])
+    derivatives = [np.abs(np.asarray(x, float)) for x in law(Jet.variable(looks, order)).dense().derivatives()]
+    return np.array([np.max(x, initial=0.0, where=np.isfinite(x)) for x in derivatives])
 
 
 def _derivatives(
@@ -62,13 +62,13 @@ def _derivatives(
 ) -> Float[np.ndarray, "levels pieces"]:
     """Return the derivatives of each piece a time after its beginning."""
     amplitude, frequency, phase = sines
-    found = []
+    derivatives = []
     for k in range(order + 1):
         polynomial = sum(
             (c * math.perm(j, k) * at ** (j - k) for j, c in enumerate(powers) if j >= k), np.zeros_like(at)
         )
-        found.append(polynomial + amplitude * frequency**k * np.sin(frequency * at + phase + k * math.pi / 2))
-    return np.array(found)
+        derivatives.append(polynomial + amplitude * frequency**k * np.sin(frequency * at + phase + k * math.pi / 2))
+    return np.array(derivatives)
 
 
 def _largest(

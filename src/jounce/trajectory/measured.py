@@ -67,7 +67,7 @@ class MeasuredMotion(SplineMotion):
 
     derivative: int = eqx.field(static=True)
     initial: Untraced = eqx.field(static=True)
-    way: str = eqx.field(static=True)
+    extrapolation: str = eqx.field(static=True)
 
     def __init__(
         self,
@@ -94,9 +94,9 @@ class MeasuredMotion(SplineMotion):
         whole, advance = _started(pieces, ends, known), 0.0
         if repeats and not self._open:
             advance = _advance(whole, ends, self.derivative, beyond)
-        way = "repeat" if beyond == "advance" else beyond
-        self._set(ends[:-1], whole, ends[-1], way, advance, samples=samples)
-        self.way = beyond
+        extrapolation = "repeat" if beyond == "advance" else beyond
+        self._set(ends[:-1], whole, ends[-1], extrapolation, advance, samples=samples)
+        self.extrapolation = beyond
 
     def resolved(self, parameters: Mapping[str, Any]) -> "MeasuredMotion":
         """Return the law with numbers in the place of its expressions of parameters."""
@@ -105,7 +105,7 @@ class MeasuredMotion(SplineMotion):
         known = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in self.initial.value]
         times, values = self.samples.value
         degree = self.degree - self.derivative
-        return MeasuredMotion(times, values, self.derivative, known, degree, self.way)
+        return MeasuredMotion(times, values, self.derivative, known, degree, self.extrapolation)
 
     @property
     def _open(self) -> list[str]:
@@ -155,8 +155,10 @@ def _advance(pieces: Any, ends: Float[np.ndarray, " breakpoints"], derivative: i
         size = math.factorial(level) * float(np.max(np.abs(pieces[level]))) + abs(float(gain))
         if abs(float(gain)) > CLOSED * size and (level or beyond == "repeat"):
             what = f"its derivative {level}" if level else "the law"
-            told = "change the samples or initial" if level else "close it, or choose beyond: advance"
-            message = f"samples of a derivative that repeat: {what} ends {float(gain):.6g} from where it began; {told}"
+            advice = "change the samples or initial" if level else "close it, or choose beyond: advance"
+            message = (
+                f"samples of a derivative that repeat: {what} ends {float(gain):.6g} from where it began; {advice}"
+            )
             raise MechanismError(message, name="beyond", value=beyond)
     return float(gains[0]) if beyond == "advance" else 0.0
 

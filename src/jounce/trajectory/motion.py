@@ -193,7 +193,7 @@ class SplineMotion(AbstractMotion):
         Raises
         ------
         MechanismError
-            If an instant is beyond the samples and the law is not told what it is there; in what JAX traces, where
+            If an instant is beyond the samples and the law has no rule for it there; in what JAX traces, where
             nothing can be raised, it is NaN.
         """
         where = self.breakpoints, self.stop, time.coefficients[0]

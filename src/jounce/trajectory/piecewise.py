@@ -114,8 +114,8 @@ class PiecewiseMotion(MadeOfOthers):
     def resolved(self, parameters: Mapping[str, Any]) -> "PiecewiseMotion":
         """Return the law with numbers in the place of parameters."""
         _, ends, start, beyond = self.recipe.value
-        found = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in (*ends, parsed_value(start))]
-        return PiecewiseMotion(self._resolved_parts(parameters), found[:-1], found[-1], beyond)
+        numbers = [x.evaluate(parameters) if isinstance(x, Expression) else x for x in (*ends, parsed_value(start))]
+        return PiecewiseMotion(self._resolved_parts(parameters), numbers[:-1], numbers[-1], beyond)
 
     def check_instants(self, first: float, last: float) -> None:
         """Raise MechanismError if one of the laws says nothing of instants that are its own, or none has them."""
@@ -143,9 +143,9 @@ class PiecewiseMotion(MadeOfOthers):
         where = self.until, self.start, time.coefficients[0]
         if self.beyond == "refuse" and np.ndim(self.start) == 0 and not is_traced(where) and np.size(where[2]):
             self.check_instants(float(np.min(where[2])), float(np.max(where[2])))
-        way = "repeat" if self.beyond == "advance" else self.beyond
+        mode = "repeat" if self.beyond == "advance" else self.beyond
         stop = self.until[-1] if self.beyond != "continue" else None
-        return continued(self._within, time, self.start, stop, way, 0.0 if self.advance is None else self.advance)
+        return continued(self._within, time, self.start, stop, mode, 0.0 if self.advance is None else self.advance)
 
     def _within(self, time: Jet) -> Jet:
         instants = time.coefficients[0]
@@ -155,8 +155,8 @@ class PiecewiseMotion(MadeOfOthers):
             own = (instants >= begin) & (instants < end)
             # elsewhere a law may have no value: it is asked for an instant of its own
             some = jnp.clip(instants, begin, jnp.where(jnp.isinf(begin), end, begin))
-            found = part(Jet((jnp.where(own, instants, some), *time.coefficients[1:]))).dense().coefficients
-            value = tuple(jnp.where(own, f, v) for f, v in zip(found, value or found, strict=True))
+            coefficients = part(Jet((jnp.where(own, instants, some), *time.coefficients[1:]))).dense().coefficients
+            value = tuple(jnp.where(own, f, v) for f, v in zip(coefficients, value or coefficients, strict=True))
         return Jet(value)
 
     def jumps(self, order: int = 4) -> tuple[Float[np.ndarray, " knots"], Float[np.ndarray, "{order}+1 knots"]]:
@@ -185,7 +185,7 @@ class PiecewiseMotion(MadeOfOthers):
         sizes = self._sizes(order) if self.until else []
         rest = np.zeros(order + 1)
         instants = [at for at, *_ in pairs]
-        found = [
+        jumps = [
             _jump(_derivatives(left, at, order), _derivatives(right, at, order), np.maximum(*sizes[k : k + 2]))
             for k, (at, left, right) in enumerate(pairs)
         ]
@@ -197,11 +197,11 @@ class PiecewiseMotion(MadeOfOthers):
                 stop = rest.copy()
                 stop[0] = end[0]
                 instants = [self.start, *instants, self.until[-1]]
-                found = [_jump(own, begin, sizes[0]), *found, _jump(end, stop, sizes[-1])]
+                jumps = [_jump(own, begin, sizes[0]), *jumps, _jump(end, stop, sizes[-1])]
             else:
                 end[0] -= float(self.advance)
-                instants, found = [self.start, *instants], [_jump(end, begin, np.maximum(sizes[0], sizes[-1])), *found]
-        return np.array(instants, float), np.stack(found, axis=-1) if found else np.zeros((order + 1, 0))
+                instants, jumps = [self.start, *instants], [_jump(end, begin, np.maximum(sizes[0], sizes[-1])), *jumps]
+        return np.array(instants, float), np.stack(jumps, axis=-1) if jumps else np.zeros((order + 1, 0))
 
     def _sizes(self, order: int) -> list[Float[np.ndarray, " levels"]]:
         """Return how large the derivatives of each law are; the first and the last go as far as their neighbors."""
@@ -211,14 +211,14 @@ class PiecewiseMotion(MadeOfOthers):
         else:
             lengths = np.diff(known) if len(known) > 1 else [abs(known[0]) or 1.0]
             borders = [known[0] - lengths[0], *known, known[-1] + lengths[-1]]
-        found = []
+        sizes = []
         for part, begin, end in zip(self._known_parts(), borders, borders[1:], strict=False):
             try:
-                found.append(derivative_sizes(part, begin, end, order))
+                sizes.append(derivative_sizes(part, begin, end, order))
             except MechanismError:  # samples that end before: what they are where laws meet is known
                 instant = begin if begin == known[-1] else end
-                found.append(derivative_sizes(part, instant, instant, order))
-        return found
+                sizes.append(derivative_sizes(part, instant, instant, order))
+        return sizes
 
 
 def _instant(name: str, value: Value) -> Any:

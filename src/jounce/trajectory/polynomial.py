@@ -18,7 +18,7 @@ ENDS = ("not-a-knot", "natural", "clamped")
 BEYOND = ("refuse", "hold", "continue")
 LARGEST_GROWTH = 1e3  # of what is interpolated, between the knots: by an ill-conditioned system, not by a law
 AT_KNOTS = 1e-6  # of the largest value, by which a law may miss its own knots
-PLACES = 4  # in each segment at which the growth is looked at
+SAMPLES = 4  # in each segment at which the growth is looked at
 
 _Conditions = Mapping[int, float]
 
@@ -328,7 +328,7 @@ def _check_growth(
     """Raise an error unless a spline goes through its own knots and stays near them, as far as rounding tells."""
     given = [abs(value) for end in conditions for value in end.values()]
     size = max(float(np.max(np.abs(values))), *given, 0.0)
-    local = np.diff(knots) * (np.arange(1, PLACES + 1) / PLACES)[:, None]
+    local = np.diff(knots) * (np.arange(1, SAMPLES + 1) / SAMPLES)[:, None]
     along = sum(c * local**k for k, c in enumerate(pieces))
     missed = float(np.max(np.abs(np.asarray(along)[-1] - values[1:])))
     if not missed <= AT_KNOTS * size:
@@ -344,23 +344,23 @@ def _check_growth(
 
 def _closing(pieces: _Pieces, knots: Float[np.ndarray, " knots"], constants: _Ends, duration: float) -> _Pieces:
     """Return the polynomial of the integration constants, as local Taylor coefficients of the shape of the pieces."""
-    count, span, last = len(constants[0]) + len(constants[1]), knots[-1], knots[-1] - knots[-2]
+    count, length, last = len(constants[0]) + len(constants[1]), knots[-1], knots[-1] - knots[-2]
     rows, values = [], []
-    for place, conditions in enumerate(constants):
+    for index, conditions in enumerate(constants):
         for order, value in conditions.items():
             reached = pieces[order, 0] * math.factorial(order)
-            if place:
+            if index:
                 reached = sum(
                     c * math.perm(k, order) * last ** (k - order) for k, c in enumerate(pieces[:, -1]) if k >= order
                 )
-            rows.append([float(math.perm(j, order) * (place or j == order)) for j in range(count)])
-            values.append(value * duration**order - reached * span**order)
+            rows.append([float(math.perm(j, order) * (index or j == order)) for j in range(count)])
+            values.append(value * duration**order - reached * length**order)
     if np.linalg.matrix_rank(np.array(rows)) < count:
         message = "these conditions do not fix the constants of integration; one at least must be on the position"
         raise TrajectoryError(message, value=[sorted(end) for end in constants])
     powers = np.linalg.solve(np.array(rows), np.array(values))
-    at = knots[:-1] / span
+    at = knots[:-1] / length
     closing = np.zeros_like(pieces)
     for k in range(count):
-        closing[k] = sum(powers[j] * math.comb(j, k) * at ** (j - k) for j in range(k, count)) / span**k
+        closing[k] = sum(powers[j] * math.comb(j, k) * at ** (j - k) for j in range(k, count)) / length**k
     return closing

@@ -62,11 +62,11 @@ class AbstractProfile(AbstractMotion):
         both = zip(forward.dense().coefficients, backward.dense().coefficients, strict=True)
         near = Jet(jnp.where(late, b, f) for f, b in both)
         near = Jet((jnp.where(moving, near.coefficients[0], 0.0), *near.coefficients[1:]))
-        way = self.first_half(near).dense().coefficients
-        span = jnp.asarray(self.end - self.start)
-        signed = jnp.where(late, -span, span)
-        value = jnp.where(late, self.end, self.start) + jnp.where(moving, signed * way[0], 0.0)
-        return Jet((value, *(jnp.where(moving, signed * c, 0.0) for c in way[1:])))
+        half = self.first_half(near).dense().coefficients
+        distance = jnp.asarray(self.end - self.start)
+        signed = jnp.where(late, -distance, distance)
+        value = jnp.where(late, self.end, self.start) + jnp.where(moving, signed * half[0], 0.0)
+        return Jet((value, *(jnp.where(moving, signed * c, 0.0) for c in half[1:])))
 
 
 class RestToRestMotion(AbstractProfile):
@@ -239,9 +239,9 @@ def motion_profile(
             raise TrajectoryError("either limits or a duration are needed", name="duration", value=duration)
         return law(duration)
     bounds = [positive(bound, value) for bound, value in zip(LIMITS, limits, strict=True)]
-    way = abs(finite("end", end) - finite("start", start))
+    distance = abs(finite("end", end) - finite("start", start))
     peaks = zip(law(1.0).peaks, bounds, strict=True)
-    quickest = max((way * peak / bound) ** (1 / order) for order, (peak, bound) in enumerate(peaks, start=1))
+    quickest = max((distance * peak / bound) ** (1 / order) for order, (peak, bound) in enumerate(peaks, start=1))
     if duration is None:
         return law(quickest or 1.0)
     if duration < quickest * (1 - 1e-12):

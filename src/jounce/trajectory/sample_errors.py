@@ -41,10 +41,10 @@ def derivative_errors(
     if float(np.ptp(values)) <= 32 * np.finfo(float).eps * np.abs(values).max():
         return np.zeros(degree + 1)
     blocks = _blocks(len(times))
-    found = [_absolute(times[block], values[block], degree) for block in blocks]
+    by_block = [_absolute(times[block], values[block], degree) for block in blocks]
     scatter, period = float(np.ptp(values)), float(times[-1] - times[0])
     least = scatter / 2 * (2 * math.pi / period) ** np.arange(degree + 1)
-    errors, peaks = np.max([f[0] for f in found], axis=0), np.max([f[1] for f in found], axis=0)
+    errors, peaks = np.max([f[0] for f in by_block], axis=0), np.max([f[1] for f in by_block], axis=0)
     return np.minimum(1.0, errors / np.maximum(peaks, least))
 
 
@@ -84,7 +84,7 @@ def unsupported_derivative(errors: Float[np.ndarray, " derivative"], order: int)
     errors : ndarray of shape (degree + 1,)
         What `derivative_errors` found; above the degree nothing is known, unless the samples are all alike.
     order : int
-        Highest derivative that is wanted.
+        Highest derivative that is requested.
     """
     known = np.append(errors, 1.0 if errors.any() else 0.0)[: order + 1]
     if (known <= TOLERANCE).all():
@@ -95,7 +95,7 @@ def unsupported_derivative(errors: Float[np.ndarray, " derivative"], order: int)
 
 def unsupported_words(name: str, order: int, error: float, degree: int) -> str:
     """Word why samples do not support a derivative, and what to do."""
-    size = "cannot be told from them" if error >= 1 else f"is about {100 * error:.0f} %"
+    size = "cannot be known from them" if error >= 1 else f"is about {100 * error:.0f} %"
     if order >= degree:
         cause = f"splines of degree {degree} have continuous derivatives to order {degree - 1}; choose a higher degree"
     else:
@@ -110,15 +110,15 @@ def noise(times: Float[np.ndarray, " samples"], values: Float[np.ndarray, " samp
     scaled to weights of unit norm, keep its standard deviation. The least over the orders is taken.
     """
     floor = float(np.abs(values).max()) * np.finfo(float).eps / 4
-    found = math.inf
+    least = math.inf
     for order in range(1, min(12, len(times) - 1)):
         windows = np.lib.stride_tricks.sliding_window_view(times, order + 1)
         gaps = windows[:, :, None] - windows[:, None, :] + np.eye(order + 1)
         weights = 1 / np.prod(gaps / (windows[:, -1:, None] - windows[:, :1, None]), axis=2)
         weights = weights / np.sqrt((weights**2).sum(axis=1, keepdims=True))
         samples = np.lib.stride_tricks.sliding_window_view(values, order + 1)
-        found = min(found, float(np.sqrt(((weights * samples).sum(axis=1) ** 2).mean())))
-    return max(floor, found) if math.isfinite(found) else floor
+        least = min(least, float(np.sqrt(((weights * samples).sum(axis=1) ** 2).mean())))
+    return max(floor, least) if math.isfinite(least) else floor
 
 
 def amplification(times: Float[np.ndarray, " samples"], degree: int, order: int) -> Float[np.ndarray, " derivative"]:

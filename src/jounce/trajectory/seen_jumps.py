@@ -14,12 +14,12 @@ HALVINGS = 40
 Evaluation = Callable[[Float[np.ndarray, " time"]], Float[np.ndarray, "time level joint"]]
 
 
-def level_sizes(values: Float[np.ndarray, "time level joint"], span: float) -> Float[np.ndarray, "level joint"]:
+def level_sizes(values: Float[np.ndarray, "time level joint"], duration: float) -> Float[np.ndarray, "level joint"]:
     """Return the size of each derivative: what is small beside a lower one over the whole time is its rounding."""
     largest = np.abs(values).max(axis=0)
     sizes = largest.copy()
     for level in range(2, len(sizes)):
-        sizes[level] = np.maximum(largest[level], sizes[level - 1] / span)
+        sizes[level] = np.maximum(largest[level], sizes[level - 1] / duration)
     return sizes
 
 
@@ -73,18 +73,18 @@ def seen_jumps(
     >>> where.round(9).tolist(), sizes[..., 0].round(9).tolist()
     ([0.3], [[0.0, 2.0]])
     """
-    span = float(instants[-1] - instants[0])
+    duration = float(instants[-1] - instants[0])
     levels, joints = values.shape[1] - 1, values.shape[2]
     if len(instants) < 2:
         return np.zeros(0), np.zeros((0, levels, joints))
-    sizes = level_sizes(values, span)
-    least = CONSTANT * sizes[0] / span ** np.arange(levels + 1)[:, None]
+    sizes = level_sizes(values, duration)
+    least = CONSTANT * sizes[0] / duration ** np.arange(levels + 1)[:, None]
     sizes = np.maximum(sizes, least / FAINT)
     cells = np.flatnonzero(unexplained(instants, values, sizes).any(axis=(1, 2)))
     low, high = instants[cells], instants[cells + 1]
     left, right = values[cells], values[cells + 1]
     for _ in range(HALVINGS):
-        if not len(cells) or (high - low).max() <= SHORTEST * span:
+        if not len(cells) or (high - low).max() <= SHORTEST * duration:
             break
         middle = (low + high) / 2
         between = evaluate(middle)

@@ -1,6 +1,6 @@
 """Segments of motion laws, and the polynomials and sines that they are made of: the profiles of cam design.
 
-The shapes of harmonic, cycloidal, modified trapezoidal and modified sine laws are told by their accelerations, parts of
+The shapes of harmonic, cycloidal, modified trapezoidal and modified sine laws are given by accelerations, parts of
 sines and constants, which are integrated exactly.
 """
 
@@ -68,11 +68,11 @@ class Piece:
     sine: tuple[Value, Value, Value] = (0.0, 0.0, 0.0)  # amplitude, frequency, phase
     length: Value = 0.0
 
-    def stretched(self, way: Value, duration: Value) -> "Piece":
+    def stretched(self, rise: Value, duration: Value) -> "Piece":
         """Return the piece over a way and a duration other than one."""
         amplitude, frequency, phase = self.sine
-        powers = [c * way / duration**k for k, c in enumerate(self.powers)]
-        return Piece(powers, (amplitude * way, frequency / duration, phase), self.length * duration)
+        powers = [c * rise / duration**k for k, c in enumerate(self.powers)]
+        return Piece(powers, (amplitude * rise, frequency / duration, phase), self.length * duration)
 
     def lifted(self, value: Value) -> "Piece":
         """Return the piece with a value added."""
@@ -103,14 +103,14 @@ def _of_segment(
         target = number_of_value(f"{name}.to", segment.to)
     else:
         target = value if segment.by is None else value + number_of_value(f"{name}.by", segment.by)
-    way = target - value
+    rise = target - value
     if segment.limits is not None:
         return _within_limits(segment, name, value, target), target, rest
     duration = number_of_value(f"{name}.duration", segment.duration, positive)
     if segment.profile == "dwell":
         return [Piece([value], length=duration)], target, rest
     if segment.profile == "constant_velocity":
-        return [Piece([value, way / duration], length=duration)], target, [way / duration, 0.0]
+        return [Piece([value, rise / duration], length=duration)], target, [rise / duration, 0.0]
     if segment.profile == "polynomial":
         given = [
             default if x is None else [number_of_value(f"{name}.{key}", entry) for entry in x]
@@ -120,8 +120,8 @@ def _of_segment(
         # what is not given at the end is what the polynomial makes of it, and the next one begins with that
         free = [_derivative(powers, order, duration) for order in range(len(given[1]) + 1, len(rest) + 1)]
         return [Piece(powers, length=duration)], target, [*given[1], *free][: len(rest)]
-    pieces = [piece.stretched(way, duration).lifted(value) for piece in _shape(segment.profile)]
-    last = [0.0, -(math.pi**2) / 2 * way / duration**2] if segment.profile == "harmonic" else rest
+    pieces = [piece.stretched(rise, duration).lifted(value) for piece in _shape(segment.profile)]
+    last = [0.0, -(math.pi**2) / 2 * rise / duration**2] if segment.profile == "harmonic" else rest
     return pieces, target, last
 
 
@@ -206,9 +206,9 @@ def _shape(profile: str) -> tuple[Piece, ...]:
     return tuple(_whole(piece, position) for piece in pieces)
 
 
-def _whole(piece: Piece, way: float) -> Piece:
+def _whole(piece: Piece, rise: float) -> Piece:
     amplitude, frequency, phase = piece.sine
-    return Piece([c / way for c in piece.powers], (amplitude / way, frequency, phase), piece.length)
+    return Piece([c / rise for c in piece.powers], (amplitude / rise, frequency, phase), piece.length)
 
 
 def parsed_value(value: Value) -> Value:

@@ -145,12 +145,12 @@ class SegmentedMotion(SplineMotion):
             return None if values is None else [known(value) for value in values]
 
         segments, initial, start, beyond = self.recipe.value
-        found = [
+        known_segments = [
             Segment(s.profile, known(s.duration), known(s.to), known(s.by), each(s.begin), each(s.end), each(s.limits))
             for s in segments
         ]
         try:
-            return SegmentedMotion(found, known(initial), known(start), beyond)
+            return SegmentedMotion(known_segments, known(initial), known(start), beyond)
         except TrajectoryError as error:  # where it stands is known to the mechanism, which names the law
             raise TrajectoryError(f"{error.name}: {error.message}", value=error.value) from None
 

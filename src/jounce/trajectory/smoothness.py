@@ -63,7 +63,7 @@ class Continuity:
 
     @property
     def smoothness(self) -> int | None:
-        """The highest derivative that is continuous, -1 if the law itself jumps; None if none of those told jumps."""
+        """The highest derivative that is continuous, -1 if the law itself jumps; None if none of those known jumps."""
         broken = [x.order for x in self.derivatives if x.count]
         return min(broken) - 1 if broken else None
 
@@ -78,14 +78,14 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
     first, last : float
         s.
     order : int, default 4
-        Up to which all derivatives are told.
+        Up to which all derivatives are examined.
     periodic : bool, default False
         Whether the law begins again after the last instant, as that of a cam does after a turn.
 
     Returns
     -------
     Continuity
-        Of what a law through samples is between them, it is told to be as smooth as its degree says.
+        Of what a law through samples is between them, its smoothness is taken as that of its degree.
 
     Raises
     ------
@@ -114,14 +114,14 @@ def continuity(law: AbstractMotion, first: float, last: float, order: int = 4, *
         closing = np.where(np.abs(ends[1] - ends[0]) <= rounding, 0.0, ends[1] - ends[0])
         instants, jumps = np.append(instants, first), np.column_stack([jumps, closing])
     broken = np.flatnonzero(np.any(jumps != 0, axis=1))
-    told = max(order, int(broken[0])) if len(broken) else order
-    found = []
-    for level in range(told + 1):
+    highest_order = max(order, int(broken[0])) if len(broken) else order
+    summaries = []
+    for level in range(highest_order + 1):
         sizes = np.abs(jumps[level])
         where = int(np.argmax(sizes >= 0.999999 * sizes.max())) if sizes.any() else -1
         at = (float(jumps[level, where]), float(instants[where])) if where >= 0 else (np.nan, np.nan)
-        found.append(DerivativeJumps(level, int(np.count_nonzero(sizes)), *at))
-    return Continuity(tuple(found), unknown)
+        summaries.append(DerivativeJumps(level, int(np.count_nonzero(sizes)), *at))
+    return Continuity(tuple(summaries), unknown)
 
 
 def knots(law: AbstractMotion, first: float, last: float) -> Float[np.ndarray, " knots"]:
@@ -259,7 +259,7 @@ def _profile_jumps(law: AbstractProfile, order: int) -> Jumps:
 
 def _of_pieces(law: PiecewiseMotion, first: float, last: float, order: int) -> tuple[np.ndarray, np.ndarray, str]:
     """Return the jumps between pieces, and those that pieces have themselves."""
-    found = [(*law.jumps(order), "")]
+    law_jumps = [(*law.jumps(order), "")]
     bounded = law.beyond != "continue"
     whole = (float(law.start), float(law.until[-1])) if bounded else (first, last)
     inner = law.until[: len(law.parts) - 1]
@@ -268,8 +268,8 @@ def _of_pieces(law: PiecewiseMotion, first: float, last: float, order: int) -> t
         if whole[0] < end and whole[1] > begin:
             own, jumps, unknown = _jumps(part, max(whole[0], begin), min(whole[1], end), order)
             within = (own > begin) & (own < end)
-            found.append((own[within], jumps[:, within], unknown))
-    parts = list(zip(*found, strict=True))
+            law_jumps.append((own[within], jumps[:, within], unknown))
+    parts = list(zip(*law_jumps, strict=True))
     jumps = np.concatenate(parts[0]), np.concatenate(parts[1], axis=1)
     repeats = law.beyond in ("repeat", "advance")
     within = _repeated(jumps, *whole, first, last, repeats=repeats)
@@ -325,8 +325,8 @@ def _passed(
     first, beyond = (np.searchsorted(knots[sequence], x, side="right") for x in (low, high))
     count = np.where(np.isfinite(low) & np.isfinite(high), beyond - first, 0)
     crossing = np.repeat(np.arange(len(count)), count)
-    place = np.arange(len(crossing)) - np.repeat(np.cumsum(count) - count, count)
-    return sequence[first[crossing] + place], crossing
+    offset = np.arange(len(crossing)) - np.repeat(np.cumsum(count) - count, count)
+    return sequence[first[crossing] + offset], crossing
 
 
 def _composed(

@@ -57,13 +57,13 @@ def spline_through(
         raise MechanismError(message, value=len(times))
     try:
         if beyond in ("repeat", "advance"):
-            found = _periodic(times, values, degree, beyond)
+            pieces = _periodic(times, values, degree, beyond)
         else:
-            found = (*_interpolated(times, values, degree), 0.0)
+            pieces = (*_interpolated(times, values, degree), 0.0)
     except (np.linalg.LinAlgError, ValueError):
         message = "no spline goes through the samples: too uneven or too large; sample evenly"
         raise MechanismError(message, value=float(np.diff(times).min())) from None
-    return ((times, values), *found)
+    return ((times, values), *pieces)
 
 
 def local_powers(
@@ -89,14 +89,14 @@ def _sums_before(terms: list[float]) -> list[float]:
 
     What each addition loses is added up beside (the two-sum of Knuth).
     """
-    found, total, lost = [], 0.0, 0.0
+    sums, total, lost = [], 0.0, 0.0
     for term in terms:
-        found.append(total + lost)
+        sums.append(total + lost)
         raised = total + term
         own = raised - total
         lost += (total - (raised - own)) + (term - own)
         total = raised
-    return found
+    return sums
 
 
 def _interpolated(times: _Samples, values: _Samples, degree: int, **ends: Any) -> tuple[_Breakpoints, _Pieces]:
@@ -123,9 +123,9 @@ def _periodic(times: _Samples, values: _Samples, degree: int, beyond: str) -> tu
     """Return breakpoints, coefficients and advance of a spline that goes on smoothly from its end at its beginning."""
     if degree % 2 == 0:
         raise MechanismError("samples that repeat need a spline of odd degree", value=degree)
-    difference, span = float(values[-1] - values[0]), float(np.ptp(values)) or 1.0
+    difference, duration = float(values[-1] - values[0]), float(np.ptp(values)) or 1.0
     advance = float(whole_periods(difference)) if beyond == "repeat" else difference
-    if abs(difference - advance) > CLOSED * span:
+    if abs(difference - advance) > CLOSED * duration:
         message = "samples that repeat must end at the value they begin with, or whole turns (in rad) from it"
         raise MechanismError(
             f"{message}; choose beyond: advance, or close them: the last one differs by", value=difference

@@ -22,14 +22,16 @@ def evaluate_laws(laws: Sequence[AbstractMotion], time: Jet) -> Jet:
         groups.setdefault((structure, tuple(jnp.shape(leaf) for leaf in leaves)), []).append(index)
     batch = time.shape
     flat = time.map(lambda c: jnp.reshape(c, (1, -1)))
-    found: list[tuple[Any, ...]] = []
+    evaluated: list[tuple[Any, ...]] = []
     for members in groups.values():
         stacked = jax.tree.map(_along_joints, *(laws[index] for index in members))
         jet = stacked(flat).dense()
         shape = (len(members), *flat.shape[1:])
-        found.append(tuple(jnp.broadcast_to(c, shape) for c in jet.coefficients))
-    places = np.argsort([index for members in groups.values() for index in members])
-    return Jet(jnp.reshape(jnp.concatenate(levels)[places], (len(laws), *batch)) for levels in zip(*found, strict=True))
+        evaluated.append(tuple(jnp.broadcast_to(c, shape) for c in jet.coefficients))
+    positions = np.argsort([index for members in groups.values() for index in members])
+    return Jet(
+        jnp.reshape(jnp.concatenate(levels)[positions], (len(laws), *batch)) for levels in zip(*evaluated, strict=True)
+    )
 
 
 def _along_joints(*leaves: Any) -> Any:

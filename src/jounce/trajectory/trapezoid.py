@@ -61,10 +61,10 @@ class TrapezoidalMotion(SplineMotion):
         start, end, start_time = finite("start", start), finite("end", end), finite("start_time", start_time, seconds)
         if duration is not None:
             duration = positive("duration", duration, seconds)
-        way = abs(end - start)
+        distance = abs(end - start)
         given = {name: x for name, x in zip(LIMITS, (velocity, acceleration, jerk), strict=True) if x is not None}
         if len(given) == len(LIMITS):
-            lengths = np.array(_quickest(way, *(positive(name, value) for name, value in given.items())))
+            lengths = np.array(_quickest(distance, *(positive(name, value) for name, value in given.items())))
         elif given:
             message = "limits on velocity, acceleration and jerk are needed, all three or none"
             raise TrajectoryError(message, value=sorted(given))
@@ -95,17 +95,17 @@ class TrapezoidalMotion(SplineMotion):
         return float(self.breakpoints[-1] - self.breakpoints[1])
 
 
-def _quickest(way: float, velocity: float, acceleration: float, jerk: float) -> tuple[float, ...]:
+def _quickest(distance: float, velocity: float, acceleration: float, jerk: float) -> tuple[float, ...]:
     """Return the lengths of the seven phases of the quickest law from rest to rest within limits."""
     ramp = min(acceleration / jerk, math.sqrt(velocity / jerk))  # of a phase of jerk
     steady = max(velocity / (jerk * ramp) - ramp, 0.0)  # of a phase of constant acceleration
     if steady < 1e-12 * ramp:
         steady = 0.0
-    cruise = way / velocity - (2 * ramp + steady)
+    cruise = distance / velocity - (2 * ramp + steady)
     if cruise < 0:  # the way is too short for the velocity
         cruise = 0.0
-        ramp = min(acceleration / jerk, math.cbrt(way / (2 * jerk)))
-        rising = ramp / 2 + math.sqrt(ramp**2 / 4 + way / (jerk * ramp)) if ramp > 0 else 0.0
+        ramp = min(acceleration / jerk, math.cbrt(distance / (2 * jerk)))
+        rising = ramp / 2 + math.sqrt(ramp**2 / 4 + distance / (jerk * ramp)) if ramp > 0 else 0.0
         steady = max(rising - 2 * ramp, 0.0) if acceleration / jerk <= ramp else 0.0
     return ramp, steady, ramp, cruise, ramp, steady, ramp
 

@@ -1,6 +1,6 @@
-"""Angles that are likely meant in degrees: told by the values that a law takes over a run, whatever its form.
+"""Angles that are likely meant in degrees: recognized by the values that a law takes over a run, whatever its form.
 
-No rule can know what was meant. Told are values of many turns, or of more than one turn to a whole or half number,
+No rule can know what was meant. Doubtful are values of many turns, or of more than one turn to a whole or half number,
 that go back and forth, or from rest to rest, as positions in degrees do; a shaft that goes on turning may take any
 value, and so may angles that are round in degrees once they are in rad: they had their unit.
 """
@@ -68,7 +68,7 @@ def values_of(law: AbstractMotion, first: float, last: float) -> Values | None:
     grid = np.linspace(first, last, INSTANTS)
     try:
         values = _values(law, grid)
-    except (JounceError, TypeError, ValueError, ArithmeticError):  # told where the law is used
+    except (JounceError, TypeError, ValueError, ArithmeticError):  # the use of the law raises it
         return None
     return values if values.shape == grid.shape and np.abs(values).max() < ENDLESS else None
 
@@ -83,8 +83,8 @@ def _values(law: AbstractMotion, grid: Values) -> Values:
     if isinstance(law, ExpressionMotion):
         known = {name: float(value) for name, value in law.parameters.items()}
         with np.errstate(all="ignore"):
-            found = law.expression.folded(float, {**known, "t": grid}.__getitem__, _operated)
-        return np.broadcast_to(np.asarray(found, float), grid.shape)
+            values = law.expression.folded(float, {**known, "t": grid}.__getitem__, _operated)
+        return np.broadcast_to(np.asarray(values, float), grid.shape)
     if isinstance(law, FollowingMotion) and law.parts:
         own, leader = law.parts
         plain = isinstance(leader, ExpressionMotion | FollowingMotion) or _is_polynomial(leader)
@@ -100,8 +100,8 @@ def _values(law: AbstractMotion, grid: Values) -> Values:
         return float(law.start) + (float(law.end) - float(law.start)) * share**2 * (3 - 2 * share)
     if _is_polynomial(law):
         return _spline_values(law, grid)
-    if type(law) is FunctionMotion and (found := _of_all(law.function, grid)) is not None:
-        return found
+    if type(law) is FunctionMotion and (values := _of_all(law.function, grid)) is not None:
+        return values
     return np.asarray(law(Jet([grid])).coefficients[0], float)
 
 
@@ -109,10 +109,10 @@ def _of_all(function: Callable[[Any], Any], grid: Values) -> Values | None:
     """Return what a function of one instant is at all of them, None where it does not take them at once."""
     try:
         with np.errstate(all="ignore"):
-            found = np.asarray(function(grid), float)
+            values = np.asarray(function(grid), float)
     except Exception:  # noqa: BLE001 - a user's function, of which nothing is known
         return None
-    return found if found.shape == grid.shape else None
+    return values if values.shape == grid.shape else None
 
 
 def _operated(word: str, arguments: list[Any]) -> Any:
@@ -136,13 +136,13 @@ def _spline_values(law: SplineMotion, grid: Values) -> Values:
         grid = np.clip(grid, first, stop)
     grid = grid - turns * (stop - first)
     piece = np.clip(np.searchsorted(begins, grid, side="right") - 1, 0, len(begins) - 1)
-    local, found = grid - begins[piece], np.zeros_like(grid)
+    local, values = grid - begins[piece], np.zeros_like(grid)
     for power in np.asarray(law.coefficients, float)[::-1]:
-        found = found * local + power[piece]
+        values = values * local + power[piece]
     if isinstance(law, SegmentedMotion):
         amplitude, frequency, phase = np.asarray(law.sines, float)[:, piece]
-        found = found + amplitude * np.sin(local * frequency + phase)
-    return found + turns * float(np.asarray(law.advance))
+        values = values + amplitude * np.sin(local * frequency + phase)
+    return values + turns * float(np.asarray(law.advance))
 
 
 def degrees_meant(values: Values, lower: float | None = None, upper: float | None = None) -> str:
@@ -178,8 +178,8 @@ def degrees_meant(values: Values, lower: float | None = None, upper: float | Non
     ):
         return ""
     turns = max(high - low, largest) / TURN
-    told = f"goes from {_round(low)} to {_round(high)} rad" if high > low else f"is {_round(low)} rad"
-    return f"{told}, {turns:.2g} turns: degrees?"
+    phrase = f"goes from {_round(low)} to {_round(high)} rad" if high > low else f"is {_round(low)} rad"
+    return f"{phrase}, {turns:.2g} turns: degrees?"
 
 
 def _round(value: float) -> str:
@@ -232,13 +232,13 @@ def trajectory_doubt(laws: dict[str, Any], first: float, last: float, limits: di
     limits : dict of str to Limits
         Of these joints.
     """
-    found = {}
+    doubts = {}
     for name, law in laws.items():
         values = values_of(law, first, last)
         if values is not None and (why := degrees_meant(values, limits[name].lower, limits[name].upper)):
-            found[name] = why
-    if not found:
+            doubts[name] = why
+    if not doubts:
         return ""
-    name, why = next(iter(found.items()))
-    others = f" (and {count - 1} joint{'s' if count > 2 else ''} like it)" if (count := len(found)) > 1 else ""
+    name, why = next(iter(doubts.items()))
+    others = f" (and {count - 1} joint{'s' if count > 2 else ''} like it)" if (count := len(doubts)) > 1 else ""
     return f"{name} {why}{others} A number without a unit is in SI; give the unit, or convert to rad"

@@ -30,8 +30,8 @@ class ReadMotion(AbstractMotion):
         if isinstance(self.computes, Composed):
             return self.computes(time)
         wide = time if len(time.shape) > 1 else time.map(lambda c: jnp.reshape(c, (1, -1)))
-        found = self.computes(wide)
-        return found if wide is time else found.map(lambda c: jnp.reshape(c, time.shape))
+        values = self.computes(wide)
+        return values if wide is time else values.map(lambda c: jnp.reshape(c, time.shape))
 
     def check_instants(self, first: float, last: float) -> None:
         """Raise MechanismError if the law says nothing of some instants from a first to a last one, s."""

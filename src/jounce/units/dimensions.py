@@ -293,7 +293,7 @@ class _Reader:
 def variables_of(kind: Any) -> dict[str, Dimension | None]:
     """Return the variables of a law of a force, time among them, with what is known of their dimensions."""
     base = {"N": LENGTH, "N*m": ANGLE}.get(kind.unit) if kind.__module__.startswith("jounce.") else None
-    found: dict[str, Dimension | None] = {"t": TIME}
+    dimensions: dict[str, Dimension | None] = {"t": TIME}
     for names, dimension in ((kind.displacement_names, base), (kind.velocity_names, base and times(base, _PER_TIME))):
-        found |= dict.fromkeys(names, dimension)
-    return found
+        dimensions |= dict.fromkeys(names, dimension)
+    return dimensions

@@ -47,7 +47,7 @@ _ARITHMETIC: dict[str, Callable[..., Any]] = {
     "neg": operator.neg,
     "pos": operator.pos,
 }
-_FOUND = {
+_REPORTED = {
     ast.Subscript: "an index in brackets",
     ast.Lambda: "a lambda",
     ast.IfExp: "a conditional",
@@ -70,14 +70,14 @@ _ALLOWED = "allowed are numbers, names, + - * / **, parentheses and the usual fu
 _Instruction = tuple[str, Any, int, int]
 
 
-def check_parameter_name(given: object, error: type[JounceError], **place: Any) -> None:
-    """Raise an error unless a parameter may have a name: expressions must be able to use it; `place` says where."""
+def check_parameter_name(given: object, error: type[JounceError], **location: Any) -> None:
+    """Raise an error unless a parameter may have a name: expressions must be able to use it; `location` says where."""
     if not isinstance(given, str) or not PARAMETER_NAME.fullmatch(given):
-        raise error("a name is up to 100 letters, digits, _, not starting with a digit", value=given, **place)
+        raise error("a name is up to 100 letters, digits, _, not starting with a digit", value=given, **location)
     if given in RESERVED:
-        raise error(f"the name '{given}' is reserved for expressions; give another one", **place)
+        raise error(f"the name '{given}' is reserved for expressions; give another one", **location)
     if keyword.iskeyword(given):
-        raise error(f"the word '{given}' cannot be a name in expressions; give another one", **place)
+        raise error(f"the word '{given}' cannot be a name in expressions; give another one", **location)
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -361,7 +361,7 @@ def _refuse(node: ast.AST, column: int, text: str) -> NoReturn:
         case ast.Constant(value=complex()):
             shown = "a complex number"
         case _:
-            shown = _FOUND.get(type(node), "something else")
+            shown = _REPORTED.get(type(node), "something else")
     _fail(f"{shown} is not allowed", column, text)
 
 

@@ -59,8 +59,8 @@ def ask_pint(name: str) -> tuple[float, Dimension] | None:
             return None
         prefix, unit, _ = readings[0]
         factor, units = registry.get_base_units(prefix + unit)
-        found = registry.Quantity(factor, units).unit_items()
-        powers = {_BASES.get(str(base), str(base)): power for base, power in found}
+        items = registry.Quantity(factor, units).unit_items()
+        powers = {_BASES.get(str(base), str(base)): power for base, power in items}
         fixed = registry._is_multiplicative(prefix + unit)
     except (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError):
         return None

@@ -102,12 +102,12 @@ def unit_size(text: str) -> tuple[float, Dimension]:
     if not isinstance(text, str) or not re.match(r"[A-Za-z\u00b0\u00b5\u03bc]|1\s*/", text.strip()):
         raise UnitError("must be a unit, such as deg or mm", value=text)
     try:
-        found = parse_value(f"1 {text.strip()}")
+        quantity = parse_value(f"1 {text.strip()}")
     except JounceError as error:
         raise UnitError(error.message, value=text) from None
-    if found.dimension is None or not isinstance(found.value, float):
+    if quantity.dimension is None or not isinstance(quantity.value, float):
         raise UnitError("must be a unit, such as deg or mm", value=text)
-    return found.value, found.dimension
+    return quantity.value, quantity.dimension
 
 
 @dataclass(frozen=True)
@@ -150,9 +150,9 @@ class ShownUnits:
                 _, dimension = unit_size(unit)
             except UnitError as error:
                 raise error.located(name=f"units.{name}") from None
-            wanted = [self._of_output(name), self._of_kind(name)]
-            if dimension not in wanted:
-                words = " or ".join(describe_dimension(x) for x in wanted if x is not None)
+            dimensions = [self._of_output(name), self._of_kind(name)]
+            if dimension not in dimensions:
+                words = " or ".join(describe_dimension(x) for x in dimensions if x is not None)
                 message = f"measures {describe_dimension(dimension)}, not {words}"
                 raise UnitError(message, name=f"units.{name}", value=unit)
 
@@ -164,10 +164,10 @@ class ShownUnits:
         """Return the dimension of a kind of quantity, None for any other name."""
         return QUANTITIES[name][1] if name in QUANTITIES else None
 
-    def _chosen(self, name: str, wanted: Dimension | None) -> str | None:
-        """Return the unit that is chosen for a name, if it measures what is wanted: a name may be of a kind as well."""
+    def _chosen(self, name: str, dimension: Dimension | None) -> str | None:
+        """Return the unit chosen for a name, if its dimension is the given one: a name may be of a kind as well."""
         unit = self.chosen.get(name)
-        return unit if unit is not None and unit_size(unit)[1] == wanted else None
+        return unit if unit is not None and unit_size(unit)[1] == dimension else None
 
     def of(self, unit: str, name: str = "") -> tuple[str, float]:
         """Return the unit in which a quantity is shown, and by what its values in SI are multiplied.
@@ -224,12 +224,12 @@ def units_given(texts: Iterable[str], option: str = "--units") -> dict[str, str]
     >>> units_given(["angle=deg,length=mm", "C=cm"])
     {'angle': 'deg', 'length': 'mm', 'C': 'cm'}
     """
-    found: dict[str, str] = {}
+    units: dict[str, str] = {}
     for text in (part for given in texts for part in given.split(",")):
         name, _, unit = (part.strip() for part in text.partition("="))
         if not name or not unit:
             raise UnitError("units are given by NAME=UNIT, such as angle=deg,length=mm", name=option, value=text)
-        if name in found:
-            raise UnitError(f"is given more than once, as {found[name]} and as {unit}", name=f"{option} {name}")
-        found[name] = unit
-    return found
+        if name in units:
+            raise UnitError(f"is given more than once, as {units[name]} and as {unit}", name=f"{option} {name}")
+        units[name] = unit
+    return units

@@ -110,8 +110,8 @@ def _product(size: Size, factor: Size, power: int) -> Size:
 
 def _looked_up(name: str) -> tuple[Size, Dimension]:
     """Return what the library of units knows."""
-    if found := ask_pint(name):
-        return found
+    if answer := ask_pint(name):
+        return answer
     shown = name.encode("ascii", "backslashreplace").decode("ascii")
     raise UnitError(f"unknown unit '{shown}'; {nearest_unit(name)}".rstrip("; "))
 

@@ -100,7 +100,7 @@ def assert_agree_alone(function, lanes, shared, expected, width, rtol, signs):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(modules, "vector_width", lambda: width)
         patch.setattr(modules, "compiled", verified)
-        binary, results = modules.object_file(of_one, kinds, (), {}, large=FEW, alone=True)
+        binary, results = modules.object_file(of_one, kinds, (), {}, large=FEW, single=True)
     program = programs.Single(binary, kinds, results)
     for k, given in zip(places, each, strict=True):
         actual = program([np.asarray(x) for x in jax.tree.leaves(given)])

@@ -39,7 +39,7 @@ def program():
 def run_alone(function, *given, large=3):
     """Return the results of machine code for a function of arrays."""
     kinds = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in given]
-    binary, results = modules.object_file(lambda given, _: function(*given), kinds, (), {}, large=large, alone=True)
+    binary, results = modules.object_file(lambda given, _: function(*given), kinds, (), {}, large=large, single=True)
     return programs.Single(binary, kinds, results)(given)
 
 

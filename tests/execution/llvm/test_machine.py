@@ -22,7 +22,7 @@ GIVEN = (np.linspace(-1, 2, 21),)
 
 
 def run(**how):
-    binary, results = modules.object_file(function, GIVEN, (), {}, large=4, alone=True, **how)
+    binary, results = modules.object_file(function, GIVEN, (), {}, large=4, single=True, **how)
     return binary, programs.Single(binary, GIVEN, results)(GIVEN)[0]
 
 

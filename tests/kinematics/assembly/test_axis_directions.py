@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import jounce as jn
 from jounce.constraints import AbstractConstraint, Vector
 from jounce.errors import AssemblyWarning
-from jounce.kinematics.assembly.assemble import settled
+from jounce.kinematics.assembly.assemble import find_assembly
 from jounce.kinematics.assembly.axis_directions import drawn_axis_signs
 from jounce.mechanism import build
 from jounce.mechanism.resolve import resolve
@@ -50,7 +50,7 @@ def cosines(mechanism, coordinates):
 
 def assembled(name):
     mechanism = jn.load(f"examples/{name}.yaml")
-    model, trial = settled(build(mechanism), 0.0, TOLERANCE)
+    model, trial = find_assembly(build(mechanism), 0.0, TOLERANCE)
     assert trial.closed
     return mechanism, model, trial.coordinates
 
@@ -69,7 +69,7 @@ def test_no_hinge_is_turned_over_from_rough_guesses(name):
     random, closed = np.random.default_rng(1), 0
     for _ in range(12):
         guess = tilted(model, start, random, 2.0)
-        _, trial = settled(dataclasses.replace(model, guess=guess), 0.0, TOLERANCE)
+        _, trial = find_assembly(dataclasses.replace(model, guess=guess), 0.0, TOLERANCE)
         if min(cosines(mechanism, guess).values()) < -0.8:
             continue  # drawn the other way round
         assert trial.closed
@@ -84,7 +84,7 @@ def test_no_block_is_turned_over_in_its_guide():
     for away in (-2.0, -1.7, 1.7, 2.0):  # half a turn is nearer than none to all but one of the first steps
         guess = {**start, "angle": start["angle"].copy()}
         guess["angle"][number] += away
-        _, trial = settled(dataclasses.replace(model, guess=guess), 0.0, TOLERANCE)
+        _, trial = find_assembly(dataclasses.replace(model, guess=guess), 0.0, TOLERANCE)
         assert trial.closed
         assert trial.coordinates["angle"][number] == pytest.approx(start["angle"][number], abs=1e-9)
 

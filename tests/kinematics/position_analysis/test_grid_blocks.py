@@ -35,7 +35,7 @@ def test_each_instant_comes_after_what_it_starts_from(count, stride, width, full
             assert seen[sources].all()
             assert not solved[lanes].any()
             seen[lanes] = True
-        assert seen[span.place].all()
+        assert seen[span.indices].all()
         assert seen.sum() == span.count
         solved |= seen
     assert solved.all()

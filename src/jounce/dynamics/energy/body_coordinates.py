@@ -91,5 +91,5 @@ def _evaluated(
         linear, angular = jax.vmap(column, out_axes=2)(np.eye(size))
         return slope_values(form, pose, Columns(Jet(tuple(linear)), Jet(tuple(angular))), *masses)
 
-    found = jax.vmap(of_body, in_axes=-2, out_axes=1)(moving, own)  # levels, bodies, coordinates, time
-    return found.reshape(found.shape[0], -1, found.shape[-1])
+    coordinates_found = jax.vmap(of_body, in_axes=-2, out_axes=1)(moving, own)  # levels, bodies, coordinates, time
+    return coordinates_found.reshape(coordinates_found.shape[0], -1, coordinates_found.shape[-1])

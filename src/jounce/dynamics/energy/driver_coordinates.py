@@ -131,7 +131,7 @@ def balanced(motion: Motion, rates: int, *, gravity: bool) -> "xarray.DataArray"
     motion : Motion
         Of a mechanism whose bodies have masses.
     rates : int
-        How many rates are wanted.
+        How many rates are requested.
     gravity : bool
         Whether the bodies have weight.
 

@@ -114,7 +114,7 @@ def energy_slope(
     rate : int, default 0
         The number n of time derivatives of the energy.
     rates : int, default 0
-        How many rates in time of the slope itself are wanted.
+        How many rates in time of the slope itself are requested.
 
     Returns
     -------
@@ -158,7 +158,7 @@ def lagrange(system: Robot | Motion, q: ArrayLike | None = None, rates: int = 0)
     q : array_like of shape (..., K + 1, n), optional
         Coordinates of a robot and their derivatives, K at least rates + 2.
     rates : int, default 0
-        How many rates are wanted.
+        How many rates are requested.
 
     Returns
     -------

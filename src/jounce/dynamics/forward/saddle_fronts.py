@@ -57,7 +57,7 @@ class SaddleFronts(Module):
     @classmethod
     def of(cls, pattern: Pattern) -> "SaddleFronts | None":
         """Plan the elimination from the pattern of the Jacobian; None where a dense one is less work."""
-        arrays = (np.asarray(pattern.bodies), np.asarray(pattern.places))
+        arrays = (np.asarray(pattern.bodies), np.asarray(pattern.entry_indices))
         key = tuple((x.shape, x.dtype.str, x.tobytes()) for x in arrays)
         return _planned(key, pattern.body_count, pattern.entry_count, FRONT_COST)
 
@@ -65,7 +65,7 @@ class SaddleFronts(Module):
     def anew(cls, pattern: Pattern) -> "SaddleFronts | None":
         """Plan it, as `of` does, which keeps the plans."""
         size, width, count = sum(pattern.shape), pattern.width, pattern.body_count
-        bodies, positions = np.asarray(pattern.bodies), np.asarray(pattern.places)
+        bodies, positions = np.asarray(pattern.bodies), np.asarray(pattern.entry_indices)
         owners = _owners(bodies.tolist(), count)
         if not owners:
             return None
@@ -193,7 +193,9 @@ def _meeting(pattern: Pattern, where: Int[np.ndarray, " row"], whole: int) -> Me
     entries: Meeting = [{k // whole: {k % whole: mass + pattern.entry_count}} for k in range(count * whole)]
     for body, i in itertools.product(range(count), range(width)):
         entries[body * whole + i][body] = {j: (i * width + j) * count + body for j in range(width)}
-    rows = zip(np.asarray(pattern.bodies).tolist(), np.asarray(pattern.places).tolist(), where.tolist(), strict=True)
+    rows = zip(
+        np.asarray(pattern.bodies).tolist(), np.asarray(pattern.entry_indices).tolist(), where.tolist(), strict=True
+    )
     for touched, columns, here in rows:
         entries[here] = {}
         for body, block in zip(touched, columns, strict=True):

@@ -74,7 +74,7 @@ def jumps_of(
     grid : array of shape (time,)
         Increasing instants, s.
     values : array of shape (time, derivative, joint)
-        Coordinates there; jumps are told of all derivatives but the highest.
+        Coordinates there; jumps of all derivatives but the highest are known.
     """
     trajectory, order, joints = followed.trajectory, values.shape[1] - 1, values.shape[2]
     first, last = float(grid[0]), float(grid[-1])

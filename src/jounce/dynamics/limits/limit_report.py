@@ -77,7 +77,7 @@ class LimitRows:
         return tuple(sorted((row for row in self.rows if row.broken), key=_ratio, reverse=True))
 
     @property
-    def kept(self) -> bool:
+    def kept(self) -> bool:  # a public name
         """Whether no limit is broken."""
         return not self.broken
 
@@ -127,7 +127,7 @@ class LimitReport(LimitRows, Displayed):
     hand_over: bool = False
 
     @property
-    def kept(self) -> bool:
+    def kept(self) -> bool:  # a public name
         """Whether no limit is broken, neither within the motion nor by a jump from rest, or to it, at its ends."""
         return not self.broken and (self.hand_over or not any(end.breaks for end in self.ends))
 

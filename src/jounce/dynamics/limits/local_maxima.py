@@ -38,7 +38,7 @@ def local_heights(measures: Float[np.ndarray, "time curve"]) -> Float[np.ndarray
 def largest_indices(height: Float[np.ndarray, "time curve"], count: int) -> Int[np.ndarray, "{count} curve"]:
     """Return the indices of the highest values of curves, the best first, of equal ones the earlier.
 
-    Where fewer are finite than are wanted, an index may stand twice.
+    Where fewer are finite than are requested, an index may stand twice.
     """
     left, every, order = height.copy(), np.arange(height.shape[1]), []
     for _ in range(count):

@@ -145,7 +145,7 @@ def trajectory_torques(
     trajectory : JointTrajectory
         Joints that it does not name stand still at zero, or at the end of their range that is nearest to it.
     rates : int, default 0
-        How many rates of the torques are wanted.
+        How many rates of the torques are requested.
     times : array_like of shape (time,), optional
         Instants, s; those of the trajectory unless given.
     drives : bool, default True

@@ -49,7 +49,7 @@ class Reduction:
     matrices : array of shape (coordinates, lanes)
         Generalized forces of the coordinates that these changes need.
     sizes : array of shape (coordinates, lanes)
-        What they would be if nothing canceled: by it, what is rounding can be told.
+        What they would be if nothing canceled: the comparison tells what is rounding.
     """
 
     point: OperatingPoint
@@ -157,8 +157,8 @@ def _check_nowhere(
     changes = np.stack([directions, *[np.zeros_like(directions)] * 2])
     for level in (1, 2):
         gaps = point.varied(changes)[1][level]
-        told = _measured(point, chosen, changes, level) if chosen else np.zeros((0, gaps.shape[1]))
-        changes[level] = inverse @ np.concatenate([-gaps, -told])
+        measured = _measured(point, chosen, changes, level) if chosen else np.zeros((0, gaps.shape[1]))
+        changes[level] = inverse @ np.concatenate([-gaps, -measured])
     left = basis.T @ point.varied(changes)[0].sum(axis=0)
     if released or (np.abs(left) > NOWHERE * sizes[:, None]).any():
         message = (

@@ -6,7 +6,7 @@ from typing import Any
 
 from jounce.execution.llvm.machine import is_published
 from jounce.execution.llvm.text.code import Code
-from jounce.execution.llvm.text.stored import copied, empty_state, stored
+from jounce.execution.llvm.text.stored import copied, new_storage, stored
 from jounce.execution.llvm.text.values import UnsupportedOperationError, kind_of
 from jounce.execution.llvm.text.views import Array, Stored, contiguous
 
@@ -19,25 +19,25 @@ def call(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     UnsupportedOperationError
         If another function is called, or lanes would have to share what it does.
     """
-    name, found = equation.params["target_name"], [variable.aval for variable in equation.outvars]
-    if not (code.alone and is_published(name)):
+    name, result = equation.params["target_name"], [variable.aval for variable in equation.outvars]
+    if not (code.single and is_published(name)):
         raise UnsupportedOperationError(f"a call of {name}")
-    results: list[Array] = [empty_state(code, aval.shape, kind_of(aval.dtype), lanes=False) for aval in found]
+    results: list[Array] = [new_storage(code, aval.shape, kind_of(aval.dtype), lanes=False) for aval in result]
     arrays = [*(_in_one_piece(code, array) for array in given), *results]
     addresses = code.fresh("m")
     code.entry.append(f"{addresses} = alloca ptr, i64 {len(arrays)}, align 8")
     code.memory += 8 * len(arrays)
     for k, array in enumerate(arrays):
-        place = code.fresh()
-        code.lines.append(f"{place} = getelementptr ptr, ptr {addresses}, i64 {k}")
-        code.lines.append(f"store ptr {array.region.pointer}, ptr {place}, align 8")
+        index = code.fresh()
+        code.lines.append(f"{index} = getelementptr ptr, ptr {addresses}, i64 {k}")
+        code.lines.append(f"store ptr {array.region.pointer}, ptr {index}, align 8")
     code.intrinsics.add(f"declare void @{name}(ptr, i64)")
-    code.lines.append(f"call void @{name}(ptr {addresses}, i64 {found[0].shape[-1]})")
+    code.lines.append(f"call void @{name}(ptr {addresses}, i64 {result[0].shape[-1]})")
     return results
 
 
 def _in_one_piece(code: Code, array: Array) -> Stored:
     """Return an array whose numbers lie one after another from the beginning of its memory on."""
-    found = stored(code, array)
-    whole = found.is_same(contiguous(found.region, found.shape)) or not math.prod(found.shape)
-    return found if whole else copied(code, found)
+    result = stored(code, array)
+    whole = result.is_same(contiguous(result.region, result.shape)) or not math.prod(result.shape)
+    return result if whole else copied(code, result)

@@ -46,11 +46,11 @@ class LoopVariables:
         """Change the arrays: where a number is what was there when it was loaded, there is nothing to do."""
         targets = [contiguous(region, shape) for region, shape in zip(self.regions, self.shapes, strict=True)]
         changing = {target.region for target, array in zip(targets, arrays, strict=True) if not target.is_same(array)}
-        apart = [  # what is a part of an array that changes is read before
+        read_first = [  # what is a part of an array that changes is read before
             copied(self.code, array) if _reads_others(array, target, changing) else array
             for target, array in zip(targets, arrays, strict=True)
         ]
-        for target, array in zip(targets, apart, strict=True):
+        for target, array in zip(targets, read_first, strict=True):
             if isinstance(array, InMemory) or is_large(self.code, array):
                 if not target.is_same(array):
                     put(self.code, target, array)

@@ -61,8 +61,8 @@ def compiled(text: str, *, hasty: bool = False, brief: bool = False) -> bytes:
     if brief:
         return _compiled_here(text, 0)
     elsewhere = hasty or (text.count("\n") > LONG and _cores() > 1)
-    found = _compiled_elsewhere(text, hasty) if elsewhere else None
-    return _compiled_here(text) if found is None else found
+    result = _compiled_elsewhere(text, hasty) if elsewhere else None
+    return _compiled_here(text) if result is None else result
 
 
 def _cores() -> int:

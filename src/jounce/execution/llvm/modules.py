@@ -36,7 +36,7 @@ def object_file(
     rows: bool = False,
     most_lines: int = MOST_LINES,
     large: int | None = None,
-    alone: bool = False,
+    single: bool = False,
     hasty: bool = False,
     brief: bool = False,
 ) -> tuple[bytes, Any]:
@@ -58,7 +58,7 @@ def object_file(
     large : int, optional
         Arrays of more numbers stay in memory, and operations on them are loops: shorter code that takes longer. None
         unless given.
-    alone : bool, default False
+    single : bool, default False
         Whether there is one instant only, all of whose arrays are in `shared`.
     hasty, brief : bool, default False
         As `compiled` has them.
@@ -68,7 +68,7 @@ def object_file(
     UnsupportedOperationError
         Where there is no code for it, or too much; or a release of JAX that was not tried writes it otherwise.
     """
-    count, options = len(jax.tree.leaves(shared)), {"most_lines": most_lines, "large": large, "alone": alone}
+    count, options = len(jax.tree.leaves(shared)), {"most_lines": most_lines, "large": large, "single": single}
     with uncollected():
         traced, results = jax.make_jaxpr(function, return_shape=True)(shared, lanes)
         closed = in_plain_operations(traced)
@@ -90,15 +90,15 @@ def _text(
     rows: bool = False,
     most_lines: int = MOST_LINES,
     large: int | None = None,
-    alone: bool = False,
+    single: bool = False,
 ) -> str:
     """Return the text of a module with a function `run` of the addresses of all arrays and the number of lanes."""
-    code, given = Code(width, most_lines, large=large, alone=alone), []
+    code, given = Code(width, most_lines, large=large, single=single), []
     for number, variable in enumerate(closed.jaxpr.invars):
         if number in known:
             given.append(constants(code, known[number]))
             continue
-        region = _region(code, number, kind_of(variable.aval.dtype), lanes=number >= shared and not alone)
+        region = _region(code, number, kind_of(variable.aval.dtype), lanes=number >= shared and not single)
         shape = variable.aval.shape
         if is_large(code, variable.aval) and not (rows and region.lanes):
             given.append(contiguous(region, shape))
@@ -146,7 +146,7 @@ def _text(
         "begin:",
         *borrowed,
         *code.entry,
-        *(code.lines if alone else loop),
+        *(code.lines if single else loop),
         *returned,
         "ret void",
         "}",
@@ -156,7 +156,7 @@ def _text(
     ]
     for name, count in sorted(code.functions):
         lines += [f"declare double @{name}({', '.join(['double'] * count)}) #0", _lane_by_lane(name, count, width)]
-    if not alone:
+    if not single:
         lines.append(rounds_text(width))
     return "\n".join([*lines, ATTRIBUTES])
 
@@ -172,10 +172,10 @@ def _write(code: Code, number: int, array: Array, *, rows: bool) -> None:
     if not array.size:
         return
     if isinstance(array, Stored) and not rows:
-        put(code, contiguous(_region(code, number, array.kind, lanes=not code.alone), array.shape), array)
+        put(code, contiguous(_region(code, number, array.kind, lanes=not code.single), array.shape), array)
         return
     values = flat(values_of(code, array))
-    region = _region(code, number, values[0].kind, lanes=not code.alone)
+    region = _region(code, number, values[0].kind, lanes=not code.single)
     if rows:
         rows_.write(code, region.pointer, values)
         return

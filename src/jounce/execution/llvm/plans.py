@@ -102,19 +102,19 @@ def _written(
         return variable if isinstance(variable, Literal) else names.get(variable, variable)
 
     for equation in program.eqns:
-        given, found = [name(variable) for variable in equation.invars], list(equation.outvars)
+        given, result = [name(variable) for variable in equation.invars], list(equation.outvars)
         if equation.primitive.name in CALLS:
             called, values = _called(equation)
             inner = dict(zip(called.invars, given, strict=True))
             for variable, value in zip(called.constvars, values, strict=True):
                 inner[variable] = Variable(variable.aval)
                 constants[inner[variable]] = value
-            names |= zip(found, _written(called, inner, operations, constants, whole=False), strict=True)
+            names |= zip(result, _written(called, inner, operations, constants, whole=False), strict=True)
             continue
         if not whole:
-            found = [Variable(variable.aval) for variable in found]
-            names |= zip(equation.outvars, found, strict=True)
-        operations.append(Operation(equation.primitive, equation.params, given, found, equation.source_info))
+            result = [Variable(variable.aval) for variable in result]
+            names |= zip(equation.outvars, result, strict=True)
+        operations.append(Operation(equation.primitive, equation.params, given, result, equation.source_info))
     return [name(variable) for variable in program.outvars]
 
 
@@ -139,7 +139,7 @@ def _delayed(
     readers: dict[Any, list[int]] = {}
     for number, variable in _reads(operations, results):
         readers.setdefault(variable, []).append(number)
-    found: dict[int, int] = {}
+    result: dict[int, int] = {}
     for number, operation in reversed([*enumerate(operations)]):
         if operation.primitive.name not in deferred or len(operation.outvars) != 1:
             continue
@@ -148,8 +148,8 @@ def _delayed(
             continue
         name = None if reader == len(operations) else operations[reader].primitive.name
         if name is None or name in deferred or name in reading:
-            found[number] = found.get(reader, reader)
-    return found
+            result[number] = result.get(reader, reader)
+    return result
 
 
 def _last_reads(operations: Sequence[Operation], results: Sequence[Any], delayed: Mapping[int, int]) -> dict[Any, int]:

@@ -26,7 +26,7 @@ class Layout:
 
     Attributes
     ----------
-    places : array of int
+    offsets : array of int
         Of the arrays, in bytes.
     end : int
         Of them all.
@@ -34,23 +34,23 @@ class Layout:
 
     def __init__(self, kinds: Sequence[tuple[tuple[int, ...], Any]], begin: int = 0):
         self._kinds = [(shape, np.dtype(dtype)) for shape, dtype in kinds]
-        self.places, self.end, self._groups = np.empty(len(kinds), np.int64), begin, []
+        self.offsets, self.end, self._groups = np.empty(len(kinds), np.int64), begin, []
         by_type = sorted(range(len(kinds)), key=lambda k: self._kinds[k][1].str)
         for _, group in itertools.groupby(by_type, key=lambda k: self._kinds[k][1].str):
             members, first = list(group), -(-self.end // 64) * 64
             dtype, sizes = self._kinds[members[0]][1], [math.prod(self._kinds[k][0]) for k in members]
             ends = first + dtype.itemsize * np.cumsum([0, *sizes])
-            self.places[members], self.end = ends[:-1], int(ends[-1])
+            self.offsets[members], self.end = ends[:-1], int(ends[-1])
             self._groups.append((members, slice(first, self.end), dtype))
 
     def put(self, memory: np.ndarray, arrays: Sequence[np.ndarray]) -> None:
         """Copy arrays of these shapes and types to their places in a memory of bytes."""
-        for members, place, dtype in self._groups:
-            np.concatenate([arrays[k] for k in members], axis=None, out=memory[place].view(dtype), casting="no")
+        for members, index, dtype in self._groups:
+            np.concatenate([arrays[k] for k in members], axis=None, out=memory[index].view(dtype), casting="no")
 
     def views(self, memory: np.ndarray) -> list[np.ndarray]:
         """Return the arrays in a memory of bytes."""
-        return [np.ndarray(*kind, memory, place) for kind, place in zip(self._kinds, self.places, strict=True)]
+        return [np.ndarray(*kind, memory, index) for kind, index in zip(self._kinds, self.offsets, strict=True)]
 
 
 class Single:
@@ -59,24 +59,24 @@ class Single:
     Parameters
     ----------
     binary : bytes
-        From `modules.object_file`, with `alone`.
+        From `modules.object_file`, with `single`.
     given, results : pytree
         Of what has the shapes and types of the arguments and of the results.
     """
 
     def __init__(self, binary: bytes, given: Any, results: Any):
         self._run = MachineCode(binary)
-        leaves, (found, self._structure) = jax.tree.leaves(given), jax.tree.flatten(results)
-        self._addresses = 8 * (len(leaves) + len(found))  # bytes
+        leaves, (result, self._structure) = jax.tree.leaves(given), jax.tree.flatten(results)
+        self._addresses = 8 * (len(leaves) + len(result))  # bytes
         self._given = Layout([(x.shape, x.dtype) for x in leaves], self._addresses)
-        self._results = Layout([(x.shape, x.dtype) for x in found], self._given.end)
-        self._places = np.concatenate([self._given.places, self._results.places])
+        self._results = Layout([(x.shape, x.dtype) for x in result], self._given.end)
+        self._offsets = np.concatenate([self._given.offsets, self._results.offsets])
 
     def __call__(self, given: Sequence[np.ndarray]) -> Any:
         """Return the results, for the leaves of the arguments, of the shapes and types that the program is for."""
         memory = np.empty(self._results.end, np.uint8)
         first = _address(memory)
-        np.add(self._places, first, out=memory[: self._addresses].view(np.int64))
+        np.add(self._offsets, first, out=memory[: self._addresses].view(np.int64))
         self._given.put(memory, given)
         self._run(first, 1)
         return jax.tree.unflatten(self._structure, self._results.views(memory))
@@ -128,11 +128,11 @@ class Program:
             lanes = [_filled(x, total, axis) for x in lanes]
         given = [np.ascontiguousarray(x) for x in lanes]
         shapes = [((total, *shape) if self._rows else (*shape, total), dtype) for shape, dtype in self._results]
-        found = [np.empty(*shape) for shape in shapes]
+        result = [np.empty(*shape) for shape in shapes]
         memory = np.empty(self._layout.end, np.uint8)
         self._layout.put(memory, shared)
-        arrays = [*given, *found]
-        addresses = [*(self._layout.places + _address(memory)).tolist(), *map(_address, arrays)]
+        arrays = [*given, *result]
+        addresses = [*(self._layout.offsets + _address(memory)).tolist(), *map(_address, arrays)]
         if not self._rows or (vectors := total // self.width) < 2 or parts == 1:
             self._run((ctypes.c_void_p * len(addresses))(*addresses), total)
         else:
@@ -146,7 +146,7 @@ class Program:
                     self._run((ctypes.c_void_p * len(here))(*here), stop - start)
 
             list(each(run, range(parts)))
-        return jax.tree.unflatten(self._structure, [x[:count] if self._rows else x[..., :count] for x in found])
+        return jax.tree.unflatten(self._structure, [x[:count] if self._rows else x[..., :count] for x in result])
 
     def rounds(
         self,
@@ -207,17 +207,17 @@ def _address(array: np.ndarray) -> int:
     return array.__array_interface__["data"][0]
 
 
-def _agree(arrays: Sequence[Any], wanted: Sequence[tuple[tuple[int, ...], Any]]) -> None:
+def _agree(arrays: Sequence[Any], expected: Sequence[tuple[tuple[int, ...], Any]]) -> None:
     """Raise ValueError unless arrays are of the shapes and types wanted."""
-    found = [(x.shape, x.dtype) for x in arrays]
-    if found != wanted:
-        raise ValueError(f"arrays of {found}, where the program was made for {wanted}")
+    result = [(x.shape, x.dtype) for x in arrays]
+    if result != expected:
+        raise ValueError(f"arrays of {result}, where the program was made for {expected}")
 
 
 def _filled(x: np.ndarray, total: int, axis: int) -> np.ndarray:
     """Repeat the last instant until there are so many; zeros where there is none."""
     x = np.moveaxis(x, axis, 0)
-    found = np.zeros((total, *x.shape[1:]), x.dtype)
+    result = np.zeros((total, *x.shape[1:]), x.dtype)
     if len(x):
-        found[: len(x)], found[len(x) :] = x, x[-1]
-    return np.moveaxis(found, 0, axis)
+        result[: len(x)], result[len(x) :] = x, x[-1]
+    return np.moveaxis(result, 0, axis)

@@ -36,15 +36,15 @@ class Column(NamedTuple):
             If the array is not one that the machine code can read.
         """
         whole: Any = self.whole
-        found = whole.shape[:-1], whole.dtype, whole.dtype.itemsize, whole.strides[-1]
-        if found != (self.shape, self.dtype, ENTRY, ENTRY) or whole.shape[-1] < least:
+        result = whole.shape[:-1], whole.dtype, whole.dtype.itemsize, whole.strides[-1]
+        if result != (self.shape, self.dtype, ENTRY, ENTRY) or whole.shape[-1] < least:
             raise ValueError(
                 f"an array of {whole.dtype}{whole.shape}, for {self.dtype}{self.shape} of {least} instants"
             )
-        places = [_address(whole)]
+        indices = [_address(whole)]
         for size, step in zip(whole.shape[:-1], whole.strides[:-1], strict=True):
-            places = [place + k * step for place in places for k in range(size)]
-        return places
+            indices = [index + k * step for index in indices for k in range(size)]
+        return indices
 
     def room(self, width: int) -> int:
         """Return how many bytes the numbers of a round take, in whole lines of the cache."""
@@ -197,9 +197,9 @@ class RoundRunner:
         for column, begin in zip(held, begins, strict=False):
             numbers = np.repeat(np.asarray(column.whole, column.dtype).reshape(*column.shape, 1), width, axis=-1)
             self._blank[begin : begin + numbers.nbytes] = numbers.ravel().view(np.uint8)
-        found = _pairs(results, begins, width, len(sources))
-        self._counts = len(at_source), len(at_target), len(found)
-        self._pairs = np.array([*at_source, *at_target, *found], np.int64).reshape(-1, 2)
+        result = _pairs(results, begins, width, len(sources))
+        self._counts = len(at_source), len(at_target), len(result)
+        self._pairs = np.array([*at_source, *at_target, *result], np.int64).reshape(-1, 2)
 
     def __call__(self, targets: Int[np.ndarray, "round lane"]) -> None:
         """Solve instants by their indices; in several threads at once, if they have none of them in common.
@@ -213,29 +213,29 @@ class RoundRunner:
         if targets.dtype != np.int64 or targets.shape[1:] != (width,) or not within:
             raise ValueError(f"targets that are not {width} indices below {count} for each round")
         targets = np.ascontiguousarray(targets)
-        room = np.empty(len(self._blank) + LINE, np.uint8)  # of its own for each call, and so for each thread
-        first = -_address(room) % LINE
-        room[first : first + len(self._blank)] = self._blank
-        start = _address(room) + first
+        memory = np.empty(len(self._blank) + LINE, np.uint8)  # of its own for each call, and so for each thread
+        first = -_address(memory) % LINE
+        memory[first : first + len(self._blank)] = self._blank
+        start = _address(memory) + first
         addresses, pairs = np.concatenate([self._common, start + self._begins]), self._pairs + np.array([0, start])
         indices = _address(self._sources), _address(targets)
         self._run(_address(addresses), _address(pairs), *self._counts, *indices, len(targets))
 
     def _check_sources(self) -> None:
         """Raise ValueError unless sources are indices of the arrays that are read at them."""
-        found = self._sources
-        within = found.min(initial=0) >= 0 and found.max(initial=-1) < self._known
-        if found.dtype != np.int64 or not within or not found.flags.c_contiguous:
+        result = self._sources
+        within = result.min(initial=0) >= 0 and result.max(initial=-1) < self._known
+        if result.dtype != np.int64 or not within or not result.flags.c_contiguous:
             raise ValueError(f"sources that are no indices below {self._known}")
 
 
 def _pairs(columns: Sequence[Column], begins: Iterator[int], width: int, least: int) -> list[tuple[int, int]]:
     """Return the address of each number of the first of `least` instants, and where those of a round begin."""
-    found: list[tuple[int, int]] = []
+    result: list[tuple[int, int]] = []
     for column, begin in zip(columns, begins, strict=False):
         if column.whole is not None:
-            found += zip(column.addresses(least), itertools.count(begin, width * ENTRY), strict=False)
-    return found
+            result += zip(column.addresses(least), itertools.count(begin, width * ENTRY), strict=False)
+    return result
 
 
 def _address(array: np.ndarray) -> int:

@@ -15,24 +15,24 @@ def read(code: Code, pointer: str, size: int, kind: str) -> list[Value]:
     if size == 0:
         return []
     rows, of, hint = _rows(code, pointer, size, kind), f"<{code.width} x {IN_MEMORY[kind]}>", "!invariant.load !0"
-    found: list[str | None] = [None] * size
+    result: list[str | None] = [None] * size
     if size < code.width:
         for k in range(size):
-            found[k] = "poison"
+            result[k] = "poison"
             for lane, row in enumerate(rows):
                 one, more = code.fresh(), code.fresh()
-                place = _place(code, row, k, kind)
-                code.lines.append(f"{one} = load {IN_MEMORY[kind]}, ptr {place}, align {_align(kind)}, {hint}")
-                code.lines.append(f"{more} = insertelement {of} {found[k]}, {IN_MEMORY[kind]} {one}, i64 {lane}")
-                found[k] = more
+                index = _place(code, row, k, kind)
+                code.lines.append(f"{one} = load {IN_MEMORY[kind]}, ptr {index}, align {_align(kind)}, {hint}")
+                code.lines.append(f"{more} = insertelement {of} {result[k]}, {IN_MEMORY[kind]} {one}, i64 {lane}")
+                result[k] = more
     for start in _starts(size, code.width):
         block = []
         for row in rows:
             block.append(code.fresh())
-            place = _place(code, row, start, kind)
-            code.lines.append(f"{block[-1]} = load {of}, ptr {place}, align {_align(kind)}, {hint}")
-        found[start : start + code.width] = _transposed(code, block, kind)
-    return [Value(_truth(code, str(name)) if kind == "b" else str(name), kind, lanes=True) for name in found]
+            index = _place(code, row, start, kind)
+            code.lines.append(f"{block[-1]} = load {of}, ptr {index}, align {_align(kind)}, {hint}")
+        result[start : start + code.width] = _transposed(code, block, kind)
+    return [Value(_truth(code, str(name)) if kind == "b" else str(name), kind, lanes=True) for name in result]
 
 
 def write(code: Code, pointer: str, values: Sequence[Value]) -> None:
@@ -45,14 +45,14 @@ def write(code: Code, pointer: str, values: Sequence[Value]) -> None:
     if size < code.width:
         for k, name in enumerate(names):
             for lane, row in enumerate(rows):
-                one, place = code.fresh(), _place(code, row, k, kind)
+                one, index = code.fresh(), _place(code, row, k, kind)
                 code.lines.append(f"{one} = extractelement {of} {name}, i64 {lane}")
-                code.lines.append(f"store {IN_MEMORY[kind]} {one}, ptr {place}, align {_align(kind)}")
+                code.lines.append(f"store {IN_MEMORY[kind]} {one}, ptr {index}, align {_align(kind)}")
     for start in _starts(size, code.width):
         block = _transposed(code, names[start : start + code.width], kind)
         for row, name in zip(rows, block, strict=True):
-            place = _place(code, row, start, kind)
-            code.lines.append(f"store {of} {name}, ptr {place}, align {_align(kind)}")
+            index = _place(code, row, start, kind)
+            code.lines.append(f"store {of} {name}, ptr {index}, align {_align(kind)}")
 
 
 def _starts(size: int, width: int) -> list[int]:
@@ -76,7 +76,7 @@ def _place(code: Code, pointer: str, index: int | str, kind: str) -> str:
 
 def _transposed(code: Code, block: Sequence[str], kind: str) -> list[str]:
     """Return the columns of a square of numbers, of which the rows are given: bit after bit of the places changes."""
-    width, found = code.width, list(block)
+    width, result = code.width, list(block)
     of, bit = f"<{width} x {IN_MEMORY[kind]}>", 1
     while bit < width:
         low = [k if not k & bit else width + k - bit for k in range(width)]
@@ -84,25 +84,25 @@ def _transposed(code: Code, block: Sequence[str], kind: str) -> list[str]:
         for i in range(width):
             if i & bit:
                 continue
-            pair = found[i], found[i + bit]
-            for place, picked in ((i, low), (i + bit, high)):
+            pair = result[i], result[i + bit]
+            for index, picked in ((i, low), (i + bit, high)):
                 name, mask = code.fresh(), ", ".join(f"i32 {k}" for k in picked)
                 code.lines.append(f"{name} = shufflevector {of} {pair[0]}, {of} {pair[1]}, <{width} x i32> <{mask}>")
-                found[place] = name
+                result[index] = name
         bit *= 2
-    return found
+    return result
 
 
 def _truth(code: Code, name: str) -> str:
-    found = code.fresh()
-    code.lines.append(f"{found} = trunc <{code.width} x i8> {name} to <{code.width} x i1>")
-    return found
+    result = code.fresh()
+    code.lines.append(f"{result} = trunc <{code.width} x i8> {name} to <{code.width} x i1>")
+    return result
 
 
 def _wide(code: Code, name: str) -> str:
-    found = code.fresh()
-    code.lines.append(f"{found} = zext <{code.width} x i1> {name} to <{code.width} x i8>")
-    return found
+    result = code.fresh()
+    code.lines.append(f"{result} = zext <{code.width} x i1> {name} to <{code.width} x i8>")
+    return result
 
 
 def _align(kind: str) -> int:

@@ -84,7 +84,7 @@ def check() -> None:
         expected = jax.vmap(lambda x: function(shared, (x[:, None],)), in_axes=1, out_axes=-1)(*lanes)
         for large in (None, 8):
             binary, results = object_file(function, shared, one, {}, large=large)
-            found = Program(binary, (shared, one), results)(list(shared), list(lanes))
-            for mine, theirs in zip(found, expected, strict=True):
+            result = Program(binary, (shared, one), results)(list(shared), list(lanes))
+            for mine, theirs in zip(result, expected, strict=True):
                 if not np.allclose(mine, theirs[:, 0], rtol=1e-12, atol=1e-14):
                     raise AssertionError("the numbers are others")

@@ -19,9 +19,9 @@ from jounce.execution.llvm.text.arrays import constants, each, filled
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.stored import (
     any_lanes,
-    empty_state,
     is_large,
     kind_in,
+    new_storage,
     put,
     row,
     settled,
@@ -83,11 +83,11 @@ def translate(
         for now, operation in enumerate(plan.operations):
             inputs = [read(variable) for variable in operation.invars]
             before = len(code.taken)
-            found = _results(code, operation, inputs, delayed=now in plan.delayed)
-            for variable, values in zip(operation.outvars, found, strict=True):
+            result = _results(code, operation, inputs, delayed=now in plan.delayed)
+            for variable, values in zip(operation.outvars, result, strict=True):
                 noted(variable, _checked(values, variable.aval))
             if code.large is not None:
-                _give_back_but(code, code.taken[before:], found)
+                _give_back_but(code, code.taken[before:], result)
                 _let_go(code, known, plan.ends.get(now, ()))
         results = [read(variable) for variable in plan.results]
         return results if late else [stored(code, x) if isinstance(x, Deferred) else x for x in results]
@@ -123,8 +123,8 @@ def _results(code: Code, equation: Any, given: Sequence[Array], *, delayed: bool
         return control(code, equation, given)
     large = any(is_large(code, variable.aval) for variable in equation.outvars)
     if (large or any(isinstance(array, InMemory) for array in given)) and (rule := STORED.get(name)) is not None:
-        found = [settled(code, array) for array in rule(code, equation, given)]
-        return [stored(code, x) if isinstance(x, Deferred) and not delayed else x for x in found]
+        result = [settled(code, array) for array in rule(code, equation, given)]
+        return [stored(code, x) if isinstance(x, Deferred) and not delayed else x for x in result]
     if (rule := RULES.get(name)) is None:
         raise NoRuleError(name)
     return rule(code, equation, [values_of(code, array) for array in given])
@@ -146,7 +146,7 @@ def _checked(values: Any, aval: Any) -> Array:
 
 
 def _linear_solve(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
-    """Write what solves linear equations, of whose derivatives JAX was told more."""
+    """Write what solves linear equations, whose derivatives JAX has a rule for."""
     lengths = equation.params["const_lengths"]
     first = lengths.matvec + lengths.vecmat
     return _closed(code, equation.params["jaxprs"].solve, given[first : first + lengths.solve], given[sum(lengths) :])
@@ -169,15 +169,15 @@ def _until_settled(code: Code, lanes: list[bool], attempt: Callable[[list[bool]]
     lanes : list of bool
         What is known of the arrays before.
     attempt : callable
-        Writes code, and returns which arrays differ, more than it was told if it has found so, and its results.
+        Writes code, and returns which arrays differ, possibly more than those given, and its results.
     """
     while True:
         mark = code.mark()
-        found, results = attempt(lanes)
-        if found == lanes:
+        differing, results = attempt(lanes)
+        if differing == lanes:
             return results
         code.back_to(mark)
-        lanes = found
+        lanes = differing
 
 
 def _in_lanes(arrays: Sequence[Array], already: Sequence[bool] | None = None) -> list[bool]:
@@ -193,7 +193,7 @@ def _likely(code: Code, arrays: Sequence[Array], avals: Sequence[Any]) -> list[b
 
 def _likely_made(code: Code, avals: Sequence[Any]) -> list[bool]:
     """Tell which arrays that are made are taken to differ from lane to lane."""
-    return [kind_of(aval.dtype) == "f" and not code.alone for aval in avals]
+    return [kind_of(aval.dtype) == "f" and not code.single for aval in avals]
 
 
 def _chosen(code: Code, choice: Value, new: Sequence[Array], old: Sequence[Array]) -> list[Array]:
@@ -217,32 +217,32 @@ def _while(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
     """Write a loop that each lane leaves when its condition no longer holds."""
     p = equation.params
     split = p["cond_nconsts"], p["cond_nconsts"] + p["body_nconsts"]
-    asked, needed, start = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
+    condition, needed, start = given[: split[0]], given[split[0] : split[1]], given[split[1] :]
 
     def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
-        carried = LoopVariables(code, [variable.aval for variable in equation.outvars], lanes)
-        carried.store(start)
+        state = LoopVariables(code, [variable.aval for variable in equation.outvars], lanes)
+        state.store(start)
         head, body, end = code.label(), code.label(), code.label()
         code.jump(head)
         code.begin(head)
-        with code.scope(), carried.held():
-            before = carried.load()
-            with code.used(_among([*asked, *needed, *before])):
-                goes = code.among_here(_number(code, _closed(code, p["cond_jaxpr"], asked, before)[0]))
+        with code.scope(), state.held():
+            before = state.load()
+            with code.used(_among([*condition, *needed, *before])):
+                goes = code.among_here(_number(code, _closed(code, p["cond_jaxpr"], condition, before)[0]))
             if goes.lanes and not all(lanes):  # what a lane keeps that has left differs
                 return [True] * len(lanes), []
             code.branch(code.anywhere(goes), body, end)
             code.begin(body)
-            live = [*asked, *needed, *(before if goes.lanes else ())]
+            live = [*condition, *needed, *(before if goes.lanes else ())]
             with code.scope(goes if goes.lanes else None), code.used(_among(live)):
                 after = _closed(code, p["body_jaxpr"], needed, before, late=True)
                 if goes.lanes:
                     after = _chosen(code, goes, after, before)
-                carried.store(after)
+                state.store(after)
                 _give_back(code, after)
             code.jump(head)
         code.begin(end)
-        return _in_lanes(after, lanes), carried.load()
+        return _in_lanes(after, lanes), state.load()
 
     return _until_settled(code, _likely(code, start, [variable.aval for variable in equation.outvars]), attempt)
 
@@ -265,8 +265,8 @@ def _regions(arrays: Sequence[Array]) -> dict[Region, None]:
 def _scan(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Write a loop of known length over the first axis of arrays."""
     p = equation.params
-    fixed, carried = sizes_of_scan(equation)
-    needed, start, rows = given[:fixed], given[fixed : fixed + carried], given[fixed + carried :]
+    fixed, carry = sizes_of_scan(equation)
+    needed, start, rows = given[:fixed], given[fixed : fixed + carry], given[fixed + carry :]
     made = [variable.aval for variable in equation.outvars[len(start) :]]
     if p["length"] == 0:
         return [*start, *(np.empty(aval.shape, object) for aval in made)]
@@ -303,28 +303,28 @@ def _rolled(
     last = code.constant(p["length"] - 1, "l")
 
     def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
-        carried = LoopVariables(code, [variable.aval for variable in equation.outvars[:size]], lanes[:size])
+        state = LoopVariables(code, [variable.aval for variable in equation.outvars[:size]], lanes[:size])
         written, counter = LoopVariables(code, made, lanes[size:]), code.room(1, "l", lanes=False)
-        carried.store(start)
+        state.store(start)
         code.store(counter, 0, code.constant(0, "l"))
         homes = [stored(code, array) if array.size else array for array in rows]
         body, end = code.label(), code.label()
         code.jump(body)
         code.begin(body)
-        with code.scope(), code.used(_among([*needed, *homes])), carried.held(), written.held():
+        with code.scope(), code.used(_among([*needed, *homes])), state.held(), written.held():
             count = code.load(counter, 0)
             at = code.arithmetic("sub", last, count) if p["reverse"] else count
             taken = [row(code, array, at) if array.size else np.empty(array.shape[1:], object) for array in homes]
-            results = _closed(code, p["jaxpr"], needed, carried.load(), taken, late=True)
+            results = _closed(code, p["jaxpr"], needed, state.load(), taken, late=True)
             for region, array in zip(written.regions, results[size:], strict=True):
                 if array.size:
                     put(code, contiguous(region, array.shape, further(code, 0, at, array.size)), array)
-            carried.store(results[:size])  # after what may be a part of what was carried
+            state.store(results[:size])  # after what may be a part of what was carried
             _give_back(code, results)
             code.store(counter, 0, code.arithmetic("add", count, code.constant(1, "l")))
             code.branch(code.operand(code.compare("lt", count, last), lanes=False), body, end)
         code.begin(end)
-        return _in_lanes(results, lanes), [*carried.load(), *written.load()]
+        return _in_lanes(results, lanes), [*state.load(), *written.load()]
 
     likely = [*_likely(code, start, [variable.aval for variable in equation.outvars[:size]]), *_likely_made(code, made)]
     return _until_settled(code, likely, attempt)
@@ -338,17 +338,17 @@ def _unrolled(
     It is given up early where the turns so far, of which the first are longer than the others, leave no hope.
     """
     p, mark, before = equation.params, code.mark(), len(code.lines)
-    size, found, live = len(start), {}, _regions([*needed, *rows])
+    size, result, live = len(start), {}, _regions([*needed, *rows])
     for k in reversed(range(p["length"])) if p["reverse"] else range(p["length"]):
         with code.used(live.__contains__):
             results = _closed(code, p["jaxpr"], needed, start, [row(code, array, k) for array in rows])
-        start, found[k] = results[:size], results[size:]
-        live |= _regions(found[k])
-        lines, left = len(code.lines) - before, p["length"] - len(found)
-        if p["length"] > 1 and lines + lines / len(found) / HOPE * left > most:
+        start, result[k] = results[:size], results[size:]
+        live |= _regions(result[k])
+        lines, left = len(code.lines) - before, p["length"] - len(result)
+        if p["length"] > 1 and lines + lines / len(result) / HOPE * left > most:
             code.back_to(mark)
             return None
-    made = [[found[k][place] for k in range(p["length"])] for place in range(len(equation.outvars) - size)]
+    made = [[result[k][index] for k in range(p["length"])] for index in range(len(equation.outvars) - size)]
     return [*start, *(_stacked(code, parts) for parts in made)]
 
 
@@ -356,10 +356,10 @@ def _stacked(code: Code, parts: Sequence[Array]) -> Array:
     single = [part for part in parts if isinstance(part, np.ndarray)]
     if len(single) == len(parts) and (code.large is None or len(parts) * parts[0].size <= code.large):
         return np.stack(single)
-    found = empty_state(code, (len(parts), *parts[0].shape), kind_in(parts[0]), lanes=any_lanes(parts))
+    result = new_storage(code, (len(parts), *parts[0].shape), kind_in(parts[0]), lanes=any_lanes(parts))
     for k, part in enumerate(parts):
-        put(code, contiguous(found.region, part.shape, k * part.size), part)
-    return found
+        put(code, contiguous(result.region, part.shape, k * part.size), part)
+    return result
 
 
 def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
@@ -370,7 +370,7 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
         return _closed(code, ways[min(max(int(which.constant or 0), 0), len(ways) - 1)], inputs)
 
     def attempt(lanes: list[bool]) -> tuple[list[bool], list[Array]]:
-        results, found = LoopVariables(code, [variable.aval for variable in equation.outvars], lanes), lanes
+        results, differing = LoopVariables(code, [variable.aval for variable in equation.outvars], lanes), lanes
         for k, way in enumerate(ways):
             word = "le" if k == 0 else "ge" if k == len(ways) - 1 else "eq"
             here = code.among_here(code.compare(word, which, code.constant(k, which.kind)))
@@ -382,13 +382,13 @@ def _cond(code: Code, equation: Any, given: Sequence[Array]) -> list[Array]:
                 code.used(_among(inputs if k < len(ways) - 1 or here.lanes else [])),
             ):
                 made = _closed(code, way, inputs)
-                found = _in_lanes(made, found)
+                differing = _in_lanes(made, differing)
                 if which.lanes and k > 0:
                     made = _chosen(code, here, made, results.load())
                 results.store(made)
             code.jump(end)
             code.begin(end)
-        return found, results.load()
+        return differing, results.load()
 
     avals = [variable.aval for variable in equation.outvars]
     return _until_settled(code, [which.lanes or likely for likely in _likely_made(code, avals)], attempt)

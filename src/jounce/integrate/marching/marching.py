@@ -121,7 +121,7 @@ def unexpanded(equations: Equations, state: State, time: Lanes, *, order: int) -
     return IntegratorState(time, nothing, expansion, refused, opening, nothing, time, *known, none, angles, *counts)
 
 
-@compiled(narrow=True, alone=True)
+@compiled(narrow=True, single=True)
 def _measured(equations: Equations, state: State) -> AnglesOfForces:
     return measured(equations, state)
 
@@ -151,7 +151,7 @@ def _is_one(_: Equations, current: IntegratorState, *__: Any, **___: Any) -> boo
     return current.time.shape[0] == 1
 
 
-@compiled("count", "keep", alone=_is_one)
+@compiled("count", "keep", single=_is_one)
 def march(
     equations: Equations,
     current: IntegratorState,

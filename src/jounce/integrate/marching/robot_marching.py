@@ -231,7 +231,7 @@ def _sizes(problem: RobotProblem, polynomial: RobotState) -> Any:
     return jnp.concatenate([jnp.maximum(sizes[:-1], jnp.maximum(moved, turned)), sizes[-1:]])
 
 
-@compiled("order", "count", alone=True)
+@compiled("order", "count", single=True)
 def march_robot(
     problem: RobotProblem,
     current: Progress,

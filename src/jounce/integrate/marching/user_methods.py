@@ -16,7 +16,7 @@ METHODS = ("prepared", "longest_step", "arrive", "polynomial", "error", "expansi
 
 
 class ReadIntegrator(AbstractMethod):
-    """A method of a user, told from others by what it computes.
+    """A method of a user, identified by what it computes.
 
     Parameters
     ----------
@@ -78,6 +78,6 @@ def integrator(method: AbstractMethod, equations: Equations, current: Integrator
 
     try:
         key = value_key(read_off(whole, *leaves).traced)
-    except Exception:  # noqa: BLE001 - what is wrong with it is told where it is called
+    except Exception:  # noqa: BLE001 - the call raises the error again
         key = (Same(object()),)
     return ReadIntegrator(method, (*key, method.controlled))

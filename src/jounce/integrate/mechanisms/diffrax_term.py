@@ -59,7 +59,7 @@ def ode_term(mechanism: Mechanism, time: float = 0.0) -> "OrdinaryEquation":
     ...     outputs={"angle": jn.outputs.AngleOutput("rod")},
     ... )
     >>> equation = jn.integrate.ode_term(pendulum)
-    >>> with jax.enable_x64(True):  # diffrax computes as precisely as JAX is told to
+    >>> with jax.enable_x64(True):  # diffrax computes in the precision that JAX is set to
     ...     solution = diffrax.diffeqsolve(
     ...         equation.term, diffrax.Dopri8(), 0.0, 1.0, None, equation.state, args=equation.equations,
     ...         stepsize_controller=diffrax.PIDController(rtol=1e-10, atol=1e-10),

@@ -46,7 +46,7 @@ def prepare_run(
     model : Model
         Of it, with initial conditions or without; the bodies need not be assembled.
     instants : array of shape (time,)
-        At which the motion is wanted, s.
+        At which the motion is requested, s.
     order : int
         Highest derivative of the outputs.
     method : AbstractMethod
@@ -57,7 +57,7 @@ def prepare_run(
     model = released(model) if any(name.startswith("initial.") for name in model.rows) else model
     if model.system.rank_is_open:
         return
-    highest, length = derivatives_of_motion(mechanism, order), method.expansion_order(limits[0])
+    motion_order, length = derivatives_of_motion(mechanism, order), method.expansion_order(limits[0])
     masses, gravity = required_masses(mechanism, "the equations of motion"), gravity_of(mechanism)
     equations, first = equations_of(model, masses, gravity), instants[:1]
     current = partial(unexpanded, equations, at_rest(model, model.guess), first, order=length)
@@ -68,10 +68,10 @@ def prepare_run(
 
     def motion() -> None:
         like = jax.eval_shape(partial(room_for_steps, method, count=1), current())[0]
-        program, lanes = expansion_program(equations, model.system.outputs, like, highest)
+        program, lanes = expansion_program(equations, model.system.outputs, like, motion_order)
         program.prepare(lanes, len(instants))
 
-    form = model.system, length, highest, method
+    form = model.system, length, motion_order, method
     prepare_later(steps, "march", *form)
-    prepare_outputs(mechanism, model, highest)
+    prepare_outputs(mechanism, model, motion_order)
     prepare_later(motion, "expanded", *form)

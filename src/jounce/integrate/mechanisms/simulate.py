@@ -245,12 +245,12 @@ def _detector_of(event: Event, mechanism: Mechanism, start: ConsistentStart) -> 
 
 def _events_at_ends(start: ConsistentStart) -> list[Event]:
     """Return events that end a run where a point comes to an end of its curve: two for each parameter with ends."""
-    found = []
+    events = []
     for ends in ends_of(start.model):
-        output = (ParameterOutput if ends.alone else ParametersOutput)(ends.joint)
+        output = (ParameterOutput if ends.is_only else ParametersOutput)(ends.joint)
         for value, direction in ((ends.low - ends.slack, -1), (ends.high + ends.slack, 1)):
-            found.append(Event(output, value, 0, ends.component, direction, terminal=True))
-    return found
+            events.append(Event(output, value, 0, ends.component, direction, terminal=True))
+    return events
 
 
 def _check_ends(start: ConsistentStart, instant: float) -> None:
@@ -282,7 +282,7 @@ def _unsound(start: ConsistentStart, sound: Bool[np.ndarray, " force"]) -> str:
     return ", ".join(f"forces.{n}" for n, good in zip(force_names(start.model), sound, strict=True) if not good)
 
 
-@compiled(narrow=True, brief=True, alone=True)
+@compiled(narrow=True, brief=True, single=True)
 def _finite_forces(equations: Equations, state: State, time: Instants) -> Bool[Numbers, "force 1"]:
     return equations.system.finite_forces(equations.pose(state), Jet.variable(time, 1))
 
@@ -306,7 +306,7 @@ def unfit_rates(start: ConsistentStart, coordinates: Coordinates, instant: float
     pose = pose_of(cut(coordinates, order), start.model.pose_type)
     clock, names = Jet.variable(np.array([[instant]]), order), []
     for group, members in zip(start.equations.system.forces, start.model.forces, strict=True):
-        with np.errstate(all="ignore"):  # what is not finite is told by name
+        with np.errstate(all="ignore"):  # errors name what is not finite
             sizes = np.stack([np.asarray(c) for c in group.force(pose, clock).dense().coefficients])
         sizes = np.broadcast_to(sizes, (*sizes.shape[:2], len(members), 1))
         good = np.atleast_1d(np.isfinite(sizes).all(axis=(0, 1, 3)))

@@ -91,10 +91,11 @@ class Simulation(Motion):
         self._ending = ending
         reached, chosen = _steps_of(dense, instants)
         outputs, max_order = start.model.system.outputs, derivatives_of_motion(mechanism, order)
-        (state, self._angles, found), backend = motion_at(start.equations, outputs, dense, instants, chosen, max_order)
+        outcome, backend = motion_at(start.equations, outputs, dense, instants, chosen, max_order)
+        state, self._angles, at_instants = outcome
         coordinates = pose_coordinates(state)
-        found = zip(outputs, found, strict=True)
-        groups = tuple(self._counted(group, series, instants) for group, series in found)
+        at_instants = zip(outputs, at_instants, strict=True)
+        groups = tuple(self._counted(group, series, instants) for group, series in at_instants)
         status = np.where(reached, int(Status.OK), int(Status.NOT_REACHED))
         faults = {}
         lost = reached & ~np.isfinite(np.concatenate([p.reshape(-1, len(instants)) for p in state])).all(axis=0)

@@ -189,7 +189,7 @@ def finest(duration: Numbers, time: Numbers, crossing: Numbers) -> Numbers:
 
 
 def steps_counted(before: Numbers, step: Numbers, duration: Numbers, count: Numbers | bool = True) -> Numbers:
-    """Return how many steps that hardly move on there are one after the other, with one more; it counts if told."""
+    """Return how many short steps follow one another, with one more where `counts` says so."""
     short = jnp.abs(step) <= SHORTEST * duration
     return jnp.where(short & count, before + 1, jnp.where(jnp.abs(step) > AWAY * duration, 0, before))
 

@@ -62,31 +62,31 @@ class Obreshkov(AbstractMethod):
         check_step(self.step)
 
     @property
-    def highest(self) -> int:
+    def derivatives_used(self) -> int:
         """Highest derivative of positions and velocities in the formula."""
         return self.order // 2
 
     def expansion_order(self, tolerance: float) -> int:
         """Return the order of the expansions: beyond the formula's own, where the step is to be chosen."""
-        return self.highest if self.step is not None else self.order + HIGHER_COEFFICIENTS
+        return self.derivatives_used if self.step is not None else self.order + HIGHER_COEFFICIENTS
 
     def longest_step(self, sizes: Sizes, tolerance: Number) -> Lanes:
         """Return the step at which the leading error, or the next where that vanishes, is the tolerance."""
         if self.step is not None:
             return jnp.full(sizes.shape[1], self.step, float)
         first = self.order + 1
-        constant = (self.order + 2) * math.factorial(self.highest) ** 2 / math.factorial(self.order)
+        constant = (self.order + 2) * math.factorial(self.derivatives_used) ** 2 / math.factorial(self.order)
         return reach(sizes, first) * (tolerance / constant) ** (1.0 / first)
 
     def arrive(self, equations: Equations, expansion: Expansion, time: Lanes, step: Lanes) -> State:
         """Return the end that fulfills the formula, not finite where the iteration for it does not converge."""
         measure = _measure(equations.system.column_scale[0], step)
         later = (time + step)[None]
-        known = _known(expansion, step, self.highest)
+        known = _known(expansion, step, self.derivatives_used)
 
         def improved(end: State) -> State:
-            state = expand(equations, end, later, self.highest).state
-            return State(*(a - _terms(c, -step, self.highest) for a, c in zip(known, state, strict=True)))
+            state = expand(equations, end, later, self.derivatives_used).state
+            return State(*(a - _terms(c, -step, self.derivatives_used) for a, c in zip(known, state, strict=True)))
 
         def iterate(carry: Any) -> Any:
             end, before, _, count = carry
@@ -106,11 +106,11 @@ class Obreshkov(AbstractMethod):
 
     def polynomial(self, start: Expansion, end: Expansion, step: Lanes) -> State:
         """Return the polynomial that has the derivatives of the formula at both ends, of degree order + 1."""
-        upper = jnp.asarray(_hermite(self.highest))
+        upper = jnp.asarray(_hermite(self.derivatives_used))
         length = jnp.where(step == 0.0, 1.0, step)  # runs that have arrived stand still
 
         def joined(c0: Any, c1: Any) -> Any:
-            count = self.highest + 1
+            count = self.derivatives_used + 1
             power = length[None, None, None] ** jnp.arange(2.0 * count)[:, None, None, None]
             low, high = c0[:count] * power[:count], c1[:count] * power[:count]
             ends = jnp.concatenate([(high - low)[:1], low[1:], high[1:]])
@@ -123,7 +123,7 @@ class Obreshkov(AbstractMethod):
         """Return how far the end departs from the formula of the next order."""
         if self.step is not None:
             return jnp.zeros_like(step)
-        p, measure = self.highest + 1, _measure(length, step)
+        p, measure = self.derivatives_used + 1, _measure(length, step)
         known = _known(start, step, p)
         parts = zip(end.state, known, start.state, strict=True)
         departure = State(*(jnp.abs(c[0] + _terms(c, -step, p) - a) - ROUNDING * jnp.abs(c0[0]) for c, a, c0 in parts))

@@ -51,6 +51,6 @@ def instants_of(time: TimeLike | None, parameters: Mapping[str, Any]) -> Float[n
     try:
         backward = bool(time[-1] < time[0])
     except TypeError:
-        backward = False  # no numbers: told below
+        backward = False  # no numbers: refused below
     instants = time_grid(list(time)[::-1] if backward else time, parameters)
     return instants[::-1] if backward else instants

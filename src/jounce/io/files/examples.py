@@ -82,19 +82,19 @@ def copy_example(name: str, path: str | PathLike[str] | None = None, *, overwrit
     pairs = [(source, target)]
     if source.suffix in (".yaml", ".py"):
         for mentioned in dict.fromkeys(_MENTIONED.findall(source.read_text(encoding="utf-8"))):
-            beside = (source.parent / mentioned).resolve()
-            if beside.is_file() and beside != source and beside.is_relative_to(folder):
-                pairs.append((beside, target.parent / mentioned))
-    for _, place in pairs:
-        if place.exists() and not overwrite:
-            raise OutputError("is there already; give another name, or replace it with --overwrite", path=place)
-    for file, place in pairs:
+            companion = (source.parent / mentioned).resolve()
+            if companion.is_file() and companion != source and companion.is_relative_to(folder):
+                pairs.append((companion, target.parent / mentioned))
+    for _, target in pairs:
+        if target.exists() and not overwrite:
+            raise OutputError("is there already; give another name, or replace it with --overwrite", path=target)
+    for file, target in pairs:
         try:
-            place.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(file, place)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(file, target)
         except OSError as error:
-            raise OutputError(f"cannot be written: {error.strerror or error}", path=place) from None
-    return [place for _, place in pairs]
+            raise OutputError(f"cannot be written: {error.strerror or error}", path=target) from None
+    return [target for _, target in pairs]
 
 
 def _name(path: Path, folder: Path) -> str:

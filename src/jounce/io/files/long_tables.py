@@ -56,7 +56,7 @@ def numbers_of(path: str, error_type: type[JounceError]) -> Numbers | None:
         Of the type given: the file cannot be read, is not text in UTF-8, or has more than 2 GB.
     """
     try:
-        if os.stat(path).st_size <= LONG:  # noqa: PTH116 - whatever is wrong with the name is told by the reader
+        if os.stat(path).st_size <= LONG:  # noqa: PTH116 - the reader reports whatever is wrong with the name
             return None
     except (OSError, ValueError):
         return None
@@ -88,11 +88,11 @@ def numbers_of(path: str, error_type: type[JounceError]) -> Numbers | None:
 
 def _offsets(row: bytes) -> dict[int, Decimal]:
     """Return the large numbers of a row by their columns."""
-    found = {}
+    offsets = {}
     for k, entry in enumerate(row.decode("utf-8", "replace").split(",")):
         if _is_number(entry) and LARGE <= abs(float(entry)) <= LARGEST_NUMBER:
-            found[k] = Decimal(entry.strip())
-    return found
+            offsets[k] = Decimal(entry.strip())
+    return offsets
 
 
 def _beyond(origin: Decimal, text: str) -> float:

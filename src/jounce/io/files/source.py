@@ -99,10 +99,10 @@ def _without_empty(source: Source) -> Source:
     if len(full) == 1:
         lines = {location[1:]: line for location, line in source.lines.items() if location[:1] == (full[0],)}
         return Source(source.path, source.data[full[0]], lines)
-    places = {old: new for new, old in enumerate(full)}
+    columns = {old: new for new, old in enumerate(full)}
     lines = {
-        (places[location[0]], *location[1:]): line
+        (columns[location[0]], *location[1:]): line
         for location, line in source.lines.items()
-        if location and location[0] in places
+        if location and location[0] in columns
     }
     return Source(source.path, [source.data[k] for k in full], lines, several=True)

@@ -17,7 +17,7 @@ from jounce.io.files.samples import rates, read_samples
 from jounce.io.files.source import read_source
 from jounce.io.mechanisms.motion_values import Samples, motion
 from jounce.kinematics import OscillatingFollower, PlateCam, TranslatingFollower, plate_cam
-from jounce.kinematics.cams.plate_cam import SENSES
+from jounce.kinematics.cams.plate_cam import SIGNS
 from jounce.mechanism.resolve import resolve_motion
 from jounce.settings import under_own_settings
 from jounce.trajectory import AbstractMotion, Expression, SplineMotion
@@ -107,7 +107,7 @@ class _CamFile:
         body = self.source.mapping(("cam",), CAM_KEYS)
         base = self._length(("cam", "base_radius"), body)
         sense = body.get("sense", "counterclockwise")
-        check_choice("sense", sense, SENSES, self.source.error_type, **self.source.error_fields(("cam", "sense")))
+        check_choice("sense", sense, SIGNS, self.source.error_type, **self.source.error_fields(("cam", "sense")))
         follower = self._follower()
         law = self._law("angle" if follower.turning else "length")
         title = self.data.get("title", "")
@@ -156,9 +156,9 @@ class _CamFile:
         try:
             law = check(self.data["law"], SimpleNamespace(context=context, data={}))
         except PydanticCustomError as error:
-            told = error.context or {}
-            value = self.data["law"] if told["value"] is ... else told["value"]
-            raise self.source.error(told["message"], ("law", *told["at"]), value=value) from None
+            details = error.context or {}
+            value = self.data["law"] if details["value"] is ... else details["value"]
+            raise self.source.error(details["message"], ("law", *details["at"]), value=value) from None
         if isinstance(law, Samples):
             law = self._spline(law, quantity)
         if not isinstance(law, AbstractMotion | Expression | float | int):

@@ -60,15 +60,15 @@ class _Reader:
     def _formula(self, raw: dict[str, Any], closed: bool, info: Any) -> ParametricCurve:
         if "expressions" not in raw:
             raise problem("is missing", "expressions", value=UNSET)
-        given, found = raw.get("range"), None
+        given, limits = raw.get("range"), None
         if given is not None and len(self.names) == 1:
-            found = _limits(given, info, "range")
+            limits = _limits(given, info, "range")
         elif given is not None:
             if not isinstance(given, list | tuple) or len(given) != len(self.names):
                 raise problem("must be [[first, last], [first, last]], of u and of v", "range", value=given)
-            found = tuple(_limits(pair, info, "range", k) for k, pair in enumerate(given))
+            limits = tuple(_limits(pair, info, "range", k) for k, pair in enumerate(given))
         try:
-            return ParametricCurve(self._expressions(raw["expressions"], info, "expressions"), found, closed)
+            return ParametricCurve(self._expressions(raw["expressions"], info, "expressions"), limits, closed)
         except JounceError as error:
             raise problem(error.message, *([error.name] if error.name else []), value=UNSET) from None
 

@@ -50,22 +50,22 @@ def coordinates_by_name(data: Mapping[str, Any], space: str, driven: Mapping[str
     driven : mapping of str to str
         What drivers and initial conditions prescribe, by their names.
     """
-    found: dict[str, str] = {}
+    kinds: dict[str, str] = {}
     for name, raw in _entries(data, "outputs"):
         quantity = raw.get("quantity")
         if quantity is None and "point" in raw:
-            found |= {f"{name}_{label}": "length" for label in COMPONENTS[: POSITION_COMPONENTS[space]]}
+            kinds |= {f"{name}_{label}": "length" for label in COMPONENTS[: POSITION_COMPONENTS[space]]}
         elif isinstance(quantity, str) and quantity in OUTPUTS:
-            found[name] = OUTPUTS[quantity]
+            kinds[name] = OUTPUTS[quantity]
     drivers, joints = cam_types(space), catalogue(space, "joint")
     for name, raw in _entries(data, "joints"):
         kind = str(raw.get("type"))
         if is_cam(space, dict(raw)):
             (law,) = (key for key in file_keys(drivers[kind]) if key.kind == "motion")
-            found[name] = at_coordinate(law.quantity, raw.get("coordinate"))
+            kinds[name] = at_coordinate(law.quantity, raw.get("coordinate"))
         elif kind in joints and (pair := facts_of(joints[kind]).pair or kind) in PAIRS:
-            found[name] = PAIRS[pair]
-    return found | dict(driven)
+            kinds[name] = PAIRS[pair]
+    return kinds | dict(driven)
 
 
 def _entries(data: Mapping[str, Any], section: str) -> list[tuple[str, Mapping[str, Any]]]:

@@ -151,7 +151,7 @@ def _dimensions(parameters: dict[str, Any]) -> dict[str, Any]:
         for name, raw in list(waiting.items()):
             try:
                 dimension = parse_value(raw, "any", parameters, dimensions).dimension
-            except JounceError:  # told where it stands
+            except JounceError:  # reported with its location
                 continue
             if dimension is not None:
                 dimensions[name] = dimension

@@ -212,8 +212,8 @@ def _samples(raw: dict[str, Any], quantity: str, info: Any) -> Samples:
         raise problem(message, "initial", value=initial)
     lapse = (info.context or {}).get("lapse", "time")
     orders = enumerate(initial)
-    found = tuple(rate(entry, order, quantity, info, "initial", order, by=lapse) for order, entry in orders)
-    samples = Samples.model_validate(raw | {"initial": found, "of": leader(raw, info)})
+    initial_values = tuple(rate(entry, order, quantity, info, "initial", order, by=lapse) for order, entry in orders)
+    samples = Samples.model_validate(raw | {"initial": initial_values, "of": leader(raw, info)})
     samples._bases, samples._free = tuple(bases(quantity, info)), lapse == "any"
     return samples
 

@@ -213,7 +213,7 @@ def _bodies(kind: type[Any]) -> dict[str, tuple[Any, Any]]:
 
 
 def _constraint_union(space: str, role: str, types: _Types) -> Any:
-    """Return the union of all joints, drivers or forces of a space, told apart by ``type``."""
+    """Return the union of all joints, drivers or forces of a space, distinguished by ``type``."""
     models: list[Any] = []
     for name, kind in types:
         fields = {"type": (Literal[name], ...)} | _bodies(kind)

@@ -200,19 +200,19 @@ def _segment(entry: object, k: int, quantity: str, lapse: str, level: int, info:
     if not isinstance(profile, str) or profile not in SEGMENT_PROFILES:
         words = unknown("profile", profile, SEGMENT_PROFILES) if isinstance(profile, str) else "is missing"
         raise problem(words, "profile", k, "profile", value=UNSET if profile is None else profile)
-    found: dict[str, Any] = {"profile": profile}
+    values: dict[str, Any] = {"profile": profile}
     if "duration" in entry:
-        found["duration"] = parse(entry["duration"], lapse, info, "profile", k, "duration").value
+        values["duration"] = parse(entry["duration"], lapse, info, "profile", k, "duration").value
     for key in ("to", "by"):
         if key in entry:
-            found[key] = rate(entry[key], level, quantity, info, "profile", k, key, by=lapse)
+            values[key] = rate(entry[key], level, quantity, info, "profile", k, key, by=lapse)
     for key in ("begin", "end", "limits"):
         if key in entry:
             if not isinstance(entry[key], list | tuple):
                 raise problem("must be a list of values", "profile", k, key, value=entry[key])
             orders = enumerate(entry[key])
-            found[key] = [rate(x, level + n + 1, quantity, info, "profile", k, key, n, by=lapse) for n, x in orders]
-    return Segment(**found)
+            values[key] = [rate(x, level + n + 1, quantity, info, "profile", k, key, n, by=lapse) for n, x in orders]
+    return Segment(**values)
 
 
 def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str, Dimension | None]) -> Any:
@@ -231,8 +231,8 @@ def piecewise(raw: dict[str, Any], quantity: str, info: Any, variables: dict[str
         valid = ({"expression", "until"}, {"expression"}) if last else ({"expression", "until"},)
         if not isinstance(entry, dict) or entry.keys() not in valid:
             words = "must have the keys expression and until" if not last else "must have the key expression"
-            told = "; where the last piece ends may be left out" if not last else ", and may say until when it goes"
-            raise problem(words + told, "piecewise", k, value=entry)
+            advice = "; where the last piece ends may be left out" if not last else ", and may say until when it goes"
+            raise problem(words + advice, "piecewise", k, value=entry)
         at = ("piecewise", k, "expression")
         law = _rate_law(entry["expression"], level, quantity, info, *at, by=lapse, variables=variables)
         laws.append(law if isinstance(law, Expression) else Expression(repr(law)))

@@ -62,7 +62,7 @@ def warn_of_units(source: Source, mechanism: Mechanism) -> None:
         at: Location = ("drivers", law.name, "motion")
         why = degrees_doubt(law.law, *run)
         if at in warned or why:
-            settle(law.driver)  # told now, or known to be meant as it stands
+            settle(law.driver)  # warned of now, or known to be meant as it is
         if why and at not in warned and not names_angle(law, angles) and not _has_unit(source, at):
             _warn(source, at, why)
     _warn_of_lengths(source, mechanism, laws)
@@ -116,7 +116,7 @@ def _run(mechanism: Mechanism) -> tuple[float, float]:
     """Return the first and the last instant of a mechanism, s; of one that has none, those of a second."""
     try:
         instants = None if mechanism.time is None else instants_of(mechanism.time, mechanism.parameter_values)
-    except JounceError:  # told where they are used
+    except JounceError:  # their use raises it
         instants = None
     return (0.0, 1.0) if instants is None else (float(instants[0]), float(instants[-1]))
 

@@ -250,7 +250,7 @@ def orientation() -> Any:
 
 
 def redundant_reactions() -> Any:
-    """Return the annotation of which reactions are wanted where constraints are redundant."""
+    """Return the annotation of which reactions are requested where constraints are redundant."""
 
     def check(raw: object, info: Any) -> Any:
         if not isinstance(raw, dict):

@@ -165,17 +165,17 @@ class _Writer:
         entries |= {"body": element.bodies[0]} if single else {"bodies": list(element.bodies)}
         return entries | self._values(location, element)
 
-    def _cam(self, place: str, cam: Cam) -> dict[str, Any]:
+    def _cam(self, location: str, cam: Cam) -> dict[str, Any]:
         """Return a cam: the driver that has its coordinate, with its law of the leader."""
         driver, leader = cam.follower, leader_name(self.mechanism, cam)
         if leader is None:
             message = (
                 "nothing in this mechanism has the coordinate that leads this cam; add a driver or an output of it"
             )
-            raise MechanismError(message, name=place)
-        found = {"type": driver.type_name, "bodies": list(driver.bodies), **self._values(place, driver)}
-        law = self.laws.written(f"{place}.motion", cam.motion, driver)
-        return found | {"motion": (law if isinstance(law, dict) else {"expression": law}) | {"of": leader}}
+            raise MechanismError(message, name=location)
+        entry = {"type": driver.type_name, "bodies": list(driver.bodies), **self._values(location, driver)}
+        law = self.laws.written(f"{location}.motion", cam.motion, driver)
+        return entry | {"motion": (law if isinstance(law, dict) else {"expression": law}) | {"of": leader}}
 
     def _output(self, name: str, output: Any) -> dict[str, Any]:
         location, kind = f"outputs.{name}", form_of(output)

@@ -135,11 +135,11 @@ class _ClosureFile:
             kind = (ANGLE,) if joint.turning else (LENGTH,)
             changes["spring_reference"] = self._number((*at, "reference"), entry["reference"], kind)
         if "friction" in entry:
-            raw, place = entry["friction"], (*at, "friction")
+            raw, location = entry["friction"], (*at, "friction")
             parts = raw if isinstance(raw, list) else [raw]
-            numbers = [self._number(place, part, _dimensions("friction", joint.turning)) for part in parts]
+            numbers = [self._number(location, part, _dimensions("friction", joint.turning)) for part in parts]
             if len(numbers) not in (1, 2):
-                raise self.source.error("must be one value, or two: forward and backward", place, value=raw)
+                raise self.source.error("must be one value, or two: forward and backward", location, value=raw)
             changes["friction"] = numbers if len(numbers) > 1 else numbers[0]
         if "gear_ratio" in entry and "rotor_inertia" not in entry:
             raise self.source.error("is of no use without rotor_inertia", (*at, "gear_ratio"))

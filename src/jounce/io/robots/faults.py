@@ -1,4 +1,4 @@
-"""What robot files hold that no real robot has, or that is left out: read all the same, and told of in one warning."""
+"""What robot files hold that no real robot has, or that is left out: read all the same, with one warning."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What MuJoCo's dynamics has and a robot has not: springs, tendons, compensated gravity, a fluid; all is told of."""
+"""What MuJoCo's dynamics has and a robot has not: springs, tendons, compensated gravity, a fluid; it warns."""
 
 from __future__ import annotations
 
@@ -86,8 +86,8 @@ def left_out_of_model(
             yield LeftOut(JOINT_SPRINGS, name, None, f"joints.{name}.stiffness", _plain(stiffness))
     passive = works("stiffness") or works("damping")  # MuJoCo leaves out all such forces where it leaves out both
     falls = model.opt.gravity.any() and works("gravity")
-    told = passive and falls and model.jnt_actgravcomp.any()  # else bodies feel less of gravity
-    for k in np.flatnonzero((model.body_gravcomp != 0) & (model.body_mass > 0)).tolist() if told else ():
+    matters = passive and falls and model.jnt_actgravcomp.any()  # else bodies feel less of gravity
+    for k in np.flatnonzero((model.body_gravcomp != 0) & (model.body_mass > 0)).tolist() if matters else ():
         if any(free[j] and not model.jnt_actgravcomp[j] for j in _moved_by(model, k)):
             yield LeftOut(COMPENSATION, bodies[k], None, f"links.{bodies[k]}.gravcomp", float(model.body_gravcomp[k]))
     fluid = {key: float(getattr(model.opt, key)) for key in FLUID_UNITS if getattr(model.opt, key)}

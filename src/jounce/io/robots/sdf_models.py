@@ -297,14 +297,14 @@ class _Models:
         if "://" in name or not name.strip("/"):
             return None
         folder = Path(include.path).parent
-        places = [folder, *(folder.parents if kind in ("model", "package") else ()), *map(Path, self.allow)]
-        for place in places:
-            target = place / name
+        folders = [folder, *(folder.parents if kind in ("model", "package") else ()), *map(Path, self.allow)]
+        for directory in folders:
+            target = directory / name
             if not os.path.lexists(target):
                 continue
             file = _manifest(target) if target.is_dir() else str(target)
             try:
-                path = named_file(file, include.path, self.allow, folder=place, error=RobotFileError)
+                path = named_file(file, include.path, self.allow, folder=directory, error=RobotFileError)
             except RobotFileError as error:
                 raise include.error(error.message, "include", value=uri) from None
             return path if os.path.lexists(path) else None

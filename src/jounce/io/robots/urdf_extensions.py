@@ -90,8 +90,8 @@ def urdf_closures(root: Element, links: Collection[str]) -> list[Loop]:
         frames = []
         for tag in ("link1", "link2"):
             part = _needed(element, tag, *where)
-            place, turn = (part.numbers(key, 3, *where, tag) or [0.0] * 3 for key in ("xyz", "rpy"))
-            frames.append((_known(part, "link", links, *where, tag), place, turn))
+            position, turn = (part.numbers(key, 3, *where, tag) or [0.0] * 3 for key in ("xyz", "rpy"))
+            frames.append((_known(part, "link", links, *where, tag), position, turn))
         axis = element.first("axis")
         along = [1.0, 0.0, 0.0] if axis is None else axis.numbers("xyz", 3, *where, "axis") or [1.0, 0.0, 0.0]
         loops.append(_made(element, name, kind, frames, along))
@@ -102,10 +102,10 @@ def urdf_closures(root: Element, links: Collection[str]) -> list[Loop]:
         for body, point in (("A", "AP"), ("B", "BQ")):
             at = _needed(element, f"{BALL}_p_{point}", *where)
             named = _needed(element, f"{BALL}_body_{body}", *where)
-            place = at.numbers("value", 3, *where, at.tag)
-            if place is None:
+            position = at.numbers("value", 3, *where, at.tag)
+            if position is None:
                 raise at.error(f"<{at.tag}> has no attribute value", *where)
-            frames.append((_known(named, "name", links, *where, named.tag), place, [0.0] * 3))
+            frames.append((_known(named, "name", links, *where, named.tag), position, [0.0] * 3))
         loops.append(_made(element, name, "ball", frames, None))
     return loops + [loop for element in gazebo_joints(root) if (loop := gazebo_loop(element, links)) is not None]
 

@@ -1,4 +1,4 @@
-"""What URDF files hold beside links and joints that bears on motions or forces: rotors are read, the rest is told of.
+"""What URDF files hold beside links and joints that bears on motions or forces: rotors are read, the rest warned of.
 
 Drake, Gazebo, Isaac Sim and MuJoCo each add elements of their own, of which a reader of links and joints sees nothing.
 """
@@ -203,7 +203,7 @@ def _of_gazebo(
 
 
 def _counts(element: Element) -> bool:
-    """Whether an element holds anything but the number zero; what is no number is told of."""
+    """Whether an element holds anything but the number zero; so is what is no number."""
     try:
         return float(element.content) != 0 and not math.isnan(float(element.content))
     except ValueError:

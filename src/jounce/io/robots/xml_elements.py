@@ -195,13 +195,13 @@ def _tolerated(content: bytes) -> tuple[bytes, list[tuple[str, int]]]:
     """Return text without what other readers let pass, all in its line, and what that is, with the line of each."""
     noted: list[tuple[str, int]] = []
 
-    def blank(found: re.Match[bytes]) -> bytes:
-        return re.sub(rb"[^\n\r]", b" ", found[0])
+    def blank(match: re.Match[bytes]) -> bytes:
+        return re.sub(rb"[^\n\r]", b" ", match[0])
 
-    def comment(found: re.Match[bytes]) -> bytes:
-        if b"--" in found[1] or found[1].endswith(b"-"):
-            noted.append(("two hyphens within a comment", content.count(b"\n", 0, found.start()) + 1))
-        return blank(found)
+    def comment(match: re.Match[bytes]) -> bytes:
+        if b"--" in match[1] or match[1].endswith(b"-"):
+            noted.append(("two hyphens within a comment", content.count(b"\n", 0, match.start()) + 1))
+        return blank(match)
 
     content = re.sub(rb"<!--(.*?)-->", comment, content, flags=re.DOTALL)
     if late := re.match(rb"(?:\xef\xbb\xbf)?(\s+)<\?xml\s[^>]*\?>", content):

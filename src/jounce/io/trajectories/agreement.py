@@ -12,7 +12,7 @@ from jounce.trajectory.sample_errors import noise
 
 CONTRADICTS, DOUBTFUL = 0.2, 0.05
 """Of the change over a stretch: from there on a column is refused, or mentioned."""
-STRETCHES = 50  # of a recording, over which changes are compared
+WINDOWS = 50  # of a recording, over which changes are compared
 NOISES = 6.0  # times the deviation of what noise makes of a change: a smaller difference says nothing
 BLOCK = 20_000  # samples that noise is estimated from
 
@@ -22,7 +22,7 @@ class _Difference:
     share: float  # of the change, by the root of the mean of squares
     row: int  # where it is largest
     given: float  # the change there, by the derivative
-    found: float  # the change there, by the level below it
+    integral: float  # the change there, by the level below it
 
 
 def check_agreement(recording: Recording) -> list[str]:
@@ -48,8 +48,8 @@ def check_agreement(recording: Recording) -> list[str]:
                 continue
             first = recording.times[rows[worst.row]]
             fact = (
-                f"{LEVELS[level]} say a change of {worst.given:.4g}, and {LEVELS[level - 1]} one of {worst.found:.4g}, "
-                f"from t = {first:.6g} s on"
+                f"{LEVELS[level]} say a change of {worst.given:.4g}, and {LEVELS[level - 1]} one of "
+                f"{worst.integral:.4g}, from t = {first:.6g} s on"
             )
             if worst.share >= CONTRADICTS:
                 message = f"{fact}: they contradict each other; correct units, signs or order, or leave the columns out"
@@ -61,24 +61,24 @@ def check_agreement(recording: Recording) -> list[str]:
 def _difference(times: np.ndarray, below: np.ndarray, rate: np.ndarray) -> _Difference | None:
     """Return by how much the integral of a rate differs from what it is the rate of; None where nothing is known."""
     steps = np.diff(times)
-    length = max(1, len(steps) // STRETCHES)
+    length = max(1, len(steps) // WINDOWS)
     sums = np.append(0.0, np.cumsum(steps * (rate[1:] + rate[:-1]) / 2))
     coarse = _coarse(times, rate)
     first = np.arange(0, len(times) - length, max(1, length // 2))
     last = first + length
-    given, found = sums[last] - sums[first], below[last] - below[first]
-    apart = given - found
+    given, integral = sums[last] - sums[first], below[last] - below[first]
+    difference = given - integral
     block = slice(0, BLOCK)
     sigmas = noise(times[block], below[block]), noise(times[block], rate[block])
     step = float(np.median(steps))
     by_noise = np.hypot(np.sqrt(2) * sigmas[0], sigmas[1] * step * np.sqrt(length))
     by_step = np.abs(coarse[last] - coarse[first] - given) / 3  # of the trapezoidal rule, by twice the step
-    size = max(_root(given), _root(found))
-    beyond = np.maximum(np.abs(apart) - by_step - NOISES * by_noise, 0.0)
+    size = max(_root(given), _root(integral))
+    beyond = np.maximum(np.abs(difference) - by_step - NOISES * by_noise, 0.0)
     if size == 0 or not beyond.any():
         return None
     worst = int(np.argmax(beyond))
-    return _Difference(_root(beyond) / size, int(first[worst]), float(given[worst]), float(found[worst]))
+    return _Difference(_root(beyond) / size, int(first[worst]), float(given[worst]), float(integral[worst]))
 
 
 def _coarse(times: Float[np.ndarray, " row"], rate: Float[np.ndarray, " row"]) -> Float[np.ndarray, " row"]:

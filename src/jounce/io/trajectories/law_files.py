@@ -34,7 +34,7 @@ _MOTION_KEYS = ("profile", "duration", "start_time", "from", "to", "limits")
 
 
 def _order(data: Mapping[str, Any]) -> int:
-    """Return which derivative samples are of; what is no number is told where it is read."""
+    """Return which derivative samples are of; reading refuses what is no number."""
     order = data.get("derivative", 0)
     return order if isinstance(order, int) else 0
 

@@ -51,7 +51,7 @@ def load_trajectory(
     In the place of ``joints``, ``motion: {samples: FILE.csv, derivative: 2}`` gives each column to the joint of its
     name, ``initial`` then being a list for each joint, and ``time`` may be left out.
 
-    What controllers take (`export_trajectory`) is told by its content: tables with the columns ``q_d_0`` or
+    What controllers take (`export_trajectory`) is recognized by its content: tables with the columns ``q_d_0`` or
     ``target_q_0``, and messages of ROS: JointTrajectory, FollowJointTrajectory goals, RobotTrajectory and
     DisplayTrajectory of MoveIt, as YAML (also as ``ros2 topic echo`` prints them) or JSON. Polynomials go through their
     positions with velocities and accelerations, where there are such. Joint states, echoed or in a bag (.bag, .db3,

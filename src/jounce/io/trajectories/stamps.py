@@ -110,8 +110,8 @@ def in_sequence(recording: Recording) -> Recording:
 def _sorted(recording: Recording, steps: np.ndarray) -> Recording:
     late = np.flatnonzero(steps < 0) + 1
     row, usual = int(late[0]), float(np.median(np.abs(steps[steps != 0])))
-    highest = np.maximum.accumulate(recording.times)
-    back = float((highest - recording.times).max())
+    latest = np.maximum.accumulate(recording.times)
+    back = float((latest - recording.times).max())
     order = np.argsort(recording.times, kind="stable")
     message = (
         f"comes before that of line {recording.lines[row - 1]}" if len(recording.lines) else "comes before another"
@@ -141,14 +141,14 @@ def _merged(recording: Recording) -> Recording:
             unlike = [k for k in again if not np.array_equal(*recording.values[k - 1 : k + 1], equal_nan=True)]
             message = "must come after that of the point before, which is another one"
             raise recording.error(message, unlike[0], name="time", value=float(times[unlike[0]]))
-    apart = np.abs(positions[again] - positions[again - 1])
-    differ = np.nan_to_num(apart) > 0
+    differences = np.abs(positions[again] - positions[again - 1])
+    differ = np.nan_to_num(differences) > 0
     if differ.any():
         moved = np.abs(np.diff(positions, axis=0))
-        beside = np.concatenate([again - 2, again - 1, again])  # steps to and from the two do not tell what is usual
-        moved[beside[(beside >= 0) & (beside < len(moved))]] = 0.0
+        neighbors = np.concatenate([again - 2, again - 1, again])  # steps to and from the two do not tell what is usual
+        moved[neighbors[(neighbors >= 0) & (neighbors < len(moved))]] = 0.0
         usual = SAME * np.nan_to_num(moved).max(axis=0)
-        bad = np.argwhere(np.nan_to_num(apart) > usual)
+        bad = np.argwhere(np.nan_to_num(differences) > usual)
         if len(bad):
             row, joint = int(again[bad[0][0]]), int(bad[0][1])
             fact = f"{positions[row - 1, joint]:.9g} and {positions[row, joint]:.9g}"

@@ -65,9 +65,9 @@ def columns_of(header: Sequence[str]) -> Columns | None:
         If two columns may be the same of one joint.
     """
     for known in (_of_rostopic, _of_libfranka, _of_plotjuggler, _of_numbers, _of_names):
-        found = known(header)
-        if found is not None:
-            return found
+        columns = known(header)
+        if columns is not None:
+            return columns
     return None
 
 
@@ -126,7 +126,7 @@ def _of_libfranka(header: Sequence[str]) -> Columns | None:
 def _of_numbers(header: Sequence[str]) -> Columns | None:
     """Tell numbered columns: ``q_0``, ``dq_0``, ``q[0]``, ``position_0``; one without is a joint's name."""
     time = _time(header)
-    found: dict[int, dict[int, int]] = {}
+    columns: dict[int, dict[int, int]] = {}
     for column, name in enumerate(header):
         match = _WITH_NUMBER.fullmatch(name)
         if match is None and column != time and name not in SPARE:
@@ -135,15 +135,15 @@ def _of_numbers(header: Sequence[str]) -> Columns | None:
         level = next((level for level, words in _NUMBERED.items() if word in words), None)
         if match is None or level is None:
             continue
-        levels = found.setdefault(int(match["number"]), {})
+        levels = columns.setdefault(int(match["number"]), {})
         if level in levels:
             message = f"two columns are of the same joint, {header[levels[level]]} and {name}; leave one of them out"
             raise TrajectoryError(message, name=name)
         levels[level] = column
-    numbers = sorted(number for number, levels in found.items() if POSITION in levels)
+    numbers = sorted(number for number, levels in columns.items() if POSITION in levels)
     if time is None or not numbers or numbers[0] > 1 or numbers != list(range(numbers[0], numbers[0] + len(numbers))):
         return None
-    return Columns(time, {header[found[number][POSITION]]: found[number] for number in numbers}, unnamed=True)
+    return Columns(time, {header[columns[number][POSITION]]: columns[number] for number in numbers}, unnamed=True)
 
 
 def _of_names(header: Sequence[str]) -> Columns | None:

@@ -88,12 +88,12 @@ def _recording(table: Table, columns: Columns, *, points: bool) -> Recording:
         raise table.error("no row has a position", line=table.header_line)
     lines = np.array([table.line(k) for k in range(len(table))])[some]
     unknown = np.isnan(values[some]).all(axis=(0, 2))
-    kept = int(np.argmax(np.append(unknown, True)))
+    count = int(np.argmax(np.append(unknown, True)))
     return Recording(
         table.path,
         names,
         times[some],
-        values[some][:, :kept],
+        values[some][:, :count],
         lines,
         points=points,
         notes=tuple(notes),

@@ -26,7 +26,7 @@ from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal, jaxpr_as_fun
 
 from jounce.settings import under_own_settings
 
-KEPT = 1000  # programs at most, of functions read before
+MOST_TRACED = 1000  # programs at most, of functions read before
 _LIBRARIES = tuple(Path(str(module.__file__)).parent.as_posix() + "/" for module in (jax, eqx))
 _CALLERS = (_LIBRARIES[1], _LIBRARIES[0] + "_src/numpy/ufunc_api.py")  # which compile functions of users as their own
 _CALLS = ("jit", "pjit")
@@ -133,7 +133,7 @@ def read_off(function: Callable[..., Any], *examples: Any) -> ReadOff:
     with _lock:
         _known.pop(key, None)
         _known[key] = program  # the last one used stands last
-        while len(_known) > KEPT:
+        while len(_known) > MOST_TRACED:
             del _known[next(iter(_known))]
     return ReadOff(program, captured, closed, result)
 
@@ -167,9 +167,9 @@ def _shaped(x: Any) -> jax.ShapeDtypeStruct:
 
 def _traced(function: Callable[..., Any], examples: Sequence[Any]) -> tuple[ClosedJaxpr, Any]:
     """Return the program of a function as it is now: another function each time, of which JAX remembers nothing."""
-    found = jax.make_jaxpr(lambda *x: function(*x), return_shape=True)(*examples)
-    if not _may_be_old(found[0].jaxpr):
-        return found
+    traced = jax.make_jaxpr(lambda *x: function(*x), return_shape=True)(*examples)
+    if not _may_be_old(traced[0].jaxpr):
+        return traced
     with _anew(next(_count)):  # nothing traced before is found under it
         return jax.make_jaxpr(lambda *x: function(*x), return_shape=True)(*examples)
 
@@ -223,12 +223,12 @@ class Pass(abc.ABC):
         """Return what stands for the results of an operation."""
 
     def _read(self, jaxpr: Jaxpr, constants: Sequence[Any], arguments: Sequence[Any]) -> list[Any]:
-        found = {v: self._number(c, v.aval) for v, c in zip(jaxpr.constvars, constants, strict=True)}
-        found.update(zip(jaxpr.invars, arguments, strict=True))
+        numbers = {v: self._number(c, v.aval) for v, c in zip(jaxpr.constvars, constants, strict=True)}
+        numbers.update(zip(jaxpr.invars, arguments, strict=True))
 
         def look(variable: Any, *, exponent: bool = False) -> Any:
             if not isinstance(variable, Literal):
-                return found[variable]
+                return numbers[variable]
             return self._number(variable.val, variable.aval, exponent=exponent)
 
         for equation in jaxpr.eqns:
@@ -239,7 +239,7 @@ class Pass(abc.ABC):
                 results = self._read(inner.jaxpr, inner.consts, operands)
             else:
                 results = self.applied(equation, operands)
-            found.update(zip(equation.outvars, results, strict=True))
+            numbers.update(zip(equation.outvars, results, strict=True))
         return [look(v) for v in jaxpr.outvars]
 
     def _number(self, value: Any, aval: Any, *, exponent: bool = False) -> Any:
@@ -263,8 +263,8 @@ class _Again(Pass):
         return np.asarray(value, dtype)
 
     def applied(self, equation: JaxprEqn, operands: list[Any]) -> Sequence[Any]:
-        found = equation.primitive.bind(*operands, **equation.primitive.get_bind_params(equation.params))
-        return found if equation.primitive.multiple_results else [found]
+        outcome = equation.primitive.bind(*operands, **equation.primitive.get_bind_params(equation.params))
+        return outcome if equation.primitive.multiple_results else [outcome]
 
 
 class _Description(Pass):
@@ -308,10 +308,10 @@ class _Description(Pass):
         """Return what tells an operation from others of its name."""
         trusted = all(map(_is_of_libraries, _inner(equation))) and equation.primitive.name.startswith("custom_")
         given = sorted((key, value) for key, value in equation.params.items() if key != "name")
-        told = [f"{key}={self._parameter(key, value, trusted)}" for key, value in given]
+        nan_where_rounding = [f"{key}={self._parameter(key, value, trusted)}" for key, value in given]
         if equation.primitive.name == "custom_jvp_call" and not trusted and self._rules:
-            told.append(f"rule={self._rule(equation)}")
-        return told
+            nan_where_rounding.append(f"rule={self._rule(equation)}")
+        return nan_where_rounding
 
     def _argument(self, k: int, aval: Any) -> str:
         return f"argument {k} {aval.shape} {aval.dtype}"
@@ -325,10 +325,15 @@ class _Description(Pass):
             return told_array(np.asarray(value))
         if isinstance(value, bool | int | float | str | bytes | None):
             return repr(value)
-        told = repr(value)
+        nan_where_rounding = repr(value)
         if not callable(value) or isinstance(value, type):
-            if " at 0x" not in told and type(value).__module__.partition(".")[0] in ("jax", "jaxlib", "numpy", "enum"):
-                return f"{type(value).__qualname__} {told}"
+            if " at 0x" not in nan_where_rounding and type(value).__module__.partition(".")[0] in (
+                "jax",
+                "jaxlib",
+                "numpy",
+                "enum",
+            ):
+                return f"{type(value).__qualname__} {nan_where_rounding}"
         elif trusted or key == "jvp_jaxpr_fun":
             return "a rule"
         self.nameless.append(value)

@@ -78,10 +78,10 @@ class Composed(Module):
         TypeError
             If the function does not return one scalar for a scalar.
         """
-        found = read_off(function, jax.ShapeDtypeStruct((), float))
-        if getattr(found.result, "shape", None) != ():
-            raise TypeError(f"a function of time must return one scalar for a scalar, got {found.result}")
-        return cls(found.program, found.captured)
+        program = read_off(function, jax.ShapeDtypeStruct((), float))
+        if getattr(program.result, "shape", None) != ():
+            raise TypeError(f"a function of time must return one scalar for a scalar, got {program.result}")
+        return cls(program.program, program.captured)
 
     def __call__(self, x: Jet) -> Jet:
         """Return the jet of the function, of the order of `x`; the batch axes stand last."""
@@ -118,8 +118,8 @@ class OfSample(Module):
     @classmethod
     def of(cls, function: Callable[..., Any], *examples: Any) -> "OfSample":
         """Return what a function computes now of arrays with the shapes and types of examples."""
-        found = read_off(lambda *x: jnp.asarray(function(*x), float), *examples)
-        return cls(found.program, found.captured, found.result.shape)
+        program = read_off(lambda *x: jnp.asarray(function(*x), float), *examples)
+        return cls(program.program, program.captured, program.result.shape)
 
     def __call__(self, *samples: Any) -> Any:
         """Return the results for samples side by side, which stand along the last axes, there and here."""

@@ -117,8 +117,8 @@ class ReadObject(Module):
             return jax.tree.unflatten(tree, given[len(jets) :])(*given[: len(jets)])
 
         def on_values(*values: Any) -> Any:
-            found = on_jets([*(Jet([x]) for x in values[: len(jets)]), *values[len(jets) :]], ())
-            (value,) = found.coefficients
+            program = on_jets([*(Jet([x]) for x in values[: len(jets)]), *values[len(jets) :]], ())
+            (value,) = program.coefficients
             return value
 
         reading = read_method(on_values, on_jets, [*jets, *fields], [])
@@ -160,16 +160,16 @@ def read_method(
         Calls the method, without arguments, where the former two may not be able to.
     """
     leaves, tree = jax.tree.flatten(([*jets], [*rates]))
-    reading: Reading = Verbatim((Same(object()),), old=False)  # what is wrong with it is told where it is called
+    reading: Reading = Verbatim((Same(object()),), old=False)  # the call raises the error again
     functions = [lambda *x: on_jets(*jax.tree.unflatten(tree, x)), *([] if whole is None else [lambda *_: whole()])]
     for function in functions:
         try:
-            found = read_off(lambda *x, f=function: jax.tree.leaves(f(*x)), *leaves)
+            program = read_off(lambda *x, f=function: jax.tree.leaves(f(*x)), *leaves)
         except Exception:  # noqa: BLE001
             continue
-        reading = Verbatim(value_key(found.traced), may_be_old(found.traced))
+        reading = Verbatim(value_key(program.traced), may_be_old(program.traced))
         if function is functions[0]:
-            return _as_program(on_values, found.traced, jets) or reading
+            return _as_program(on_values, program.traced, jets) or reading
         break
     return reading
 
@@ -179,15 +179,15 @@ def _as_program(on_values: Callable[..., Any], traced: ClosedJaxpr, jets: Sequen
     leaves, tree = jax.tree.flatten([*jets])
     shapes = tuple(x.shape for x in leaves)
     try:
-        found = read_off(on_values, *(x.coefficients[0] if isinstance(x, Jet) else x for x in jets))
-        reading = ReadMethod(found.program, found.captured)
-        if not found.captured or not has_rules(found.program) or len(jax.tree.leaves(found.result)) != 1:
+        program = read_off(on_values, *(x.coefficients[0] if isinstance(x, Jet) else x for x in jets))
+        reading = ReadMethod(program.program, program.captured)
+        if not program.captured or not has_rules(program.program) or len(jax.tree.leaves(program.result)) != 1:
             return None
 
-        other = _on_series(found.program, tree, shapes)
+        other = _on_series(program.program, tree, shapes)
     except Exception:  # noqa: BLE001 - it needs more than values
         return None
-    return reading if is_same(traced, other, found.captured) else None
+    return reading if is_same(traced, other, program.captured) else None
 
 
 @lru_cache(maxsize=1000)

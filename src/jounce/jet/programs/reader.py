@@ -38,16 +38,16 @@ class ProgramReader(abc.ABC):
 
     def read(self, jaxpr: Any, constants: Sequence[Any], arguments: Sequence[Any]) -> list[Any]:
         """Return the results of a program for its arguments."""
-        found: dict[Any, Any] = dict(zip(jaxpr.constvars, map(self.constant, constants), strict=True))
-        found.update(zip(jaxpr.invars, arguments, strict=True))
+        values: dict[Any, Any] = dict(zip(jaxpr.constvars, map(self.constant, constants), strict=True))
+        values.update(zip(jaxpr.invars, arguments, strict=True))
 
         def look(variable: Any) -> Any:
-            return self.constant(variable.val) if isinstance(variable, Literal) else found[variable]
+            return self.constant(variable.val) if isinstance(variable, Literal) else values[variable]
 
         for equation in jaxpr.eqns:
             operands = [look(v) for v in equation.invars]
             results = self.results(equation, operands)
-            found.update(zip(equation.outvars, results, strict=True))
+            values.update(zip(equation.outvars, results, strict=True))
         return [look(v) for v in jaxpr.outvars]
 
     def composed(self, function: Callable[..., Any], operands: Sequence[Any]) -> Any:
@@ -84,15 +84,15 @@ class ProgramReader(abc.ABC):
     def _unrolled(self, equation: JaxprEqn, operands: list[Any]) -> list[Any]:
         """Run a loop of known length step by step."""
         parameters, inner = equation.params, equation.params["jaxpr"]
-        constants, carried = sizes_of_scan(equation)
-        fixed, carry = operands[:constants], operands[constants : constants + carried]
-        sequences, collected = operands[constants + carried :], []
+        constants, state = sizes_of_scan(equation)
+        fixed, carry = operands[:constants], operands[constants : constants + state]
+        sequences, collected = operands[constants + state :], []
         steps = range(parameters["length"])
         for i in reversed(steps) if parameters["reverse"] else steps:
             here = [self.composed(lambda x, i=i: x[i], [x]) for x in sequences]
             results = self.read(inner.jaxpr, inner.consts, [*fixed, *carry, *here])
-            carry = results[:carried]
-            collected.append(results[carried:])
+            carry = results[:state]
+            collected.append(results[state:])
         if parameters["reverse"]:
             collected.reverse()
         return [*carry, *(self.composed(lambda *xs: jnp.stack(xs), parts) for parts in zip(*collected, strict=True))]

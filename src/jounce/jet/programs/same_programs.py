@@ -47,8 +47,8 @@ class _Nodes(Pass):
             operands = [self._unspread(x) for x in operands]
         if name == "reshape" and given[0].shape == made[0].shape:
             return operands
-        told, nameless = parameters_of(equation)
-        key = name, tuple(told), tuple(map(id, nameless)), tuple(operands), tuple(shapes)
+        nan_where_rounding, nameless = parameters_of(equation)
+        key = name, tuple(nan_where_rounding), tuple(map(id, nameless)), tuple(operands), tuple(shapes)
         node = self._node(key)
         if name in ("broadcast_in_dim", "reshape") and not given[0].shape:
             self._nodes[("spread", node)] = operands[0]

@@ -66,7 +66,7 @@ class Recursion(ProgramReader):
     values : sequence of array
         Coefficients of order zero of its arguments.
     order : int
-        Highest coefficient that will be wanted.
+        Highest coefficient that will be requested.
     reversible : bool, default False
         Whether loops are of known length, as JAX wants them for derivatives in reverse mode; they take longer then.
     unrolled : bool, default False
@@ -129,11 +129,11 @@ class Recursion(ProgramReader):
         left, right = self._written(left, right, newest, k - 1)
         now = self._swept(coefficients, self._sums(left, right, k))
 
-        def found(x: Any) -> Any:
+        def value_of(x: Any) -> Any:
             c = now[x] if isinstance(x, int) else None
             return jnp.zeros_like(self.value(x)) if c is None else c
 
-        return self._collected([found(x) for x in self._outputs]), (left, right, tuple(map(found, self._stored)))
+        return self._collected([value_of(x) for x in self._outputs]), (left, right, tuple(map(value_of, self._stored)))
 
     def corrected(self, history: Any, changes: Sequence[Any]) -> Any:
         """Return the history after a change of the newest coefficients of the arguments.
@@ -154,8 +154,8 @@ class Recursion(ProgramReader):
         now: dict[int, Any] = dict(zip(self._inputs, coefficients, strict=True))
         for node in self._nodes:
             parts = [now[x] if isinstance(x, int) else None for x in node.operands]
-            found = None if sums is None or not node.pairs else total(sums[pair] for pair in node.pairs)
-            now[node.result] = node.rule(parts, found)
+            swept = None if sums is None or not node.pairs else total(sums[pair] for pair in node.pairs)
+            now[node.result] = node.rule(parts, swept)
         return now
 
     # what is known of variables
@@ -171,16 +171,16 @@ class Recursion(ProgramReader):
     def _needed(self) -> list[_Node]:
         """Return the nodes on which the outputs depend."""
         makers = {node.result: node for node in self._nodes}
-        found: set[int] = set()
+        needed: set[int] = set()
         waiting = [x for x in self._outputs if isinstance(x, int)]
         while waiting:
             number = waiting.pop()
-            if number in makers and number not in found:
-                found.add(number)
+            if number in makers and number not in needed:
+                needed.add(number)
                 node = makers[number]
                 waiting += [x for x in node.operands if isinstance(x, int)]
                 waiting += [x for pair in node.pairs for x in pair[:2]]
-        return [node for node in self._nodes if node.result in found]
+        return [node for node in self._nodes if node.result in needed]
 
     # histories: the factors of all products side by side, one row an order, so that one loop sums all products
 
@@ -200,22 +200,22 @@ class Recursion(ProgramReader):
     def _sums(self, left: Any, right: Any, k: Any) -> dict[_Pair, Any]:
         """Return the sums over the products of coefficients of orders 1 to k - 1, those of order k left out."""
 
-        def block(i: Any, found: Any) -> Any:
+        def block(i: Any, products: Any) -> Any:
             first = 1 + i * _BLOCK
             a = jax.lax.dynamic_slice_in_dim(left, first, _BLOCK)
             b = jax.lax.dynamic_slice_in_dim(right, k - first + 1, _BLOCK)
-            return found + total(a[j] * b[_BLOCK - 1 - j] for j in range(_BLOCK))
+            return products + total(a[j] * b[_BLOCK - 1 - j] for j in range(_BLOCK))
 
         count = -(-self.order // _BLOCK) if self.reversible else (k + _BLOCK - 2) // _BLOCK  # what is beyond is zero
         if self.unrolled:
-            found = total(left[j] * right[k - j] for j in range(1, k)) if k > 1 else jnp.zeros(self._width)
+            products = total(left[j] * right[k - j] for j in range(1, k)) if k > 1 else jnp.zeros(self._width)
         else:
-            found = jax.lax.fori_loop(0, count, block, jnp.zeros(self._width))
+            products = jax.lax.fori_loop(0, count, block, jnp.zeros(self._width))
         sums, place = {}, 0
         for pair in self._products:
             shape = jnp.shape(self._values[pair.left])
             size = math.prod(shape)
-            part, place = found[place : place + size].reshape(shape), place + size
+            part, place = products[place : place + size].reshape(shape), place + size
             sums[pair] = part / k if pair.weighted else part
         return sums
 

@@ -79,88 +79,88 @@ def assemble(model: Model, instant: float, tolerance: float, *, free: bool = Fal
     if not model.rows:  # bodies that fly freely are together as they are
         model, _ = with_reference(model, model.guess, instant, model.prescribed)
         return dataclasses.replace(model, system=resident(model.system)), model.guess
-    model, found = settled(model, instant, tolerance)
-    check_assembled(model, found, instant, free=free)
-    warn_of_parts_turned_over(model, found)
-    model, told = redundancy_of(model, _exact(model, found, instant, tolerance), instant)
+    model, attempt = find_assembly(model, instant, tolerance)
+    check_assembled(model, attempt, instant, free=free)
+    warn_of_parts_turned_over(model, attempt)
+    model, redundant = redundancy_of(model, _exact(model, attempt, instant, tolerance), instant)
     try:
-        check_mobility(model, told, free=free)
+        check_mobility(model, redundant, free=free)
     except MobilityError as error:
-        error.idle = idle_motions(model, told, found.coordinates, Displacements(model, instant))
+        error.idle = idle_motions(model, redundant, attempt.coordinates, Displacements(model, instant))
         raise
-    return model, found.coordinates
+    return model, attempt.coordinates
 
 
-def _exact(model: Model, found: AssemblyAttempt, instant: float, tolerance: float) -> AssemblyAttempt:
+def _exact(model: Model, attempt: AssemblyAttempt, instant: float, tolerance: float) -> AssemblyAttempt:
     """Return bodies that were put together loosely, next to a singular position, put together to rounding."""
-    if tolerance <= TIGHT or not found.jacobian.smallest[1].size:
-        return found
-    exact = assemble_from_guess(model, instant, TIGHT, found.coordinates)
-    return exact if exact.closed else found
+    if tolerance <= TIGHT or not attempt.jacobian.smallest[1].size:
+        return attempt
+    exact = assemble_from_guess(model, instant, TIGHT, attempt.coordinates)
+    return exact if exact.closed else attempt
 
 
-def settled(model: Model, instant: float, tolerance: float) -> tuple[Model, AssemblyAttempt]:
+def find_assembly(model: Model, instant: float, tolerance: float) -> tuple[Model, AssemblyAttempt]:
     """Put the bodies together with no part turned over in its joint, if that goes, and count angles from there.
 
     A guess in which directions that joints hold parallel are far from it may lead to a part that lies turned over, or
     nowhere: then the directions are drawn together first, in some ways until one does not end in a singular position.
     """
-    names = [model.rows[place] for place in group_rows(model)]
+    names = [model.rows[rows] for rows in group_rows(model)]
     check_gears(model.system.groups, names)
     check_wheels(model.system.groups, names, model.guess)
-    best = _nearby(model, instant, tolerance)
-    found = best[1]
-    sought = axis_signs_to_try(model, found)
-    rank = found.jacobian.rank - 1 if sought and found.closed else -1  # of the best so far
-    for wanted in sought:
-        for start in starts_with_axis_signs(model, wanted, instant, tolerance):
+    best = _assemble_near_guess(model, instant, tolerance)
+    initial = best[1]
+    candidates = axis_signs_to_try(model, initial)
+    rank = initial.jacobian.rank - 1 if candidates and initial.closed else -1  # of the best so far
+    for signs in candidates:
+        for start in starts_with_axis_signs(model, signs, instant, tolerance):
             drawn, _ = with_reference(dataclasses.replace(model, guess=start), start, instant, model.prescribed)
-            other, trial = _nearby(drawn, instant, tolerance)
-            as_wanted = trial.closed and np.array_equal(axis_signs(model.system, trial.coordinates), wanted)
-            if as_wanted and trial.jacobian.rank > rank:
+            other, trial = _assemble_near_guess(drawn, instant, tolerance)
+            signs_match = trial.closed and np.array_equal(axis_signs(model.system, trial.coordinates), signs)
+            if signs_match and trial.jacobian.rank > rank:
                 best, rank = (dataclasses.replace(other, guess=model.guess), trial), trial.jacobian.rank
             if rank == trial.jacobian.shape[1]:
                 return best
-        if best[1] is not found:
+        if best[1] is not initial:
             break
     return best
 
 
-def _nearby(model: Model, instant: float, tolerance: float) -> tuple[Model, AssemblyAttempt]:
+def _assemble_near_guess(model: Model, instant: float, tolerance: float) -> tuple[Model, AssemblyAttempt]:
     """Put the bodies together from the starting guess, and count the angles about axes from the position found.
 
     Where the axes were tilted against each other in the guess, the angles in the position found are others than those
     counted from the guess, and it takes another turn to get to those that the drivers prescribe.
     """
-    displace, told = Displacements(model, instant), model.prescribed
-    residual, found, known = displace.closed(model.guess, tolerance)
+    displace, prescribed = Displacements(model, instant), model.prescribed
+    residual, attempt, known = displace.closed(model.guess, tolerance)
     lag = driver_lag(model, instant, residual)
-    model, start = _turned(model, instant, tolerance, lag)
+    model, start = _start_after_turns(model, instant, tolerance, lag)
     if start is not None:
-        found = assemble_from_guess(model, instant, tolerance, start)
-    elif found is None:
-        found = assemble_from_guess(model, instant, tolerance, known=known or displace.at(model.guess))
-    if not found.closed and any(map(measures_angle, model.system.groups)):
+        attempt = assemble_from_guess(model, instant, tolerance, start)
+    elif attempt is None:
+        attempt = assemble_from_guess(model, instant, tolerance, known=known or displace.at(model.guess))
+    if not attempt.closed and any(map(measures_angle, model.system.groups)):
         # angles counted from a tilted guess may be far off: first the joints alone, with the drivers as they are
-        begin = found if lag is None else assemble_from_guess(model, instant, tolerance, lag=lag)
+        begin = attempt if lag is None else assemble_from_guess(model, instant, tolerance, lag=lag)
         if begin.closed:
-            model, _ = with_reference(model, begin.coordinates, instant, told)
-            found = assemble_from_guess(model, instant, tolerance, begin.coordinates)
-    if "angle" in found.coordinates and start is None and found.closed:
-        found = nearest_to_guess(model, found, instant)
+            model, _ = with_reference(model, begin.coordinates, instant, prescribed)
+            attempt = assemble_from_guess(model, instant, tolerance, begin.coordinates)
+    if "angle" in attempt.coordinates and start is None and attempt.closed:
+        attempt = nearest_to_guess(model, attempt, instant)
     for _ in range(MAX_DATUMS):
-        if not found.closed:
-            return model, found
-        model, away = with_reference(model, found.coordinates, instant, told)
+        if not attempt.closed:
+            return model, attempt
+        model, away = with_reference(model, attempt.coordinates, instant, prescribed)
         if away <= SETTLED:
-            return model, found
-        found = assemble_from_guess(model, instant, tolerance, found.coordinates)
-    return with_reference(model, found.coordinates, instant, told, keep=True)[0], found
+            return model, attempt
+        attempt = assemble_from_guess(model, instant, tolerance, attempt.coordinates)
+    return with_reference(model, attempt.coordinates, instant, prescribed, keep=True)[0], attempt
 
 
-def warn_of_parts_turned_over(model: Model, found: AssemblyAttempt) -> None:
+def warn_of_parts_turned_over(model: Model, attempt: AssemblyAttempt) -> None:
     """Warn of joints whose parts are held the other way round than the starting guess means."""
-    there = axis_signs(model.system, found.coordinates)
+    there = axis_signs(model.system, attempt.coordinates)
     if there.all() or not (odd := there != drawn_axis_signs(model)).any():
         return
     names = [name for name, is_odd in zip(pair_names(model), odd, strict=True) if is_odd]
@@ -172,7 +172,9 @@ def warn_of_parts_turned_over(model: Model, found: AssemblyAttempt) -> None:
     warnings.warn(AssemblyWarning(message), stacklevel=3)
 
 
-def _turned(model: Model, instant: float, tolerance: float, lag: DriverLag | None) -> tuple[Model, Coordinates | None]:
+def _start_after_turns(
+    model: Model, instant: float, tolerance: float, lag: DriverLag | None
+) -> tuple[Model, Coordinates | None]:
     """Return the model and the coordinates to start from where laws begin more than half a turn from the guess.
 
     The drivers are turned from the guess to their laws then, and all angles count their turns; None where none is so
@@ -183,10 +185,10 @@ def _turned(model: Model, instant: float, tolerance: float, lag: DriverLag | Non
     begin = assemble_from_guess(model, instant, tolerance, lag=lag)
     if not begin.closed:
         return model, None
-    found = turned_to_laws(model, lag, begin.coordinates, Displacements(model, instant))
-    if found is None:
+    turned = turned_to_laws(model, lag, begin.coordinates, Displacements(model, instant))
+    if turned is None:
         return model, None
-    coordinates, history = found
+    coordinates, history = turned
     if history is not None:
         forces, outputs = (
             with_angles(with_datums(part, coordinates), history.last_angles(part))
@@ -197,32 +199,34 @@ def _turned(model: Model, instant: float, tolerance: float, lag: DriverLag | Non
     return model, coordinates
 
 
-def nearest_to_guess(model: Model, found: AssemblyAttempt, instant: float) -> AssemblyAttempt:
+def nearest_to_guess(model: Model, attempt: AssemblyAttempt, instant: float) -> AssemblyAttempt:
     """Return planar bodies put together, with every angle shifted by whole turns to be nearest to the guess."""
     displace = Displacements(model, instant)
 
     def residual_at(angle: np.ndarray) -> np.ndarray:
-        return found.scale * displace.at({**found.coordinates, "angle": angle})[1]
+        return attempt.scale * displace.at({**attempt.coordinates, "angle": angle})[1]
 
-    return found._replace(coordinates=nearest_turns(model.guess, found.coordinates, residual_at))
+    return attempt._replace(coordinates=nearest_turns(model.guess, attempt.coordinates, residual_at))
 
 
-def check_assembled(model: Model, found: AssemblyAttempt, instant: float, *, free: bool = False) -> None:
+def check_assembled(model: Model, attempt: AssemblyAttempt, instant: float, *, free: bool = False) -> None:
     """Raise AssemblyError, with the joints concerned and by how much they stay open, where gaps are not closed.
 
     What is missing for every motion to be prescribed is told too, unless degrees of freedom may be left (`free`).
     """
-    gaps = found.gaps
+    gaps = attempt.gaps
     if not (known := np.isfinite(gaps)).all():
-        named = ", ".join(dict.fromkeys(name for name, told in zip(model.rows, known, strict=True) if not told))
+        named = ", ".join(
+            dict.fromkeys(name for name, is_finite in zip(model.rows, known, strict=True) if not is_finite)
+        )
         message = f"no finite value at t = {instant:g} s: {named}; check motion laws and the starting guess"
         raise AssemblyError(message, status=Status.INADMISSIBLE)
-    if found.closed:
+    if attempt.closed:
         return
     gaps = np.abs(gaps)
     worst = np.argsort(-gaps)
     open_rows = list(dict.fromkeys(model.rows[k] for k in worst if gaps[k] > 0.1 * gaps[worst[0]]))
-    wide = _widths(model, found, instant)
+    wide = _widths(model, attempt, instant)
     message = (
         f"the mechanism cannot be assembled at t = {instant:g} s from its starting guess: {', '.join(open_rows[:4])} "
         f"{'stays' if len(open_rows) == 1 else 'stay'} open, by {', '.join(wide[name] for name in open_rows[:4])}; "
@@ -230,7 +234,7 @@ def check_assembled(model: Model, found: AssemblyAttempt, instant: float, *, fre
     )
     if not free:
         message += " (`assembly: nearest` looks from random starts)"
-    extra = _structural_excess(model, found, instant)
+    extra = _structural_excess(model, attempt, instant)
     if extra:
         details = (
             f"{message}; {_count(extra, 'equation')} more than coordinates are among them, and redundant constraints "
@@ -244,33 +248,33 @@ def check_assembled(model: Model, found: AssemblyAttempt, instant: float, *, fre
             "contradict each other; correct lengths, or take out a joint"
         )
         raise AssemblyError(message, status=Status.NOT_ASSEMBLED, details=details)
-    missing = found.jacobian.shape[1] - len(model.rows)
+    missing = attempt.jacobian.shape[1] - len(model.rows)
     if missing > 0 and not free:
         message += f"; {_count(missing, 'equation')} too few for all coordinates: a joint may be missing"
     raise AssemblyError(message, status=Status.NOT_ASSEMBLED)
 
 
-def _structural_excess(model: Model, found: AssemblyAttempt, instant: float) -> int:
+def _structural_excess(model: Model, attempt: AssemblyAttempt, instant: float) -> int:
     """Return how many equations are dependent wherever the bodies are, so that they may contradict each other.
 
     Bodies that do not reach each other come to rest where equations depend on each other too, but only there.
     """
     anywhere = 0.1 * np.random.default_rng(1).standard_normal(model.system.shape[1])
-    jacobian = Displacements(model, instant)(found.coordinates, anywhere)[2]
+    jacobian = Displacements(model, instant)(attempt.coordinates, anywhere)[2]
     return len(model.rows) - jacobian.scaled(jacobian.row_scale).rank if jacobian.finite().all() else 0
 
 
-def _widths(model: Model, found: AssemblyAttempt, instant: float) -> dict[str, str]:
+def _widths(model: Model, attempt: AssemblyAttempt, instant: float) -> dict[str, str]:
     """Return by how much each joint and driver is open, as a length or as an angle, whichever it closes."""
-    shifts, entries = model.pose_type.shifts, np.abs(found.jacobian.blocks)
+    shifts, entries = model.pose_type.shifts, np.abs(attempt.jacobian.blocks)
     by_shift, by_turn = (np.max(part, axis=(1, 2)) for part in (entries[:, :, :shifts], entries[:, :, shifts:]))
     squares = _squared_lengths(model, instant)  # of two points in one place the slopes are all zero
     lengthy = (by_shift > 1e-9 * by_turn) | np.isin(model.rows, list(squares))
     unit = np.where(lengthy, 1e3 * model.length, np.degrees(1.0))
-    open_by = np.abs(found.gaps) * unit / np.maximum(np.where(lengthy, by_shift, by_turn), 1e-300)
+    open_by = np.abs(attempt.gaps) * unit / np.maximum(np.where(lengthy, by_shift, by_turn), 1e-300)
     for row, name in enumerate(model.rows):
         if name in squares:  # the residual is the square of a distance less this
-            square = max(found.gaps[row] / found.scale[row] + squares[name], 0.0)
+            square = max(attempt.gaps[row] / attempt.scale[row] + squares[name], 0.0)
             open_by[row] = 1e3 * abs(np.sqrt(square) - np.sqrt(squares[name]))
     sizes = {name: {"mm": 0.0, "deg": 0.0} for name in model.rows}
     for row, name in enumerate(model.rows):
@@ -284,7 +288,7 @@ def _widths(model: Model, found: AssemblyAttempt, instant: float) -> dict[str, s
 
 def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
     """Return the squares of the distances that joints and drivers keep between two points, by name, m^2."""
-    found, clock = {}, Jet([np.full((1, 1), instant)])
+    squares, clock = {}, Jet([np.full((1, 1), instant)])
     for group, rows in zip(model.system.groups, group_rows(model), strict=True):
         field = facts_of(type(group.element)).squared_distance
         if not field:
@@ -292,28 +296,28 @@ def _squared_lengths(model: Model, instant: float) -> dict[str, float]:
         lengths = getattr(group.element, field)
         lengths = lengths(clock).coefficients[0] if isinstance(lengths, AbstractMotion) else lengths
         lengths = np.broadcast_to(lengths, (group.instances, 1))[:, 0]
-        found |= {name: float(length) ** 2 for name, length in zip(model.rows[rows], lengths, strict=False)}
-    return found
+        squares |= {name: float(length) ** 2 for name, length in zip(model.rows[rows], lengths, strict=False)}
+    return squares
 
 
-def redundancy_of(model: Model, found: AssemblyAttempt, instant: float) -> tuple[Model, Redundancy]:
+def redundancy_of(model: Model, attempt: AssemblyAttempt, instant: float) -> tuple[Model, Redundancy]:
     """Return a model that was put together with its rows scaled, and which of them follow from others."""
-    system = resident(with_fields(model.system, row_scale=found.scale[:, None], rank=None))
+    system = resident(with_fields(model.system, row_scale=attempt.scale[:, None], rank=None))
     model = dataclasses.replace(model, system=system)
-    told = redundancy(model, found.coordinates, found.jacobian, Displacements(model, instant))
-    if told.count:
-        model = dataclasses.replace(model, system=with_fields(system, rank=told.rank))
-    return model, told
+    redundant = redundancy(model, attempt.coordinates, attempt.jacobian, Displacements(model, instant))
+    if redundant.count:
+        model = dataclasses.replace(model, system=with_fields(system, rank=redundant.rank))
+    return model, redundant
 
 
-def check_mobility(model: Model, found: Redundancy, *, free: bool = False) -> None:
+def check_mobility(model: Model, redundant: Redundancy, *, free: bool = False) -> None:
     """Raise MobilityError, with the bodies concerned, where degrees of freedom are left or the position is singular.
 
     Redundant constraints are no error: here they agree. Degrees of freedom may be left (`free`).
     """
-    (rows, columns), rank = found.here.shape, found.rank
+    (rows, columns), rank = redundant.here.shape, redundant.rank
     left_over = columns - rank
-    if (free or not left_over) and not found.is_singular:
+    if (free or not left_over) and not redundant.is_singular:
         return
     bodies = len(model.bodies)
     parts = [
@@ -322,21 +326,21 @@ def check_mobility(model: Model, found: Redundancy, *, free: bool = False) -> No
     ]
     if left_over and not free:
         noun = "degree of freedom is" if left_over == 1 else "degrees of freedom are"
-        moving = freely_moving(model, found.jacobian.free_directions)
+        moving = freely_moving(model, redundant.jacobian.free_directions)
         remedy = f"add {_count(left_over, 'driver')}, or simulate it under its forces"
         parts.append(f"{left_over} {noun} left, with which {moving} can move: {remedy}")
-        if hint := missing_joint_words(model, moving_bodies(model, found.jacobian.free_directions), left_over):
+        if hint := missing_joint_words(model, moving_bodies(model, redundant.jacobian.free_directions), left_over):
             parts.append(hint)
-    if found.count:
-        parts.append(f"{found}, which is no fault as they agree")
-    if found.is_singular:
-        moving = freely_moving(model, found.here.free_directions)
+    if redundant.count:
+        parts.append(f"{redundant}, which is no fault as they agree")
+    if redundant.is_singular:
+        moving = freely_moving(model, redundant.here.free_directions)
         parts.append(
             "the start is a singular position (a dead point or a change point), where only "
-            f"{found.here.rank} equations are independent and {moving} can move: start at another instant, or with "
+            f"{redundant.here.rank} equations are independent and {moving} can move: start at another instant, or with "
             "another position"
         )
-    raise MobilityError("; ".join(parts), status=Status.SINGULAR if found.is_singular else None)
+    raise MobilityError("; ".join(parts), status=Status.SINGULAR if redundant.is_singular else None)
 
 
 def freely_moving(model: Model, directions: Float[np.ndarray, "direction column"]) -> str:

@@ -1,7 +1,7 @@
-"""Which way parts lie in joints that would hold them turned over as well.
+"""Signs of the axes of joints: parts lie as drawn, or turned over, which fulfills the same equations.
 
 The rows of a hinge or a guide hold a body in two ways: as drawn, and with its axis the other way round. The second is
-no assembly that anybody means, and no motion leads from one to the other.
+no assembly that a user means, and no motion leads from one to the other.
 """
 
 from collections.abc import Iterator
@@ -73,13 +73,13 @@ def pair_names(model: Model) -> list[str]:
     return [name for group, _ in _pairs(model.system) for name in names[id(group)][: group.instances]]
 
 
-def axis_signs_to_try(model: Model, found: AssemblyAttempt) -> list[AxisSigns]:
-    """Return the signs with which assembly should be tried again, the most likely first; none where all is well.
+def axis_signs_to_try(model: Model, attempt: AssemblyAttempt) -> list[AxisSigns]:
+    """Return the signs with which to assemble again, the most likely first; none where the assembly is as drawn.
 
     That is where parts lie turned over, and where they were not put together at all from a guess in which directions
     are far from parallel. What the guess draws may not exist: then all pairs are meant to point the same way.
     """
-    there = axis_signs(model.system, found.coordinates) if found.closed else None
+    there = axis_signs(model.system, attempt.coordinates) if attempt.closed else None
     if there is not None and there.all():
         return []
     drawn = _cosines(model.system, model.guess)
@@ -87,53 +87,53 @@ def axis_signs_to_try(model: Model, found: AssemblyAttempt) -> list[AxisSigns]:
     if there is not None:
         as_meant = np.array_equal(there, meant)
     else:  # where a law has no finite value, no other start helps
-        as_meant = bool(np.all(np.abs(drawn) > DRAWN_NEARLY)) or not np.isfinite(found.gaps).all()
+        as_meant = bool(np.all(np.abs(drawn) > DRAWN_NEARLY)) or not np.isfinite(attempt.gaps).all()
     if as_meant:
         return []
     return [meant] if meant.all() else [meant, np.ones_like(meant)]
 
 
-def starts_with_axis_signs(model: Model, wanted: AxisSigns, instant: float, tolerance: float) -> Iterator[Coordinates]:
+def starts_with_axis_signs(model: Model, signs: AxisSigns, instant: float, tolerance: float) -> Iterator[Coordinates]:
     """Give coordinates near the starting guess in which the joints hold with these signs, the most likely first.
 
     Drivers hold in the first as well. The attitudes alone come first in a part of them: what is far away else draws
     parts round.
     """
-    turned = assemble_from_guess(_directed(model, wanted, alone=True), instant, tolerance)
+    turned = assemble_from_guess(_directed(model, signs, only_directions=True), instant, tolerance)
     for driven in (True, False):
-        directed = _directed(model, wanted, driven=driven)
+        directed = _directed(model, signs, driven=driven)
         for start in (model.guess, turned.coordinates)[: 1 + turned.closed]:
-            found = assemble_from_guess(directed, instant, tolerance, start)
-            if found.closed:
-                yield found.coordinates
+            attempt = assemble_from_guess(directed, instant, tolerance, start)
+            if attempt.closed:
+                yield attempt.coordinates
 
 
-def _directed(model: Model, wanted: AxisSigns, *, alone: bool = False, driven: bool = True) -> Model:
-    """Return the model with rows that hold directions the same way, or the opposite one where not wanted.
+def _directed(model: Model, signs: AxisSigns, *, only_directions: bool = False, driven: bool = True) -> Model:
+    """Return the model with rows that hold directions the same way, or the opposite one where the sign is False.
 
     Parameters
     ----------
     model : Model
         The mechanism.
-    wanted : array of bool, shape (pairs,)
-        Axis signs.
-    alone : bool, default False
+    signs : array of bool, shape (pairs,)
+        Whether the directions of each pair point the same way.
+    only_directions : bool, default False
         Whether they are the only rows; then pairs that close a loop are left out.
     driven : bool, default True
         Whether drivers stay.
     """
-    groups = [] if alone else [group for group in model.system.groups if driven or not group.is_driver]
+    groups = [] if only_directions else [group for group in model.system.groups if driven or not group.is_driver]
     leads, first = list(range(model.system.body_count + 1)), 0
     for group, names in _pairs(model.system):
         its = np.arange(group.instances)
-        signs = np.where(wanted[first + its], 1.0, -1.0)
+        factors = np.where(signs[first + its], 1.0, -1.0)
         first += group.instances
-        if alone:
+        if only_directions:
             its = np.array([k for k in its if _joins(leads, group.bodies[0][k], group.bodies[1][k])], int)
         if len(its):
             vector_i, vector_j = (_unit(group, name)[:, its, None] for name in names)
             slots = tuple(tuple(slot[k] for k in its) for slot in group.bodies[:2])
-            groups.append(Group(SameDirection(vector_i, vector_j * signs[its, None]), slots))
+            groups.append(Group(SameDirection(vector_i, vector_j * factors[its, None]), slots))
     unnamed = tuple(("",) * group.instances for group in groups)
     parts = ((tuple(groups), unnamed), ((), ()), ((), ()))
     return model_of(model.bodies, parts, model.guess, model.length, None)
@@ -166,14 +166,14 @@ def _unit(group: Group, name: str) -> Float[np.ndarray, "component instance"]:
 
 def _cosines(system: System, coordinates: Coordinates) -> Float[np.ndarray, " pair"]:
     """Return the cosine of the angle between the directions of each pair."""
-    found = []
+    cosines = []
     for group, names in _pairs(system):
         first, second = (
             _globally(_unit(group, name), coordinates, np.array(slot))
             for name, slot in zip(names, group.bodies[:2], strict=True)
         )
-        found.append(np.sum(first * second, axis=0))
-    return np.concatenate([*found, np.zeros(0)])
+        cosines.append(np.sum(first * second, axis=0))
+    return np.concatenate([*cosines, np.zeros(0)])
 
 
 def _globally(

@@ -69,7 +69,7 @@ class ReducedConstraints:
         order: int,
         held: Bool[np.ndarray, " row"] | None = None,
     ) -> "ReducedConstraints":
-        """Reduce the constraints at a position, where they have a scaled Jacobian; of some rows alone where told."""
+        """Reduce the constraints at a position, where they have a scaled Jacobian; or only some of its rows."""
         held = np.ones(len(jacobian), bool) if held is None else held
         left, sizes, right = np.linalg.svd(jacobian[held])
         rank = int(np.sum(sizes > SINGULAR * sizes.max(initial=0.0)))
@@ -98,14 +98,14 @@ class ReducedConstraints:
             some = series[first : first + LANES]
             filled = np.zeros((LANES, self.order, series.shape[2]))
             filled[: len(some), : some.shape[1]] = some
-            found = _along(
+            evaluated = _along(
                 self.model.system,
                 self.coordinates,
                 (self.free, self.dependent, self.inverse, self.held.astype(float)),
                 np.moveaxis(filled, 0, -1),
                 pose_type=self.model.pose_type,
             )
-            parts.append([np.moveaxis(np.asarray(x), -1, 0)[: len(some)] for x in found])
+            parts.append([np.moveaxis(np.asarray(x), -1, 0)[: len(some)] for x in evaluated])
         equations, sizes, moved = (np.concatenate(x) for x in zip(*parts, strict=True))
         return equations, sizes, moved
 

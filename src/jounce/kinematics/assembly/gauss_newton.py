@@ -27,7 +27,7 @@ REGULAR = 1e-4  # smallest pivot over the largest, from where on a matrix is inv
 
 
 class _NewtonState(NamedTuple):
-    """How Newton-Raphson stands between two steps, for one instant."""
+    """State of the Newton-Raphson iteration between two steps, for one instant."""
 
     coordinates: dict[str, Numbers]
     increment: Float[Numbers, " column"]  # to be made next
@@ -40,7 +40,7 @@ class _NewtonState(NamedTuple):
     left: Int[Numbers, ""]  # steps that may follow; below zero none does
 
 
-@compiled("pose_type", narrow=True, brief=True, alone=True)
+@compiled("pose_type", narrow=True, brief=True, single=True)
 def _moved(
     system: System,
     coordinates: dict[str, Numbers],
@@ -91,7 +91,7 @@ def _moved(
 
 
 class AssemblyAttempt(NamedTuple):
-    """How far bodies could be put together.
+    """The outcome of an assembly: a position, and the gaps that stay open.
 
     Attributes
     ----------
@@ -115,9 +115,9 @@ class AssemblyAttempt(NamedTuple):
 
 
 class Displacements:
-    """Moves the bodies of a model at an instant, s, in compiled code: from and to the host.
+    """Displacements of the bodies of a model at an instant, s, in compiled code, called from the host.
 
-    Called with coordinates and an increment, it returns the place after that.
+    Called with coordinates and an increment, it returns the displaced position.
     """
 
     def __init__(self, model: Model, instant: float):
@@ -126,7 +126,7 @@ class Displacements:
         self._dense, self._still = rows == columns and model.system.fronts is None, np.zeros(columns)
 
     def __call__(self, coordinates: Coordinates, increment: Float[np.ndarray, " column"]) -> Displaced:
-        """Return the place after an increment."""
+        """Return the position after an increment."""
         return self._moved(coordinates, increment, 0, 0.0)[0]
 
     def closed(
@@ -134,22 +134,22 @@ class Displacements:
     ) -> tuple[Float[np.ndarray, " row"], AssemblyAttempt | None, Displaced | None]:
         """Return the residual at some coordinates, and the bodies put together from there if no step needs a check.
 
-        The place with those coordinates comes last, where none of its steps was tried: the one to go on from.
+        The position with those coordinates comes last, where none of its steps was tried: the one to go on from.
         """
         there, begun, closed = self._moved(start, self._still, MAX_STEPS if self._dense else 0, tolerance)
-        found = _trial(*there, there[2].row_scale, tolerance) if closed else None
-        return begun, found, None if self._dense else there
+        attempt = _trial(*there, there[2].row_scale, tolerance) if closed else None
+        return begun, attempt, None if self._dense else there
 
     def at(self, coordinates: Coordinates) -> Displaced:
-        """Return the place with some coordinates."""
+        """Return the position with some coordinates."""
         return self(coordinates, self._still)
 
     def _moved(
         self, coordinates: Coordinates, increment: Float[np.ndarray, " column"], steps: int, tolerance: float
     ) -> tuple[Displaced, Float[np.ndarray, " row"], bool]:
         settings = self._instant, np.int64(steps), np.float64(tolerance)
-        found = _moved(self._system, coordinates, increment, *settings, self._model.pose_type)
-        to, residual, entries, *ending = jax.tree.map(np.asarray, found)
+        result = _moved(self._system, coordinates, increment, *settings, self._model.pose_type)
+        to, residual, entries, *ending = jax.tree.map(np.asarray, result)
         begun, closed = ending or (residual, False)
         system = self._model.system
         jacobian = HostJacobian.of(system.pattern, entries).scaled(np.asarray(system.row_scale)[:, 0])
@@ -157,7 +157,7 @@ class Displacements:
 
     @cached_property
     def _system(self) -> System:
-        """All that the program needs."""
+        """The system with its arrays on the device."""
         pattern = self._model.system.pattern if self._dense else None
         return with_fields(self._model.system, outputs=(), forces=(), fronts=None, pattern=pattern)
 
@@ -171,7 +171,7 @@ def assemble_from_guess(
     lag: DriverLag | None = None,
     known: Displaced | None = None,
 ) -> AssemblyAttempt:
-    """Return how far the bodies can be put together at one instant; nothing is refused.
+    """Assemble the bodies at one instant by damped Gauss-Newton; the outcome may have open gaps.
 
     Parameters
     ----------
@@ -190,22 +190,22 @@ def assemble_from_guess(
     """
     displace = Displacements(model, instant)
 
-    def opened(place: Displaced) -> Displaced:
-        return place if lag is None else (place[0], lag.open(place[1], 1.0), place[2])
+    def opened(displaced: Displaced) -> Displaced:
+        return displaced if lag is None else (displaced[0], lag.open(displaced[1], 1.0), displaced[2])
 
     if known is None:
         begin = model.guess if start is None else start
         if lag is None:
-            _, found, known = displace.closed(begin, tolerance)
-            if found is not None:
-                return found
+            _, attempt, known = displace.closed(begin, tolerance)
+            if attempt is not None:
+                return attempt
         known = displace.at(begin) if known is None else known
     coordinates, residual, jacobian = opened(known)
     scale = jacobian.row_scale
     for _ in range(MAX_STEPS):
         step = jacobian.step(residual)
         if step is None:
-            break  # told by name
+            break  # the error names the rows
         size = np.max(np.abs(step), initial=0.0)
         step *= min(1.0, LONGEST_STEP / max(size, 1e-300))
         now = np.linalg.norm(scale * residual)

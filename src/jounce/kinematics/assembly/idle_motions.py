@@ -1,4 +1,4 @@
-"""Idle motions: bodies that may spin about an axis of themselves, which moves nothing else.
+"""Idle motions: bodies that may spin about an axis of their own without moving others.
 
 A strut between a ball joint and a cylinder, or a rod between two balls, has such a degree of freedom. It is found from
 the null space of the Jacobian: vectors of a basis whose bodies no other vector moves, and which turn these as one about
@@ -23,14 +23,14 @@ IdleMotions = dict[str, tuple[tuple[str, ...], tuple[float, float, float]]]
 """By the body that is held: all bodies that spin as one with it, and the axis on that body."""
 
 
-def idle_motions(model: Model, told: Redundancy, coordinates: Coordinates, displace: Displace) -> IdleMotions:
+def idle_motions(model: Model, redundant: Redundancy, coordinates: Coordinates, displace: Displace) -> IdleMotions:
     """Return the idle motions of a driven mechanism in space, if all degrees of freedom left are such; else none.
 
     Parameters
     ----------
     model : Model
         That was put together.
-    told : Redundancy
+    redundant : Redundancy
         Of its equations.
     coordinates : dict of str to array
         Where they are fulfilled.
@@ -38,31 +38,31 @@ def idle_motions(model: Model, told: Redundancy, coordinates: Coordinates, displ
         Takes coordinates and an increment to coordinates, residual and Jacobian.
     """
     driven = any(name.startswith("drivers.") for name in model.rows)
-    if told.is_singular or not driven or "quaternion" not in coordinates:
+    if redundant.is_singular or not driven or "quaternion" not in coordinates:
         return {}
-    directions = told.here.free_directions
+    directions = redundant.here.free_directions
     parts = directions.reshape(len(directions), len(model.bodies), -1)
-    found: IdleMotions = {}
+    idle: IdleMotions = {}
     for members in _moved_together(parts):
-        _, sizes, ways = np.linalg.svd(parts[:, members].reshape(len(parts), -1), full_matrices=False)
+        _, sizes, modes = np.linalg.svd(parts[:, members].reshape(len(parts), -1), full_matrices=False)
         if np.count_nonzero(sizes > 0.5) != 1:  # a projection of orthonormal vectors: each is one or zero
             return {}
-        way = ways[0].reshape(len(members), -1)
-        spin = _spin(model, members, way, coordinates)
+        mode = modes[0].reshape(len(members), -1)
+        spin = _spin(model, members, mode, coordinates)
         if spin is None or not _is_finite(members, spin, coordinates, displace):
             return {}
         first = members[0]
-        axis = way[0, 3:] / np.linalg.norm(way[0, 3:])
+        axis = mode[0, 3:] / np.linalg.norm(mode[0, 3:])
         axis = axis if axis[np.argmax(np.abs(axis))] > 0 else -axis
-        found[model.bodies[first]] = tuple(model.bodies[k] for k in members), tuple(axis.tolist())
-    return found
+        idle[model.bodies[first]] = tuple(model.bodies[k] for k in members), tuple(axis.tolist())
+    return idle
 
 
 def _moved_together(parts: Float[np.ndarray, "direction body coordinate"]) -> list[list[int]]:
-    """Return the bodies that move, those that some direction of the null space moves together in one list each."""
+    """Return clusters of bodies that directions of the null space move together."""
     projector = np.einsum("dbc,def->bcef", parts, parts)
     joined = np.sqrt((projector**2).sum(axis=(1, 3))) > RELATED
-    moving, found = set(np.flatnonzero(joined.diagonal()).tolist()), []
+    moving, clusters = set(np.flatnonzero(joined.diagonal()).tolist()), []
     while moving:
         group, waiting = set(), [min(moving)]
         while waiting:
@@ -71,12 +71,12 @@ def _moved_together(parts: Float[np.ndarray, "direction body coordinate"]) -> li
                 group.add(body)
                 waiting += np.flatnonzero(joined[body]).tolist()
         moving -= group
-        found.append(sorted(group))
-    return found
+        clusters.append(sorted(group))
+    return clusters
 
 
 def _spin(
-    model: Model, members: list[int], way: Float[np.ndarray, "member coordinate"], coordinates: Coordinates
+    model: Model, members: list[int], mode: Float[np.ndarray, "member coordinate"], coordinates: Coordinates
 ) -> tuple[Any, Any] | None:
     """Return a unit vector and a point of the line about which bodies turn as one; None where they do not.
 
@@ -86,15 +86,15 @@ def _spin(
         The mechanism.
     members : list of int
         Bodies, without the ground.
-    way : array of shape (members, 6)
+    mode : array of shape (members, 6)
         How each moves, scaled: the velocity of its origin, and its angular velocity in its own axes.
     coordinates : dict of str to array
         Of all bodies.
     """
-    velocity = way * np.asarray(model.system.column_scale)
-    places, attitudes = (np.asarray(coordinates[name])[:, [k + 1 for k in members], 0] for name in _POSE)
+    velocity = mode * np.asarray(model.system.column_scale)
+    positions, attitudes = (np.asarray(coordinates[name])[:, [k + 1 for k in members], 0] for name in _POSE)
     turning = turned(attitudes, velocity[:, 3:].T)
-    at_origin = velocity[:, :3].T - np.cross(turning.T, places.T).T  # of the point in the global origin
+    at_origin = velocity[:, :3].T - np.cross(turning.T, positions.T).T  # of the point in the global origin
     size = np.linalg.norm(turning[:, 0])
     scale = RELATED * np.array([size, size * model.length])
     alike = [np.abs(part - part[:, :1]).max(initial=0.0) for part in (turning, at_origin)]
@@ -110,16 +110,16 @@ _POSE = ("position", "quaternion")
 
 
 def _is_finite(members: list[int], spin: tuple[Any, Any], coordinates: Coordinates, displace: Displace) -> bool:
-    """Tell whether all constraints hold after bodies were turned far about a line, the others being where they were."""
+    """Tell whether all constraints hold after large turns of bodies about a line, while the others stay in place."""
     axis, point = spin
     bodies, nothing = [k + 1 for k in members], None
     for angle in TURNS:
         turn = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis])[:, None]
-        place, attitude = (np.array(coordinates[name]) for name in _POSE)
-        place[:, bodies, 0] = point[:, None] + turned(turn, place[:, bodies, 0] - point[:, None])
+        position, attitude = (np.array(coordinates[name]) for name in _POSE)
+        position[:, bodies, 0] = point[:, None] + turned(turn, position[:, bodies, 0] - point[:, None])
         attitude[:, bodies, 0] = _composed(turn, attitude[:, bodies, 0])
-        nothing = np.zeros(6 * (place.shape[1] - 1)) if nothing is None else nothing
-        residual = displace({**coordinates, "position": place, "quaternion": attitude}, nothing)[1]
+        nothing = np.zeros(6 * (position.shape[1] - 1)) if nothing is None else nothing
+        residual = displace({**coordinates, "position": position, "quaternion": attitude}, nothing)[1]
         if not np.abs(residual).max(initial=0.0) < HELD:
             return False
     return True

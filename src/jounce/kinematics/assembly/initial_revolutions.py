@@ -1,4 +1,4 @@
-"""Whole turns at the first assembly: those that the starting guess and the laws of the drivers say.
+"""Whole turns at the first assembly, from the starting guess and the laws of the drivers.
 
 Where a law starts more than half a turn from where the guess has its body, the drivers are turned from the guess to the
 law step by step, and every body and every angle counts the turns that it makes on the way. Otherwise all angles are
@@ -34,7 +34,7 @@ Displace = Callable[[Coordinates, np.ndarray], Displaced]
 
 
 class DriverLag(NamedTuple):
-    """What the drivers still lack at the starting guess, by rows of the residual.
+    """The lag of the drivers at the starting guess: law less guess, by rows of the residual.
 
     Attributes
     ----------
@@ -62,14 +62,14 @@ class DriverLag(NamedTuple):
 
 
 def driver_lag(model: Model, instant: float, residual: Float[np.ndarray, " row"]) -> DriverLag | None:
-    """Return what the drivers lack where the residual is that of the guess; None where a driver has several rows."""
+    """Return the lag of the drivers where the residual is that of the guess; None where a driver has several rows."""
     rows = [k for k, name in enumerate(model.rows) if name.partition(".")[0] in ("drivers", "initial")]
     groups = [group for group in model.system.groups if group.is_driver]
     if len(rows) != sum(group.instances for group in groups) or not np.isfinite(residual).all():
         return None
     size = np.zeros(len(model.rows))
     turning, periodic = np.zeros(len(size), bool), np.zeros(len(size), bool)
-    told = iter(prescribed_by_drivers(model.system.groups, model.guess, instant))
+    prescribed = iter(prescribed_by_drivers(model.system.groups, model.guess, instant))
     first = 0
     for group in groups:
         its = rows[first : first + group.instances]
@@ -78,14 +78,14 @@ def driver_lag(model: Model, instant: float, residual: Float[np.ndarray, " row"]
         turning[its] = dimension_of_field(group.element, "motion") == "angle"
         if measures_angle(group):
             turning[its] = periodic[its] = True
-            size[its] = [next(told).angle for _ in its] - np.asarray(group.element.datum.angle)[:, 0]
+            size[its] = [next(prescribed).angle for _ in its] - np.asarray(group.element.datum.angle)[:, 0]
     return DriverLag(size, turning, periodic)
 
 
 def turned_to_laws(
     model: Model, lag: DriverLag, start: Coordinates, displace: Displace
 ) -> tuple[Coordinates, AttitudeHistory | None] | None:
-    """Follow the mechanism from where drivers are as in the guess to where they fulfill their laws.
+    """Follow the mechanism from the drivers of the guess to those of the laws, in steps.
 
     Parameters
     ----------
@@ -118,16 +118,16 @@ def turned_to_laws(
             if turns > MOST_FOLLOWED:
                 return None
             skipped = 0  # drivers that turn unlike each other: no turn is like the last
-        found = _corrected(states[-1], increment, lambda r, p=part: lag.open(r, p), displace)
-        if found is None:
+        corrected = _corrected(states[-1], increment, lambda r, p=part: lag.open(r, p), displace)
+        if corrected is None:
             return None
-        coordinates, increment = found
+        coordinates, increment = corrected
         states.append(coordinates)
     last = states[-1] if last is None else last
     if "quaternion" not in last:
         return last, None
-    places = [np.asarray(place["quaternion"]) for place in (model.guess, *states)]
-    return last, AttitudeHistory(np.concatenate(places, axis=-1), np.zeros(len(places)), STEPS_A_TURN, skipped)
+    attitudes = [np.asarray(state["quaternion"]) for state in (model.guess, *states)]
+    return last, AttitudeHistory(np.concatenate(attitudes, axis=-1), np.zeros(len(attitudes)), STEPS_A_TURN, skipped)
 
 
 def _corrected(
@@ -136,7 +136,7 @@ def _corrected(
     opened: Callable[[np.ndarray], np.ndarray],
     displace: Displace,
 ) -> tuple[Coordinates, Float[np.ndarray, " column"]] | None:
-    """Return coordinates a step on, and the step; None where Newton-Raphson does not go there."""
+    """Return the coordinates after a step, and the step; None where Newton-Raphson does not converge."""
     whole, trial = increment, displace(coordinates, increment)
     for _ in range(CORRECTIONS):
         step = trial[2].step(opened(trial[1]))
@@ -149,7 +149,7 @@ def _corrected(
 
 
 def _repeated(states: list[Coordinates], turns: int) -> Coordinates | None:
-    """Return the end of a course after further turns, each like the last; None if that did not lead back."""
+    """Return the coordinates after further turns, each like the last; None if the last turn did not close."""
     before, after = states[-1 - STEPS_A_TURN], states[-1]
     for name, value in after.items():
         away = value - before[name]
@@ -163,7 +163,7 @@ def _repeated(states: list[Coordinates], turns: int) -> Coordinates | None:
 
 
 def nearest_turns(
-    guess: dict[str, Any], found: Coordinates, residual_at: Callable[[np.ndarray], np.ndarray]
+    guess: dict[str, Any], coordinates: Coordinates, residual_at: Callable[[np.ndarray], np.ndarray]
 ) -> Coordinates:
     """Return planar coordinates with every angle shifted by the whole turns that bring it nearest to the guess.
 
@@ -171,18 +171,18 @@ def nearest_turns(
 
     Parameters
     ----------
-    guess, found : dict of str to array
+    guess, coordinates : dict of str to array
         Coordinates of all bodies, the ground first.
     residual_at : callable
         Returns the scaled residual at some angles, shape (rows,).
     """
-    away = ((np.asarray(guess["angle"]) - found["angle"]) / WHOLE_TURN)[1:, 0]
+    away = ((np.asarray(guess["angle"]) - coordinates["angle"]) / WHOLE_TURN)[1:, 0]
     if not np.round(away).any():
-        return found
-    still = residual_at(found["angle"])
+        return coordinates
+    still = residual_at(coordinates["angle"])
 
     def shifted(turns: np.ndarray) -> np.ndarray:
-        return found["angle"] + WHOLE_TURN * np.concatenate([[0.0], turns])[:, None]
+        return coordinates["angle"] + WHOLE_TURN * np.concatenate([[0.0], turns])[:, None]
 
     bodies = np.arange(len(away))
     changes = np.stack([residual_at(shifted((bodies == k) * 1.0)) - still for k in bodies])
@@ -199,12 +199,12 @@ def nearest_turns(
         members = np.array(sorted(together))
         turns[members] = _together(changes[members], away[members])
     if not turns.any() or np.max(np.abs(residual_at(shifted(turns)) - still)) > 1e-6:
-        return found
-    return {**found, "angle": shifted(turns)}
+        return coordinates
+    return {**coordinates, "angle": shifted(turns)}
 
 
 def _together(changes: Float[np.ndarray, "body row"], away: Float[np.ndarray, " body"]) -> Float[np.ndarray, " body"]:
-    """Return the whole turns, nearest to those wanted, that change no row; changes of one turn are (bodies, rows)."""
+    """Return the whole turns, nearest to given ones, that change no row; changes of one turn are (bodies, rows)."""
     if np.max(np.abs(np.round(away) @ changes)) < 1e-6:
         return np.round(away)
     left, sizes, _ = np.linalg.svd(changes)

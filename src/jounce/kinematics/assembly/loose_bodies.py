@@ -1,4 +1,4 @@
-"""Bodies that hang loose: those that can move and that one joint alone holds, or none, as where one is missing."""
+"""Loose bodies: movable ones that one joint or none holds, which suggests a missing joint."""
 
 from collections.abc import Sequence
 
@@ -13,15 +13,15 @@ MOST_NAMED = 3
 def joints_of(model: Model) -> dict[str, list[str]]:
     """Return the names of the joints that hold each body, drivers left out."""
     names = (GROUND, *model.bodies)
-    found: dict[str, list[str]] = {name: [] for name in names}
+    joints: dict[str, list[str]] = {name: [] for name in names}
     for group, rows in zip(model.system.groups, group_rows(model), strict=True):
         for k, row in enumerate(model.rows[rows][: group.instances]):
             kind, _, name = row.partition(".")
             if kind == "joints":
                 for slot in group.bodies:
-                    if name not in found[names[slot[k]]]:
-                        found[names[slot[k]]].append(name)
-    return found
+                    if name not in joints[names[slot[k]]]:
+                        joints[names[slot[k]]].append(name)
+    return joints
 
 
 def missing_joint_words(model: Model, moving: Sequence[str], left: int) -> str:
@@ -40,10 +40,10 @@ def missing_joint_words(model: Model, moving: Sequence[str], left: int) -> str:
     loose = [body for body in moving if len(joints[body]) <= 1]
     if not loose or (len(loose) == 1 and left == 1 and joints[loose[0]]):
         return ""  # a crank, which a driver may be missing of
-    held = [f"by {joints[body][0]} alone" if joints[body] else "by no joint" for body in loose]
-    first, *others = zip(loose, held, strict=True)
-    told = [f"{first[0]} is held {first[1]}", *map(" ".join, others[: MOST_NAMED - 1])]
-    words = f"{', '.join(told)}{', ...' if len(held) > MOST_NAMED else ''}"
+    supports = [f"by {joints[body][0]} alone" if joints[body] else "by no joint" for body in loose]
+    first, *others = zip(loose, supports, strict=True)
+    phrases = [f"{first[0]} is held {first[1]}", *map(" ".join, others[: MOST_NAMED - 1])]
+    words = f"{', '.join(phrases)}{', ...' if len(supports) > MOST_NAMED else ''}"
     if len(loose) != 2:
         return f"{words}: is a joint missing?"
     components = model.pose_type.shifts

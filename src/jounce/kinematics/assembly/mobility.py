@@ -1,7 +1,7 @@
-"""How a mechanism can move from a position: by the count of its equations, by their rank, and in fact.
+"""Mobility at a position: by the count of equations, by their rank, and by finite motions.
 
-A velocity that all joints allow may be no motion: equations of a higher order may block it. Which go on, and where they
-branch, follows from the series of the constraints (`mobility_series`, `tangent_cone`).
+A velocity that all joints allow may be no motion: equations of a higher order may block it. The series of the
+constraints tell which velocities continue, and where they branch (`constraint_series`, `tangent_cone`).
 """
 
 import dataclasses
@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.errors import MechanismError, whole_number
-from jounce.kinematics.assembly.assemble import check_assembled, redundancy_of, settled
+from jounce.kinematics.assembly.assemble import check_assembled, find_assembly, redundancy_of
 from jounce.kinematics.assembly.constraint_series import SINGULAR, ReducedConstraints
 from jounce.kinematics.assembly.gauss_newton import AssemblyAttempt, Displacements, assemble_from_guess
 from jounce.kinematics.assembly.initial_revolutions import Coordinates, Displace
@@ -57,8 +57,8 @@ class Branch:
         turning = {name: _turn(vectors[0]) for name, vectors in self.tangents.items()}
         most = max(turning.values(), key=abs, default=0.0)
         if self.freedom == 1 and most:
-            told = [f"{name} {turn / most + 0.0:.3g}" for name, turn in turning.items()]
-            return ", ".join(told[:6]) + (", ..." if len(told) > 6 else "")
+            phrases = [f"{name} {turn / most + 0.0:.3g}" for name, turn in turning.items()]
+            return ", ".join(phrases[:6]) + (", ..." if len(phrases) > 6 else "")
         moving = [name for name, vectors in self.tangents.items() if np.abs(vectors).max(initial=0.0) > 1e-9]
         return f"{_freedom(self.freedom)} of {', '.join(moving[:6])}{', ...' if len(moving) > 6 else ''}"
 
@@ -129,7 +129,7 @@ def independent(coordinates: int, equations: int) -> Mobility:
 
 @concrete
 def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -> Mobility:
-    """Return how a mechanism can move from where it is put together: by count, by rank, and to a finite extent.
+    """Return the mobility of a mechanism at its assembled position: by count, by rank, and by finite motions.
 
     Drivers and initial conditions hold it at the position, and are released there.
 
@@ -174,36 +174,36 @@ def mobility(mechanism: Mechanism, time: float | None = None, order: int = 10) -
     order = whole_number("order", order, 2, HIGHEST_ORDER, error=MechanismError)
     if time is None:
         time = 0.0 if mechanism.time is None else float(time_grid(mechanism.time, mechanism.parameter_values)[0])
-    model, coordinates, found = _released(mechanism, time)
+    model, coordinates, attempt = _released(mechanism, time)
     columns, rows = model.system.shape[1], len(model.rows)
     if not rows:
         return independent(columns, 0)
-    matrix = found.jacobian.dense()
+    matrix = attempt.jacobian.dense()
     sizes = np.linalg.svd(matrix, compute_uv=False)
     if np.sum(sizes > SINGULAR * sizes.max()) == rows:
         return independent(columns, rows)
     constraints = ReducedConstraints.at(model, coordinates, matrix, order)
-    told = redundancy_of(model, found, time)[1]
-    return dataclasses.replace(_analyzed(constraints, Displacements(model, time)), repetitions=told.repetitions)
+    redundant = redundancy_of(model, attempt, time)[1]
+    return dataclasses.replace(_analyzed(constraints, Displacements(model, time)), repetitions=redundant.repetitions)
 
 
 def _released(mechanism: Mechanism, time: float) -> tuple[Model, Coordinates, AssemblyAttempt]:
     """Return the model of the joints alone, where drivers hold it, with rows of one size."""
-    held = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={}, outputs={})
-    model = build(held)
+    driven = dataclasses.replace(mechanism, drivers={**mechanism.drivers, **mechanism.initial}, initial={}, outputs={})
+    model = build(driven)
     coordinates = model.guess
     if model.rows:
-        model, found = settled(model, time, TOLERANCE)
-        check_assembled(model, found, time, free=True)
-        coordinates = found.coordinates
-    model = build(dataclasses.replace(held, drivers={}, forces={}))
+        model, attempt = find_assembly(model, time, TOLERANCE)
+        check_assembled(model, attempt, time, free=True)
+        coordinates = attempt.coordinates
+    model = build(dataclasses.replace(driven, drivers={}, forces={}))
     if not model.rows:
         nothing = HostJacobian.of(model.system.pattern, np.zeros(model.system.pattern.entry_count))
         return model, coordinates, AssemblyAttempt(coordinates, np.ones(0), np.zeros(0), nothing, True)
     model, _ = with_reference(model, coordinates, time)
-    found = assemble_from_guess(model, time, TOLERANCE, coordinates)
-    system = with_fields(model.system, row_scale=found.scale[:, None])
-    return dataclasses.replace(model, system=system), found.coordinates, found
+    attempt = assemble_from_guess(model, time, TOLERANCE, coordinates)
+    system = with_fields(model.system, row_scale=attempt.scale[:, None])
+    return dataclasses.replace(model, system=system), attempt.coordinates, attempt
 
 
 def _analyzed(constraints: ReducedConstraints, displace: Displace) -> Mobility:
@@ -214,10 +214,10 @@ def _analyzed(constraints: ReducedConstraints, displace: Displace) -> Mobility:
         return Mobility(columns, rows, 0, 0, None, "rigid")
     if _all_go_on(constraints):
         return Mobility(columns, rows, left, left, order, "regular", None, (_whole(constraints),))
-    found = curves(constraints)
-    going = [curve for curve in found if curve.order == order]
+    local_curves = curves(constraints)
+    going = [curve for curve in local_curves if curve.order == order]
     branches = _branches(constraints, going, displace)
-    blocked = max((curve.order + 1 for curve in found if curve.order < order), default=2)
+    blocked = max((curve.order + 1 for curve in local_curves if curve.order < order), default=2)
     finite = max((branch.freedom for branch in branches), default=0)
     if not branches:
         moves = _moves_by_trial(constraints, displace)
@@ -229,7 +229,7 @@ def _analyzed(constraints: ReducedConstraints, displace: Displace) -> Mobility:
 
 
 def _all_go_on(constraints: ReducedConstraints) -> bool:
-    """Tell whether all velocities can be continued, as far as some of them taken at random tell."""
+    """Tell whether all velocities can be continued, by a sample of random ones."""
     count = constraints.free.shape[1]
     some = np.random.default_rng(2).standard_normal((RANDOM_CURVES, count))
     series = np.zeros((RANDOM_CURVES, constraints.order, count))
@@ -243,7 +243,7 @@ def _whole(constraints: ReducedConstraints) -> Branch:
 
 
 def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], displace: Displace) -> tuple[Branch, ...]:
-    """Return the branches that curves belong to: those whose tangent spaces a little way on are alike are one."""
+    """Return the branches of curves: curves with the same tangent space a little further on are one branch."""
     members: list[tuple[np.ndarray, list[LocalCurve]]] = []
     for curve in going:
         coefficients = constraints.along(curve.series[None])[2][0]
@@ -258,22 +258,22 @@ def _branches(constraints: ReducedConstraints, going: Sequence[LocalCurve], disp
                 break
         else:
             members.append((space, [curve]))
-    found = []
+    branches = []
     for space, its in members:
         velocities = np.stack([constraints.free @ curve.tangent for curve in its])
         tangents = np.linalg.svd(velocities)[2][: len(space)] if len(its) > 1 else velocities
         cusp = all(curve.multiplicity > 1 for curve in its)
-        found.append(Branch(len(space), _by_body(constraints, tangents), cusp))
-    return tuple(sorted(found, key=lambda branch: branch.freedom))
+        branches.append(Branch(len(space), _by_body(constraints, tangents), cusp))
+    return tuple(sorted(branches, key=lambda branch: branch.freedom))
 
 
 def _moves_by_trial(constraints: ReducedConstraints, displace: Displace) -> bool:
-    """Tell whether bodies that are displaced along a velocity that is free can be put together where they are."""
+    """Tell whether bodies displaced along a free velocity can be assembled there."""
     everything = np.ones(len(constraints.dependent), bool)
     random = np.random.default_rng(3).standard_normal((2 * RANDOM_CURVES, constraints.free.shape[1]))
-    ways = np.concatenate([np.eye(random.shape[1]), -np.eye(random.shape[1]), random])
-    for way in ways:
-        sway = constraints.free @ way
+    directions = np.concatenate([np.eye(random.shape[1]), -np.eye(random.shape[1]), random])
+    for direction in directions:
+        sway = constraints.free @ direction
         sway *= FARTHER / np.abs(sway).max()
         if closed_nearby(constraints.coordinates, sway, everything, displace) is not None:
             return True
@@ -301,22 +301,22 @@ def _freedom(number: int) -> str:
     return f"{number} degree{'' if number == 1 else 's'} of freedom"
 
 
-def facts_of(found: Mobility) -> dict[str, Any]:
+def facts_of(result: Mobility) -> dict[str, Any]:
     """Return a mobility as plain data."""
     return {
-        "count": found.count,
-        "instantaneous": found.instantaneous,
-        "finite": found.finite,
-        "order": found.order,
-        "kind": found.kind,
-        "blocked": found.blocked,
+        "count": result.count,
+        "instantaneous": result.instantaneous,
+        "finite": result.finite,
+        "order": result.order,
+        "kind": result.kind,
+        "blocked": result.blocked,
         "branches": [
             {
                 "freedom": branch.freedom,
                 "cusp": branch.cusp,
                 "tangents": {name: vectors.tolist() for name, vectors in branch.tangents.items()},
             }
-            for branch in found.branches
+            for branch in result.branches
         ],
-        "words": str(found),
+        "words": str(result),
     }

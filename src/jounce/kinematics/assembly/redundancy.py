@@ -1,7 +1,7 @@
-"""Redundant constraints: found by the rank of the Jacobian at several positions, and told by which joint repeats which.
+"""Redundant constraints: found by the rank of the Jacobian at several positions, with the joints that repeat others.
 
-The rank may be low at one position only, at a dead point or where bodies happen to be aligned. So it is judged in
-general positions near the one assembled, which the joints allow: on the way there drivers let go.
+The rank may be low at one position only, at a dead point or where bodies happen to be aligned. So it is taken at
+nearby general positions that fulfill the joints, with the drivers released.
 """
 
 import dataclasses
@@ -102,7 +102,7 @@ class Redundancy:
 
 
 def redundancy(model: Model, coordinates: Coordinates, jacobian: HostJacobian, displace: Displace) -> Redundancy:
-    """Return which rows of a mechanism that was put together follow from others.
+    """Return which rows of an assembled mechanism are redundant.
 
     Parameters
     ----------
@@ -143,20 +143,20 @@ def _next_to_singular(coordinates: Coordinates, jacobian: HostJacobian, displace
 
 
 def _nearby(model: Model, coordinates: Coordinates, jacobian: HostJacobian, displace: Displace) -> list[HostJacobian]:
-    """Return the Jacobians at positions in general near one, as many as are found."""
+    """Return the Jacobians at general positions near one; random displacements that do not close are left out."""
     joints = np.array([name.startswith("joints.") for name in model.rows], bool)
     directions = jacobian.take(joints).free_directions
     if not len(directions):
         return []
-    random, found = np.random.default_rng(1), []  # any directions do, the same each time
+    random, jacobians = np.random.default_rng(1), []  # any directions do, the same each time
     for _ in range(POSITIONS):
         sway = random.normal(size=len(directions)) @ directions
         for size in SWAYS:
             there = closed_nearby(coordinates, size * sway / np.abs(sway).max(), joints, displace)
             if there is not None:
-                found.append(there)
+                jacobians.append(there)
                 break
-    return found or _along_curves(model, coordinates, jacobian, joints, displace)
+    return jacobians or _along_curves(model, coordinates, jacobian, joints, displace)
 
 
 def _along_curves(
@@ -167,13 +167,13 @@ def _along_curves(
         return []
     constraints = ReducedConstraints.at(model, coordinates, jacobian.dense(), CURVE_ORDER, joints)
     going = [curve for curve in curves(constraints) if curve.order == CURVE_ORDER]
-    found = []
+    jacobians = []
     for curve in going:
         coefficients = constraints.along(curve.series[None])[2][0]
         sway = constraints.placed(coefficients, SWAYS[-1] ** (1.0 / curve.multiplicity))
         there = closed_nearby(coordinates, sway, joints, displace)
-        found += [] if there is None else [there]
-    return found
+        jacobians += [] if there is None else [there]
+    return jacobians
 
 
 def closed_nearby(
@@ -192,17 +192,17 @@ def closed_nearby(
     displace : callable
         As `redundancy` takes it.
     """
-    place, step, gone = displace(coordinates, sway), sway, sway
+    displaced, step, total = displace(coordinates, sway), sway, sway
     for _ in range(MOST_STEPS):
-        correction = place[2].take(joints).step(place[1][joints])
+        correction = displaced[2].take(joints).step(displaced[1][joints])
         if correction is None or np.abs(correction).max(initial=0.0) > 1.0:
             return None
-        place, step, gone = displace(place[0], correction), correction, gone + correction
+        displaced, step, total = displace(displaced[0], correction), correction, total + correction
         if np.abs(step).max(initial=0.0) < 1e-12:
             break
-    away = np.abs(gone).max(initial=0.0)
-    open_ = np.abs(place[1][joints]).max(initial=0.0)
-    return place[2] if open_ <= CLOSED and away > 0.1 * np.abs(sway).max() else None
+    away = np.abs(total).max(initial=0.0)
+    open_ = np.abs(displaced[1][joints]).max(initial=0.0)
+    return displaced[2] if open_ <= CLOSED and away > 0.1 * np.abs(sway).max() else None
 
 
 def repetitions(rows: tuple[str, ...], combinations: Float[np.ndarray, "row combination"]) -> tuple[Repetition, ...]:
@@ -217,7 +217,7 @@ def repetitions(rows: tuple[str, ...], combinations: Float[np.ndarray, "row comb
     """
     names = list(dict.fromkeys(rows))
     parts = {name: combinations[[k for k, row in enumerate(rows) if row == name]] for name in names}
-    found = []
+    repeated = []
     while combinations.shape[1]:
         ranks = {name: _rank(part) for name, part in parts.items()}
         most = max(ranks.values())
@@ -227,10 +227,10 @@ def repetitions(rows: tuple[str, ...], combinations: Float[np.ndarray, "row comb
         its, rest = turned[:most].T, turned[most:].T
         others = [other for other in names if other != name and np.linalg.norm(parts[other] @ its) > OPEN]
         kind, _, plain = name.partition(".")
-        found.append(Repetition(KINDS.get(kind, kind), plain, most, tuple(x.partition(".")[2] for x in others)))
+        repeated.append(Repetition(KINDS.get(kind, kind), plain, most, tuple(x.partition(".")[2] for x in others)))
         combinations = combinations @ rest
         parts = {name: part @ rest for name, part in parts.items()}
-    return tuple(found)
+    return tuple(repeated)
 
 
 def _rank(part: Float[np.ndarray, "row combination"]) -> int:

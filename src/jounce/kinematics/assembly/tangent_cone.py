@@ -52,22 +52,22 @@ class LocalCurve:
 def curves(constraints: ReducedConstraints) -> list[LocalCurve]:
     """Return the curves through a position, one for each tangent that is found: those that go on, and the others.
 
-    Of a continuum of tangents, as where two degrees of freedom are left, a few are told.
+    Of a continuum of tangents, as where two degrees of freedom are left, a few are returned.
     """
     tangents = _distinct([*_quadratic_tangents(constraints)])
-    found = []
+    branches = []
     for tangent in tangents:
         smooth = _continued(constraints, tangent, 1)
         if smooth.order < constraints.order:
-            found += [smooth] if (turning := _cusp(constraints, tangent)) is None else [turning]
+            branches += [smooth] if (turning := _cusp(constraints, tangent)) is None else [turning]
         else:
-            found.append(smooth)
-    return found
+            branches.append(smooth)
+    return branches
 
 
 def _cusp(constraints: ReducedConstraints, tangent: Float[np.ndarray, " k"]) -> LocalCurve | None:
-    for sense in (1.0, -1.0):
-        curve = _continued(constraints, sense * tangent, 2)
+    for sign in (1.0, -1.0):
+        curve = _continued(constraints, sign * tangent, 2)
         if curve.order == constraints.order:
             return curve
     return None
@@ -158,8 +158,8 @@ def _fulfilling(constraints: ReducedConstraints, series: Series, multiplicity: i
     gap, allowed = constraints.gap(with_values(values[None]), order)
     for _ in range(STEPS):
         if (np.abs(gap[0]) <= allowed[0]).all():
-            found = with_values(values[None])[0]
-            return found if np.linalg.norm(found[multiplicity - 1]) > 0.5 else None
+            value = with_values(values[None])[0]
+            return value if np.linalg.norm(value[multiplicity - 1]) > 0.5 else None
         nudged = values + DIFFERENCE * np.concatenate([np.eye(values.size), -np.eye(values.size)])
         ahead, behind = np.split(constraints.gap(with_values(nudged), order)[0], 2)
         weights = 1.0 / allowed[0]

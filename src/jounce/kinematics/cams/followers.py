@@ -229,8 +229,8 @@ class OscillatingFollower(AbstractFollower):
         with np.errstate(invalid="ignore", divide="ignore"):
             if self.is_flat:
                 sine = self.face_offset / away
-                found = above + np.arcsin(sine)
-                return np.where(np.abs(sine) <= 1, found, -np.inf)
+                coordinate = above + np.arcsin(sine)
+                return np.where(np.abs(sine) <= 1, coordinate, -np.inf)
             cosine = (self.arm**2 + away**2 - self.radius**2) / (2 * self.arm * away)
             if not self.radius:
                 return np.where(np.abs(away - self.arm) <= 1e-9 * self.arm, above, -np.inf)

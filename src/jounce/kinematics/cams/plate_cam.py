@@ -35,7 +35,7 @@ from jounce.units.shown_units import ShownUnits
 if TYPE_CHECKING:
     import xarray
 
-SENSES = {"counterclockwise": 1.0, "clockwise": -1.0}
+SIGNS = {"counterclockwise": 1.0, "clockwise": -1.0}
 CLOSED = 1e-9  # of the rise: so near to where it began a law ends
 ORDER = 3  # of the jets: positions, tangents, and how they turn
 BENT = 1e-9  # of how far a normal turns: less is straight
@@ -100,7 +100,7 @@ class PlateCam(Displayed):
     @cached_property
     def largest_pressure_angle(self) -> Extreme:
         """The pressure angle that is farthest from zero, with its sign, rad."""
-        return self._extreme(lambda found: np.abs(found.pressure_angle), lambda found: found.pressure_angle)
+        return self._extreme(lambda geometry: np.abs(geometry.pressure_angle), lambda geometry: geometry.pressure_angle)
 
     @cached_property
     def least_radius(self) -> Extreme | None:
@@ -129,8 +129,8 @@ class PlateCam(Displayed):
         """
         if not self.follower.is_flat:
             return None
-        low = self._extreme(lambda found: -found.contact, lambda found: found.contact)
-        return low, self._extreme(lambda found: found.contact, lambda found: found.contact)
+        low = self._extreme(lambda geometry: -geometry.contact, lambda geometry: geometry.contact)
+        return low, self._extreme(lambda geometry: geometry.contact, lambda geometry: geometry.contact)
 
     @cached_property
     def undercuts(self) -> tuple[Undercut, ...]:
@@ -145,25 +145,25 @@ class PlateCam(Displayed):
 
         The profile is taken as it is cut, by points; where it is not undercut, the lift is that of the law.
         """
-        return Cutter(self.follower, self.base_radius, SENSES[self.sense]).followed(self.angle, self.table, self.at)
+        return Cutter(self.follower, self.base_radius, SIGNS[self.sense]).followed(self.angle, self.table, self.at)
 
     @cached_property
     def dataset(self) -> "xarray.Dataset":
         """The table as an `xarray.Dataset` along the cam angle, SI, units in the attributes."""
         import xarray
 
-        found, lift = self.table, "rad" if self.follower.turning else "m"
+        geometry, lift = self.table, "rad" if self.follower.turning else "m"
         columns = {
-            "lift": (found.lift, lift),
-            "x": (found.profile[0], "m"),
-            "y": (found.profile[1], "m"),
-            "pitch_x": (found.pitch[0], "m"),
-            "pitch_y": (found.pitch[1], "m"),
-            "pressure_angle": (found.pressure_angle, "rad"),
-            "curvature": (found.curvature, "1/m"),
+            "lift": (geometry.lift, lift),
+            "x": (geometry.profile[0], "m"),
+            "y": (geometry.profile[1], "m"),
+            "pitch_x": (geometry.pitch[0], "m"),
+            "pitch_y": (geometry.pitch[1], "m"),
+            "pressure_angle": (geometry.pressure_angle, "rad"),
+            "curvature": (geometry.curvature, "1/m"),
         }
         if self.follower.is_flat:
-            columns["contact"] = (found.contact, "m")
+            columns["contact"] = (geometry.contact, "m")
             del columns["pitch_x"], columns["pitch_y"]
         variables = {name: ("angle", values, {"units": u, "long_name": name}) for name, (values, u) in columns.items()}
         dataset = xarray.Dataset(variables, coords={"angle": ("angle", self.angle, {"units": "rad"})})
@@ -172,13 +172,13 @@ class PlateCam(Displayed):
     def _least_radius(self, sign: float) -> Extreme | None:
         """Return the smallest radius of curvature where the profile is convex, or concave."""
 
-        def radius(found: Geometry) -> Numbers1:
-            bent = sign * found.turned > BENT * np.abs(found.turned).max(initial=0.0)
-            return np.where(bent, found.forward / np.where(bent, sign * found.turned, 1.0), np.inf)
+        def radius(geometry: Geometry) -> Numbers1:
+            bent = sign * geometry.turned > BENT * np.abs(geometry.turned).max(initial=0.0)
+            return np.where(bent, geometry.forward / np.where(bent, sign * geometry.turned, 1.0), np.inf)
 
         if not np.isfinite(radius(self.table)).any():
             return None
-        return self._extreme(lambda found: -radius(found), radius)
+        return self._extreme(lambda geometry: -radius(geometry), radius)
 
     def _extreme(self, size: Any, value: Any) -> Extreme:
         """Return the largest of a size, looked for nearer and nearer around the largest of the table."""
@@ -243,7 +243,7 @@ def plate_cam(
         raise TrajectoryError("must be a motion law, or an expression of t, the cam angle", name="law", value=law)
     if not isinstance(follower, AbstractFollower):
         raise MechanismError("must be a TranslatingFollower or an OscillatingFollower", name="follower", value=follower)
-    check_choice("sense", sense, tuple(SENSES), MechanismError)
+    check_choice("sense", sense, tuple(SIGNS), MechanismError)
     count = whole_number("count", count, 16, MOST, error=TrajectoryError)
     angle = np.linspace(0.0, WHOLE_TURN, count)
     cam = PlateCam(law, follower, positive("base_radius", base_radius), sense, angle, title)
@@ -281,7 +281,7 @@ def _check(cam: PlateCam) -> None:
 
 def _geometry(cam: PlateCam, angles: Numbers1) -> Geometry:
     """Return a cam at cam angles, from jets by the cam angle in the frame of the cam."""
-    follower, sense = cam.follower, SENSES[cam.sense]
+    follower, sense = cam.follower, SIGNS[cam.sense]
     theta = Jet.variable(angles, ORDER)
     lift = cam.law(theta)
     coordinate = lift + follower.start(cam.base_radius)
@@ -300,10 +300,10 @@ def _geometry(cam: PlateCam, angles: Numbers1) -> Geometry:
         profile = pitch - normal * follower.radius
     forward, around = (_dot(tangent, curve.differentiate()) for curve in (profile, pitch))
     turned = _dot(tangent, normal.differentiate())
-    place = rotated(pitch, -back)
-    travel = rotated(follower.travel(coordinate, place), back)
+    center = rotated(pitch, -back)
+    travel = rotated(follower.travel(coordinate, center), back)
     pressure = atan2((travel[0] * normal[1] - travel[1] * normal[0]) * sense, _dot(travel, normal))
-    contact = follower.along_face(coordinate, place) if follower.is_flat else lift * 0.0
+    contact = follower.along_face(coordinate, center) if follower.is_flat else lift * 0.0
     jets = (lift, pitch, profile, pressure, forward, around, turned, contact)
     return Geometry(*(np.asarray(jet.coefficients[0]) for jet in jets))
 

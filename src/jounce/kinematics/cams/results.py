@@ -1,4 +1,4 @@
-"""What is told of a cam: its shape, extremes with the cam angles where they are, and undercut."""
+"""Results of a cam: its shape, extremes with the cam angles where they are, and undercut."""
 
 import dataclasses
 from typing import NamedTuple

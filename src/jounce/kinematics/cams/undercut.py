@@ -62,14 +62,14 @@ class Cutter:
     def _size(self) -> float:
         return 1.0 if self.follower.turning else self.base_radius
 
-    def _left(self, angle: Numbers1, found: Geometry) -> Float[np.ndarray, "2 left"]:
+    def _left(self, angle: Numbers1, geometry: Geometry) -> Float[np.ndarray, "2 left"]:
         """Return the points of a profile through which the follower passes at no cam angle."""
         start, turns = self.follower.start(self.base_radius), self.sense * angle
         cut = np.zeros(len(angle), bool)
         for rows in _chunks(len(turns)):
-            touched = self._touching(found.profile, turns[rows])
-            cut |= np.any(touched > (start + found.lift[rows] + LOST * self._size)[:, None], axis=0)
-        return found.profile[:, ~cut]
+            touched = self._touching(geometry.profile, turns[rows])
+            cut |= np.any(touched > (start + geometry.lift[rows] + LOST * self._size)[:, None], axis=0)
+        return geometry.profile[:, ~cut]
 
     def _touching(
         self, points: Float[np.ndarray, "2 point"], turns: Float[np.ndarray, " turn"]
@@ -87,7 +87,7 @@ def _chunks(count: int) -> list[slice]:
 
 def runs(angle: Numbers1, lost: Numbers1, where: Bool[np.ndarray, " angle"]) -> list[Undercut]:
     """Return the parts of a turn in which lift is lost, one through zero as a whole."""
-    found, marks = [], where[:-1]  # the last angle is the first one
+    intervals, marks = [], where[:-1]  # the last angle is the first one
     if marks.all():
         worst = int(np.argmax(lost))
         return [Undercut(0.0, WHOLE_TURN, float(angle[worst]), float(lost[worst]))]
@@ -98,5 +98,5 @@ def runs(angle: Numbers1, lost: Numbers1, where: Bool[np.ndarray, " angle"]) -> 
         inside = order[low:high]
         worst = inside[int(np.argmax(lost[inside]))]
         start, stop, most = (float(angle[k]) for k in (inside[0], inside[-1], worst))
-        found.append(Undercut(start, stop, most, float(lost[worst])))
-    return found
+        intervals.append(Undercut(start, stop, most, float(lost[worst])))
+    return intervals

@@ -1,4 +1,4 @@
-"""Instants next to a change point, read off the motion on both sides of it.
+"""Instants next to a change point, interpolated from the motion on both sides.
 
 At a change point the Jacobian is singular, and near it derivatives lose digits: a distance in time of d radii of the
 Taylor series away, that of order k is good to about ``eps k! / d^(k + 1)``. The motion itself is smooth there. Its jets
@@ -38,11 +38,11 @@ def spoiled_width(point: ChangePoint, order: int) -> float:
 def spoiled(
     points: Iterable[ChangePoint], instants: Float[np.ndarray, " time"], order: int
 ) -> Bool[np.ndarray, " time"]:
-    """Tell at which instants what follows from the factored Jacobian is mostly rounding at an order."""
-    found = np.zeros(len(instants), bool)
+    """Tell at which instants solutions by the factored Jacobian are mostly rounding at an order."""
+    affected = np.zeros(len(instants), bool)
     for point in points:
-        found |= np.abs(instants - point.instant) < spoiled_width(point, order)
-    return found
+        affected |= np.abs(instants - point.instant) < spoiled_width(point, order)
+    return affected
 
 
 def bridged(
@@ -81,13 +81,13 @@ def _interpolated(before: Anchor, after: Anchor, instants: Float[np.ndarray, " t
     """Return the jets of the state at instants between two anchors, by Hermite interpolation of both their jets."""
     from scipy.interpolate import BPoly  # here, since importing SciPy takes half a second
 
-    span = after.instant - before.instant
-    place = (instants - before.instant) / span
+    duration = after.instant - before.instant
+    share = (instants - before.instant) / duration
 
     def between(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-        scale = np.array([math.factorial(k) * span**k for k in range(len(left))])
+        scale = np.array([math.factorial(k) * duration**k for k in range(len(left))])
         curve = BPoly.from_derivatives([0.0, 1.0], [x.reshape(len(x), -1) * scale[:, None] for x in (left, right)])
-        values = np.stack([curve(place, nu=k).T / scale[k] for k in range(len(left))])
+        values = np.stack([curve(share, nu=k).T / scale[k] for k in range(len(left))])
         return values.reshape(*left.shape[:-1], len(instants))
 
     return jax.tree.map(between, before.state[:2], after.state[:2])

@@ -34,7 +34,7 @@ Number = Float[Numbers, ""]
 
 
 class Settings(NamedTuple):
-    """How exactly instants are solved; see `advance`."""
+    """Tolerances of the solution of instants; see `advance`."""
 
     tolerance: Number
     refine: Bool[Numbers, ""]
@@ -43,7 +43,7 @@ class Settings(NamedTuple):
 
 
 class StepState(NamedTuple):
-    """How a run stands between two batches."""
+    """State of a run between two batches."""
 
     known: SolvedState  # what a prediction needs of the last anchor, in all lanes
     control: StepControl  # of the step that is tried next
@@ -54,7 +54,7 @@ class StepState(NamedTuple):
 
 
 class Records(NamedTuple):
-    """What came of each batch, batches first; of a lane that solved an instant of the grid, which one, or -1."""
+    """Records of all batches, batches first; of a lane that solved an instant of the grid, which one, or -1."""
 
     coordinates: dict[str, Numbers]
     outputs: tuple[Numbers, ...]
@@ -66,7 +66,7 @@ class Records(NamedTuple):
 
 
 class TakenSteps(NamedTuple):
-    """What came of a run."""
+    """Outcome of a run."""
 
     run: StepState
     records: Records
@@ -85,7 +85,7 @@ def _calls_code(*_: Any, native: str | None, **__: Any) -> bool:
 @compiled(
     *("pose_type", "order", "batches", "native"),
     narrow=True,
-    alone=_calls_code,
+    single=_calls_code,
     otherwise={"native": None},  # where there is no code for a run, XLA has none to call
 )
 def take_steps(
@@ -116,7 +116,7 @@ def take_steps(
     most : int
         Batches that it may solve.
     pose_type, order
-        PlanarPose or SpatialPose; derivatives wanted.
+        PlanarPose or SpatialPose; derivatives requested.
     batches : int
         As many as there is room for.
     native : str, optional
@@ -141,9 +141,9 @@ def take_steps(
     def go_on(state: TakenSteps) -> TakenSteps:
         arrival = _typed(solved(state.run), blank)
         known = predictor(system, pose_type, (arrival.coordinates, arrival.outputs, arrival.sign))
-        run, found = _after(state.run, arrival, known, grid, limits)
+        run, record = _after(state.run, arrival, known, grid, limits)
         put = jax.lax.dynamic_update_index_in_dim
-        records = jax.tree.map(lambda xs, x: put(xs, x, state.count, 0), state.records, _typed(found, state.records))
+        records = jax.tree.map(lambda xs, x: put(xs, x, state.count, 0), state.records, _typed(record, state.records))
         return TakenSteps(_typed(run, state.run), records, arrival, state.count + 1)
 
     shapes = jax.eval_shape(solved, run)
@@ -166,7 +166,7 @@ def _typed(values: Any, like: Any) -> Any:
 
 
 def _planned(run: StepState, grid: Float[Numbers, " time"], limits: StepLimits) -> StepState:
-    """Return the run with its next step, or why there is none."""
+    """Plan the next step of a run, or end it with a reason."""
     return _aimed(run, plan_next_step(run.control, limits), grid)
 
 
@@ -188,7 +188,7 @@ def _after(
     grid: Float[Numbers, " time"],
     limits: StepLimits,
 ) -> tuple[StepState, Records]:
-    """Return how the run stands after a batch, and what is recorded of it; `known` is of the arrival."""
+    """Return the state of a run after a batch, and the record of the batch; `known` belongs to the arrival."""
     control, status, lanes = run.control, arrival.status[0], len(run.instant) - 1
     target = control.target
     arrived = ExpansionPoint(target, arrival.safe_step[0], arrival.radius[0], arrival.det_rate[0])

@@ -4,7 +4,7 @@ Each lane of the batch is predicted by the Taylor series of a neighbor, correcte
 differentiated order after order with the last factorization of its Jacobian (Sommer 2024, equations 1-8). That it is on
 the branch of its neighbor is not judged by how near the prediction was: the simplified Newton iteration must contract
 (Deuflhard 2011, chapter 5), the determinant of the Jacobian must keep its sign, and where one is searched for, the
-nearest zero of that determinant is told, real or complex, beyond which no step may go.
+nearest zero of that determinant, real or complex, is estimated: no step may go beyond it.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -48,7 +48,7 @@ LARGEST_CONTRADICTION = 1e-6  # of derivatives in redundant rows, as a part of w
 
 
 class StepResult(NamedTuple):
-    """What is known of the instants of a batch; every array has the batch last."""
+    """Results of the instants of a batch; every array has the batch last."""
 
     coordinates: dict[str, Numbers]  # jets of the pose, by name, shape (order + 1, ...)
     outputs: tuple[Numbers, ...]  # jets of each group of outputs
@@ -61,7 +61,7 @@ class StepResult(NamedTuple):
     det_rate: Lanes  # 1/s, how fast the first lane nears (< 0) or leaves a singular position; 0 unless searched; (1,)
     pivot_ratio: Lanes  # smallest pivot of the Jacobian over the largest
     admissible: Bool[Numbers, "driver batch"]  # whether each driver has a permitted value
-    finite: Bool[Numbers, "result batch"]  # whether all derivatives wanted are, of the pose and of each output
+    finite: Bool[Numbers, "result batch"]  # whether all derivatives requested are, of the pose and of each output
     gaps: Float[Numbers, "2 contradicting batch"]  # of redundant rows, see `_gaps`; of none where none are
 
     def state(self, lanes: slice | np.ndarray) -> SolvedState:
@@ -79,7 +79,7 @@ def predicts_turns(group: Group) -> bool:
 
 
 def predictor(system: System, pose_type: type[Pose], solved: SolvedState) -> SolvedState:
-    """Return what a prediction needs of solved instants: jets of the pose and of turning angles, and the sign."""
+    """Return what predictions need of solved instants: jets of the pose and of turning angles, and the sign."""
     coordinates, outputs, sign = solved
     angles = [output for output, group in zip(outputs, system.outputs, strict=True) if predicts_turns(group)]
     return {name: coordinates[name] for name in pose_type.predictor}, tuple(angles), sign
@@ -147,18 +147,18 @@ def _outputs(system: System, pose: Pose, angles: Sequence[Numbers], step: Lanes)
 
 
 def _finite(jets: Sequence[Numbers], finite_order: Int[Numbers, ""]) -> Bool[Numbers, "instance batch"]:
-    """Tell where the coefficients of jets are finite up to the order wanted, for each instance: (instances, batch)."""
-    found = []
+    """Tell where coefficients of jets are finite up to the order requested, for each instance: (instances, batch)."""
+    flags = []
     for jet in jets:
         above = (np.arange(jet.shape[0]) > finite_order).reshape(-1, *[1] * (jet.ndim - 1))
-        found.append(jnp.all(jnp.isfinite(jet) | above, axis=(0, 1)))
-    return jnp.concatenate(found)
+        flags.append(jnp.all(jnp.isfinite(jet) | above, axis=(0, 1)))
+    return jnp.concatenate(flags)
 
 
 def _finite_results(
     coordinates: Sequence[Numbers], outputs: Sequence[Numbers], finite_order: Int[Numbers, ""]
 ) -> Bool[Numbers, "result batch"]:
-    """Tell where the pose and each output are finite up to the order wanted."""
+    """Tell where the pose and each output are finite up to the order requested."""
     posed = [jnp.max(part, axis=-2, keepdims=True) for part in coordinates]
     finite = _finite([*(x.reshape(x.shape[0], -1, 1, x.shape[-1]) for x in posed), *outputs], finite_order)
     return jnp.concatenate([jnp.all(finite[: len(posed)], axis=0, keepdims=True), finite[len(posed) :]])
@@ -255,7 +255,7 @@ def advance(
     finite_order : int
         Highest derivative that must be finite.
     pose_type, order
-        PlanarPose or SpatialPose; derivatives wanted.
+        PlanarPose or SpatialPose; derivatives requested.
     with_det_rate : bool, default True
         Whether the rate of the determinant is looked for here, too; else it is left at zero.
     """
@@ -299,11 +299,11 @@ def solved_batch(
     departures = _departures(system, pose, predicted)
     departure = jnp.max(departures, axis=0)
     travel = travel_of(_terms(system, moving, pose_type.predictor), step)
-    found = _signs(
+    signs = _signs(
         system, factor, lambda: (pose_type.predicted_from(moving, 0.0 * step), Jet([(instant - step)[None]])), sign
     )
     predictable = near_prediction(departure, travel) & laws_predictable(system, instant, step, order)
-    predictable &= correction.contracts() & ((sign == 0) | (found == sign))
+    predictable &= correction.contracts() & ((sign == 0) | (signs == sign))
     admissible, pivot_ratio = system.admissible(time), factor.pivot_ratio()
     finite = _finite_results([coordinates[name] for name in pose_type.predictor], outputs, finite_order)
     admitted, defined = jnp.all(admissible, axis=0), jnp.all(finite, axis=0)
@@ -319,7 +319,7 @@ def solved_batch(
         _safe_step(terms),
         _safe_step(terms[:3]) / SAFE_FRACTION,
         departure / jnp.maximum(travel, 1e-300),
-        found,
+        signs,
         np.zeros(1),
         pivot_ratio,
         admissible,

@@ -32,7 +32,7 @@ Lanes = Float[Numbers, " batch"]
 
 
 class Correction(NamedTuple):
-    """How Newton-Raphson went."""
+    """Outcome of a Newton-Raphson iteration."""
 
     last: Lanes  # size of the last correction, rad or sizes of the mechanism
     first: Lanes
@@ -44,7 +44,7 @@ class Correction(NamedTuple):
 
 
 class _Iteration(NamedTuple):
-    """How Newton-Raphson stands after a correction."""
+    """State of a Newton-Raphson iteration after a correction."""
 
     pose: Any
     factor: Factor

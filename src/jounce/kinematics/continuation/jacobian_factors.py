@@ -36,9 +36,9 @@ def refactored(system: System, pose: Pose, time: Jet, known: Factor, anew: Bool[
     if not isinstance(known, DenseFactor | ReflectedFactor):
         return factored(system, pose, time)
     matrix = system.jacobian(pose, time)
-    kept = known.refining(matrix)
-    stale = jnp.any(~(kept.defect() <= STALE))
-    return jax.lax.cond(anew | stale, lambda: type(known).of(matrix), lambda: kept)
+    reused = known.refining(matrix)
+    stale = jnp.any(~(reused.defect() <= STALE))
+    return jax.lax.cond(anew | stale, lambda: type(known).of(matrix), lambda: reused)
 
 
 def blank_factor(system: System, lanes: int) -> Factor:

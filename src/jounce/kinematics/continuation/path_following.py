@@ -1,9 +1,9 @@
-"""Following a motion from anchor to anchor: steps that no singular position hides in, checked one by one.
+"""Following a motion from anchor to anchor: steps that hide no singular position, each of them checked.
 
 A run makes the steps that are in the ordinary (see `continuation_steps`). Toward a dead point steps become shorter and
 shorter, and the motion ends there; a near miss is followed through its sharp turn. Where the steps shrink while the
 motion itself stays smooth, two branches cross: a change point. It is passed on the series that leads through it, if
-that arrives on the other side to rounding, and is told.
+that arrives on the other side to rounding, and is recorded.
 """
 
 import bisect
@@ -31,7 +31,9 @@ PASSAGE_DEVIATION = 1e-8  # from that series, as a part of the way: two branches
 NEARLY_SINGULAR = 1e-6  # of the span: a motion that ends so short before a singular position ends at it
 LEAST_PASSAGE = 0.2  # of the way to a change point: how far the motion must go on beyond it
 NEARBY = 0.1  # radii: a singular position nearer than this spoils high derivatives, if the motion is smooth there
-PLACES = 8  # in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
+SAMPLES_A_STEP = (
+    8  # in each step at which attitudes are looked at for turns: nowhere between them a body turns by half a turn
+)
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -92,7 +94,7 @@ class ChangePoint:
 class FollowedPath:
     """Anchors in order of time, the change points passed, and where and why following the motion ended, if it did.
 
-    Instants of a grid that were solved on the way are told by their indices, with their states; and what computed, too.
+    Instants of a grid that the steps have solved are stored by index, with their states, and the back ends used.
     """
 
     anchors: list[Anchor]
@@ -111,14 +113,14 @@ class FollowedPath:
         leaves, structure = jax.tree.flatten((records.coordinates, records.outputs, records.sign))
         steps = np.flatnonzero(records.taken)
         taken = [x[steps, ..., :1] for x in leaves]  # copies: an anchor is kept for long, the other lanes are not
-        places = zip(*(x[steps].tolist() for x in (*records.expansion_point, records.status[:, 0])), strict=True)
-        for parts, (instant, safe_step, radius, det_rate, status) in zip(zip(*taken, strict=True), places, strict=True):
+        values = zip(*(x[steps].tolist() for x in (*records.expansion_point, records.status[:, 0])), strict=True)
+        for parts, (instant, safe_step, radius, det_rate, status) in zip(zip(*taken, strict=True), values, strict=True):
             state = jax.tree.unflatten(structure, parts)
             self.anchors.append(Anchor(instant, state, safe_step, radius, det_rate, Status(status)))
         solved = (records.lane >= 0) & (records.status == Status.OK)
         if solved.any():
-            found = [np.moveaxis(x, 0, -2)[..., solved] for x in leaves]
-            self.solved_instants.append((first + records.lane[solved], jax.tree.unflatten(structure, found)))
+            states = [np.moveaxis(x, 0, -2)[..., solved] for x in leaves]
+            self.solved_instants.append((first + records.lane[solved], jax.tree.unflatten(structure, states)))
 
     def anchors_around(self, first: float, last: float) -> list[Anchor]:
         """Return the anchors between two instants, with one before them and one after, where there are some."""
@@ -133,27 +135,27 @@ class FollowedPath:
         times = np.array([anchor.instant for anchor in self.anchors])
         series = np.concatenate([anchor.state[0]["quaternion"] for anchor in self.anchors], axis=-1)
         between = partial(attitudes_between, times, np.where(np.isfinite(series), series, 0.0))
-        since = np.diff(times)[:, None] * (np.arange(PLACES) / PLACES)
+        since = np.diff(times)[:, None] * (np.arange(SAMPLES_A_STEP) / SAMPLES_A_STEP)
         instants = np.append((times[:-1, None] + since).ravel(), times[-1])
         return AttitudeHistory(between(instants), instants, between=between)
 
     def ended(self, status: Status, instant: float, fault: str) -> "FollowedPath":
-        """Return the path, with where and why it could not be followed any further."""
+        """End the path, with status, instant and fault."""
         self.status, self.ended_at, self.fault = status, instant, fault
         return self
 
     def singular_positions_outside(self) -> list[ChangePoint]:
         """Return where the motion would be singular just before its start or after its end, and smooth all the same."""
         first = self.anchors[0]
-        found = self._just_ahead() if self.status == Status.OK else []
+        points = self._just_ahead() if self.status == Status.OK else []
         if _is_left(first):
-            found.append(ChangePoint(first.instant - first.reach, first.radius))
-        return found
+            points.append(ChangePoint(first.instant - first.reach, first.radius))
+        return points
 
     def _just_ahead(self) -> list[ChangePoint]:
         """Return the singular position that the motion was nearing when it ended.
 
-        Where it ends next to it, or just beyond, rounding spoils what is known there: it is told from farther off.
+        Where it ends next to it, or just beyond, rounding spoils its data there: an anchor farther off is used.
         """
         end, passed = self.anchors[-1].instant, self.change_points[-1].instant if self.change_points else -np.inf
         since = itertools.takewhile(lambda anchor: anchor.instant > passed, reversed(self.anchors))
@@ -163,12 +165,12 @@ class FollowedPath:
 
 
 def _is_left(point: "Anchor | ExpansionPoint") -> Any:
-    """Tell whether a motion leaves a singular position close behind a place."""
+    """Tell whether a singular position lies close behind an expansion point."""
     return (point.det_rate > 0) & (point.det_rate * point.radius > 1 / NEARBY)
 
 
 def _is_just_beyond(point: "Anchor | ExpansionPoint", end: float) -> Any:
-    """Tell whether a motion nears a singular position close to a place, and comes to its end next to it or before."""
+    """Tell whether a singular position lies close ahead, and the motion ends next to it or before."""
     near = (point.det_rate < 0) & (-point.det_rate * point.radius > 1 / NEARBY)
     return near & ((end - point.instant) * -point.det_rate < 1 + LEAST_PASSAGE)
 
@@ -176,7 +178,7 @@ def _is_just_beyond(point: "Anchor | ExpansionPoint", end: float) -> Any:
 def is_spoiled_outside(
     point: ExpansionPoint, begins: Bool[np.ndarray, " lane"], end: float
 ) -> Bool[np.ndarray, " lane"]:
-    """Tell which motions may be singular just before they begin, at a place, or after their end.
+    """Tell which motions may be singular just before they begin, at an expansion point, or after their end.
 
     Those that are followed alone tell by `singular_positions_outside`, which this leaves nothing to.
     """
@@ -248,7 +250,7 @@ def follow(
 
 
 def _ended(solver: Solver, path: FollowedPath, done: TakenSteps, span: float) -> FollowedPath:
-    """Return the path that cannot be followed any further: where a law was first refused, if it was."""
+    """End a path that cannot be followed any further, at the instant where a law was first refused, if any."""
     here, refused = path.anchors[-1], float(done.run.control.refused)
     if np.isnan(refused):
         target, arrival = float(done.run.instant[0]), jax.tree.map(np.asarray, done.last)
@@ -289,7 +291,7 @@ def attitudes_between(
     series: Float[np.ndarray, "order component bodies anchor"],
     instants: Float[np.ndarray, " time"],
 ) -> Float[np.ndarray, "component bodies time"]:
-    """Return attitudes, or places, at instants between anchors in order of time, by their series."""
+    """Return attitudes, or positions, at instants between anchors in order of time, by their series."""
     after = np.clip(np.searchsorted(times, instants, side="right"), 1, max(len(times) - 1, 1))
     return blended_attitudes(times, series, (after - 1, np.minimum(after, len(times) - 1)), instants)
 
@@ -300,7 +302,7 @@ def blended_attitudes(
     neighbors: tuple[Int[np.ndarray, " time"], Int[np.ndarray, " time"]],
     instants: Float[np.ndarray, " time"],
 ) -> Float[np.ndarray, "component bodies time"]:
-    """Return attitudes, or places, at instants by the series of the anchors before and after each, by index.
+    """Return attitudes, or positions, at instants by the series of the anchors before and after each, by index.
 
     A share s of the way from one to the other, their errors are as s^n and (1 - s)^n, and so are the weights of the
     other one.
@@ -309,13 +311,13 @@ def blended_attitudes(
     whole = times[after] - times[before]
     share = np.clip((instants - times[before]) / np.where(whole > 0, whole, 1.0), 0.0, 1.0)
     late, early = share ** len(series), (1.0 - share) ** len(series)
-    found = np.zeros((*series.shape[1:-1], len(instants)))
+    blended = np.zeros((*series.shape[1:-1], len(instants)))
     for anchor, weight in ((before, early / (early + late)), (after, late / (early + late))):
-        part = np.zeros_like(found)
+        part = np.zeros_like(blended)
         for coefficient in series[::-1]:
             part = part * (instants - times[anchor]) + coefficient[..., anchor]
-        found += weight * part
-    return found
+        blended += weight * part
+    return blended
 
 
 def _shortened(jet: Float[np.ndarray, "order *rest"]) -> Float[np.ndarray, "order *rest"]:

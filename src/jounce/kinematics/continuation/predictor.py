@@ -62,5 +62,5 @@ def hidden_by_laws(system: System, status: Numbers, instant: Lanes, step: Lanes,
         away = jnp.abs(value - Jet(tuple(terms)).evaluate(ahead))
         allowed = jnp.maximum(0.2 * travel_of([jnp.abs(c) for c in terms[1:]], ahead), size)
         near &= jnp.all(away <= allowed, axis=(0, 1))
-    hidden = ~near & (step > FINEST * jnp.abs(instant))  # instants nearer to each other are told apart by rounding only
+    hidden = ~near & (step > FINEST * jnp.abs(instant))  # only rounding separates instants nearer to each other
     return jnp.where((status == int(Status.OK)) & hidden, int(Status.BRANCH_JUMP), status)

@@ -109,7 +109,7 @@ def _of_matrix(relative: Float[Numbers, "column column"]) -> Float[Numbers, " 1"
 def _of_products(
     product: Callable[[Float[Numbers, "column probe"]], Float[Numbers, "column probe"]], columns: int
 ) -> Float[Numbers, " 1"]:
-    """Return it for a matrix of which only products are to be had.
+    """Return it for a matrix that is given by its products.
 
     The same power is applied to random vectors, whose mean square then is that of its norm (Hutchinson 1990). To come
     out too small, all of them would have to miss the direction that the power makes longest: with eight, the chance is

@@ -1,4 +1,4 @@
-"""A mechanism with the settings under which it is solved: what turns known neighbors into solved instants."""
+"""A mechanism with the settings under which it is solved: it predicts, corrects and differentiates instants."""
 
 import dataclasses
 import math
@@ -66,7 +66,7 @@ class Solver:
         return jax.tree.map(lambda x: np.asarray(x)[..., :lanes], arrival)
 
     def still(self, coordinates: Mapping[str, Any]) -> SolvedState:
-        """Return what is known of an instant before it is solved: its position."""
+        """Return the state of an unsolved instant: its position, with zero derivatives."""
         levels, system = self.order + 1, self.model.system
         still = {name: np.zeros((levels, *np.shape(x))) for name, x in coordinates.items()}
         for name, x in coordinates.items():
@@ -76,7 +76,7 @@ class Solver:
         return still, outputs, np.zeros(lanes)
 
     def needed(self, known: SolvedState) -> SolvedState:
-        """Return what predictions need of solved instants, see `predictor`."""
+        """Return the data of solved instants that predictions need, see `predictor`."""
         return predictor(self.model.system, self.model.pose_type, known)
 
     def rounds(
@@ -88,7 +88,7 @@ class Solver:
         sources: Int[np.ndarray, " time"],
         own: Mapping[int, np.ndarray] | None,
     ) -> Rounds:
-        """Return what solves instants of a grid in rounds.
+        """Return a runner that solves instants of a grid in rounds.
 
         Parameters
         ----------
@@ -115,7 +115,7 @@ class Solver:
         return self._take_steps(run, grid, _limits(stop, smallest), self._batches, search=True)
 
     def prepare(self) -> None:
-        """Make the program of runs, unless it is there; nothing is solved."""
+        """Compile the program of runs, unless it exists; nothing is solved."""
         run = self.beginning(self.still(self.model.guess), 0.0)
         self._take_steps(run, NO_GRID, _limits(0.0, 0.0), 0, search=True, only_made=True)
 
@@ -234,8 +234,8 @@ class Solver:
         size, over = gaps
         names = dict.fromkeys(self.model.rows[k] for k in np.argsort(-over) if over[k] > 0.1 * over.max())
         wide = size.max()
-        told = f"open by {wide:.2g} rad, or sizes of the mechanism" if wide > LARGEST_GAP else "in their rates"
-        return f"{', '.join(list(names)[:4])} ({told})"
+        phrase = f"open by {wide:.2g} rad, or sizes of the mechanism" if wide > LARGEST_GAP else "in their rates"
+        return f"{', '.join(list(names)[:4])} ({phrase})"
 
 
 def _run_from(
@@ -247,7 +247,7 @@ def _run_from(
     largest: float = np.inf,
     crawled: int = 0,
 ) -> StepState:
-    """Return a run that begins, with what is solved first, if that is told."""
+    """Return a run that begins, with the step that is solved first, if given."""
     nothing = np.zeros(SMALL_BATCH)
     here = nothing if instant is None else instant
     control = initial_control(ExpansionPoint(*map(np.asarray, expansion_point)), np.asarray(here[0]))

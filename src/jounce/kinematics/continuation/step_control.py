@@ -1,4 +1,4 @@
-"""How long the next continuation step is, and whether the last one is taken: of one motion, or of many designs.
+"""Step control of the continuation: the length of the next step, and whether the last one is taken.
 
 Two things limit a step. The Taylor series must carry it: no term moves a body far. And the Jacobian must not come near
 a singular one on the way, where branches meet and a series that looks smooth may lead over to another: `advance` tells
@@ -41,7 +41,7 @@ class StopReason(enum.IntEnum):
 
 
 class ExpansionPoint(NamedTuple):
-    """Where a motion has come to: the instant, s, and how far it may be followed from there; see `StepResult`."""
+    """Expansion point of a Taylor series: the instant, s, and how far the series carries; see `StepResult`."""
 
     instant: Lanes
     safe_step: Lanes
@@ -56,14 +56,14 @@ class ExpansionPoint(NamedTuple):
 
 
 class StepLimits(NamedTuple):
-    """Where steps go to, s, and what step is too small to be halved, s."""
+    """Limits of the steps: the last instant, s, and the smallest step, s."""
 
     stop: Lanes
     smallest: Lanes
 
 
 class StepControl(NamedTuple):
-    """The next step: from where, how long, and what came of those before."""
+    """The next step, and the outcome of those before."""
 
     expansion_point: ExpansionPoint  # of the last anchor
     step: Lanes  # to be tried next, s; zero to solve the first instant itself
@@ -76,14 +76,14 @@ class StepControl(NamedTuple):
 
 
 def initial_control(point: ExpansionPoint, target: Float[np.ndarray, "*batch"]) -> StepControl:
-    """Return the step that solves the first instant itself, s; or, at a place that is known, none that is planned."""
+    """Return the step that solves the first instant itself, s; or, at a known expansion point, none that is planned."""
     blank = np.zeros(target.shape)
     no, none = np.zeros(target.shape, bool), np.zeros(target.shape, int)
     return StepControl(point, blank, target, ~no, blank + np.inf, none, blank + np.nan, none)
 
 
 def plan_next_step(control: StepControl, limits: StepLimits) -> StepControl:
-    """Return the next step from a place, or why there is none."""
+    """Plan the next step from an expansion point, or end the steps with a reason."""
     point = control.expansion_point
     left = limits.stop - point.instant
     step = jnp.minimum(jnp.minimum(point.safe_step, SAFE_FRACTION * point.reach), jnp.minimum(control.largest, left))
@@ -105,7 +105,7 @@ def plan_next_step(control: StepControl, limits: StepLimits) -> StepControl:
 
 
 def is_accepted(control: StepControl, status: Int[Numbers, "*batch"], there: ExpansionPoint) -> Truths:
-    """Tell whether a step may be taken, of which the status is known, and the place that it led to."""
+    """Tell whether a step may be taken, by its status and the expansion point that it led to."""
     passable = (status == int(Status.OK)) | (status == int(Status.UNDEFINED))
     return passable & ((control.step == 0) | (control.step * jnp.abs(there.det_rate) <= LARGEST_DET_RATE))
 
@@ -149,7 +149,7 @@ def next_controls(
     limits : StepLimits
         Of all.
     lanes : tuple
-        Of each the step that was made, its status, and the place that it led to.
+        Of each the step that was made, its status, and the expansion point that it led to.
     """
     control, status, there = lanes
     good = is_accepted(control, status, there)

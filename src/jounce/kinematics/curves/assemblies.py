@@ -12,15 +12,15 @@ from jounce.execution.device import resident
 from jounce.kinematics.assembly.assemble import (
     check_assembled,
     check_mobility,
+    find_assembly,
     nearest_to_guess,
     redundancy_of,
-    settled,
 )
 from jounce.kinematics.assembly.axis_directions import axis_signs, drawn_axis_signs
 from jounce.kinematics.assembly.gauss_newton import assemble_from_guess
-from jounce.kinematics.curves.curve import Curve, posed
+from jounce.kinematics.curves.curve import Curve
 from jounce.kinematics.curves.path_tracker import PathTracker
-from jounce.kinematics.curves.start import first_instant
+from jounce.kinematics.curves.start import first_instant, posed
 from jounce.kinematics.curves.starts import assemble_side_by_side
 from jounce.kinematics.curves.tracing import check_number, traced
 from jounce.mechanism import Mechanism, build, check_mechanism
@@ -89,13 +89,13 @@ class Assemblies(Displayed, Sequence[Assembly]):
 
     def __init__(
         self,
-        found: Sequence[Assembly],
+        members: Sequence[Assembly],
         starts: int,
         since_last_new: int,
         circuits: tuple[Curve, ...] = (),
         movable: int = 0,
     ):
-        self._found, self.circuits, self.movable = tuple(found), circuits, movable
+        self._found, self.circuits, self.movable = tuple(members), circuits, movable
         self.starts, self.since_last_new = starts, since_last_new
 
     def __repr__(self) -> str:
@@ -197,14 +197,14 @@ def assemblies(
     instant = first_instant(mechanism) if time is None else float(time)
     search = _Search(mechanism, instant)
     search.from_starts(count, np.random.default_rng(seed))
-    found: tuple[Curve, ...] = ()
+    curves: tuple[Curve, ...] = ()
     if circuits and (driver is not None or len(mechanism.drivers) == 1):
-        found = search.along_circuits(driver)
-    return search.result(found)
+        curves = search.along_circuits(driver)
+    return search.result(curves)
 
 
 @dataclasses.dataclass
-class _Found:
+class _Configuration:
     coordinates: dict[str, np.ndarray]
     smallest: float
     hits: int
@@ -221,13 +221,13 @@ class _Search:
         if model.system.shape[0] < model.system.shape[1]:
             message = "joints and drivers leave degrees of freedom, so that there are infinitely many assemblies"
             raise MobilityError(f"{message}: add drivers")
-        self.first, trial = settled(model, instant, TOLERANCE)
+        self.first, trial = find_assembly(model, instant, TOLERANCE)
         self.trial = trial
         system = with_fields(self.first.system, row_scale=trial.scale[:, None])
         self.system = resident(with_fields(system, outputs=(), forces=(), fronts=None))
         self.model = dataclasses.replace(self.first, system=system)
         self.tracker = PathTracker(self.model, driven=False)
-        self.found: list[_Found] = []
+        self.configurations: list[_Configuration] = []
         self.axis_signs = axis_signs(self.system, trial.coordinates) if trial.closed else drawn_axis_signs(model)
         self.starts = self.since_last_new = self.movable = 0
         if trial.closed:
@@ -237,22 +237,22 @@ class _Search:
     def from_starts(self, count: int, random: np.random.Generator) -> None:
         """Look from random starts, until each assembly was found often enough."""
         most = MOST_ROUNDS * count
-        while self.starts < count or (self.starts < most and any(x.hits < OFTEN for x in self.found)):
+        while self.starts < count or (self.starts < most and any(x.hits < OFTEN for x in self.configurations)):
             self._round(min(BATCH, most - self.starts), random)
-        if not self.found and not self.movable:
+        if not self.configurations and not self.movable:
             check_assembled(self.first, self.trial, self.instant)
             raise AssemblyError(f"no assembly was found from {self.starts} starts at t = {self.instant:g} s")
-        if not self.found:
+        if not self.configurations:
             message = (
                 f"at t = {self.instant:g} s the mechanism can move with its drivers held: infinitely many assemblies"
             )
             raise MobilityError(message)
 
     def _round(self, count: int, random: np.random.Generator) -> None:
-        begun = self._random_poses(random)
+        starts = self._random_poses(random)
         instant, kind = np.float64(self.instant), self.model.pose_type
-        found, gaps = assemble_side_by_side(self.system, begun, instant, pose_type=kind)
-        coordinates, gaps = {name: np.asarray(x) for name, x in found.items()}, np.asarray(gaps)
+        assembled, gaps = assemble_side_by_side(self.system, starts, instant, pose_type=kind)
+        coordinates, gaps = {name: np.asarray(x) for name, x in assembled.items()}, np.asarray(gaps)
         for lane in range(count):
             self.starts += 1
             self.since_last_new += 1
@@ -262,11 +262,11 @@ class _Search:
 
     def _set_movable_apart(self) -> bool:
         """Take singular ones for parts of a curve or a surface once they are many, dead points being few; tell it."""
-        singular = [x for x in self.found if x.smallest < NEARLY_SINGULAR]
+        singular = [x for x in self.configurations if x.smallest < NEARLY_SINGULAR]
         if len(singular) <= (0 if self.movable else MOST_SINGULAR):
             return False
         self.movable += sum(x.hits for x in singular)
-        self.found = [x for x in self.found if x.smallest >= NEARLY_SINGULAR]
+        self.configurations = [x for x in self.configurations if x.smallest >= NEARLY_SINGULAR]
         return True
 
     def _random_poses(self, random: np.random.Generator) -> dict[str, np.ndarray]:
@@ -288,7 +288,7 @@ class _Search:
         there = {name: x[..., None] for name, x in coordinates.items()}
         if not np.array_equal(axis_signs(self.system, there), self.axis_signs):
             return False
-        for known in self.found:
+        for known in self.configurations:
             same = SAME if known.smallest > NEARLY_SINGULAR else SAME_IF_SINGULAR
             if np.max(np.abs(self.tracker.difference(coordinates, known.coordinates))) < same:
                 known.hits += hits
@@ -296,7 +296,7 @@ class _Search:
         coordinates = self._polished(coordinates)
         point = self.tracker.point_without_series({name: x[..., None] for name, x in coordinates.items()}, self.instant)
         sizes = np.linalg.svd(point.jacobian, compute_uv=False)
-        self.found.append(_Found(coordinates, float(sizes[: self.tracker.columns][-1]), hits))
+        self.configurations.append(_Configuration(coordinates, float(sizes[: self.tracker.columns][-1]), hits))
         return True
 
     def _polished(self, coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -312,12 +312,12 @@ class _Search:
         """Trace the circuits of all assemblies, and add what else is on them."""
         circuits: list[Curve] = []
         number = 0
-        while number < len(self.found):
-            if self.found[number].circuit is None:
-                begun = posed(self.mechanism, self.found[number].coordinates)
+        while number < len(self.configurations):
+            if self.configurations[number].circuit is None:
+                begun = posed(self.mechanism, self.configurations[number].coordinates)
                 curves = traced(begun, self.instant, driver).connected()
                 circuits.append(curves[0])
-                self.found[number].circuit, self.found[number].branch = len(circuits), 1
+                self.configurations[number].circuit, self.configurations[number].branch = len(circuits), 1
                 before = 0  # branches of the curves through the same change points
                 for curve in curves:
                     self._assign(curve, len(circuits), before)
@@ -334,26 +334,26 @@ class _Search:
             if known.circuit is None:
                 known.circuit, known.branch = circuit, before + curve.branch_at(arc_length)
 
-    def _nearest(self, coordinates: dict[str, np.ndarray]) -> _Found:
-        away = [np.max(np.abs(self.tracker.difference(coordinates, x.coordinates))) for x in self.found]
-        return self.found[int(np.argmin(away))]
+    def _nearest(self, coordinates: dict[str, np.ndarray]) -> _Configuration:
+        away = [np.max(np.abs(self.tracker.difference(coordinates, x.coordinates))) for x in self.configurations]
+        return self.configurations[int(np.argmin(away))]
 
     def result(self, circuits: tuple[Curve, ...]) -> Assemblies:
         """Return the assemblies in the order of how far they are from the starting guess."""
         guess = {name: np.asarray(x)[..., 0] for name, x in self.model.guess.items()}
-        away = [float(np.linalg.norm(self.tracker.difference(x.coordinates, guess))) for x in self.found]
+        away = [float(np.linalg.norm(self.tracker.difference(x.coordinates, guess))) for x in self.configurations]
         order = np.argsort(away, kind="stable")
         renumbered: dict[int, int] = {}
         for k in order:
-            circuit = self.found[k].circuit
+            circuit = self.configurations[k].circuit
             if circuit is not None:
                 renumbered.setdefault(circuit, len(renumbered) + 1)
-        found = []
+        members = []
         for number, k in enumerate(order, start=1):
-            x = self.found[k]
+            x = self.configurations[k]
             circuit = None if x.circuit is None else renumbered[x.circuit]
             mechanism = posed(self.mechanism, x.coordinates)
-            found.append(Assembly(number, mechanism, circuit, x.branch, x.hits, away[k], x.smallest))
+            members.append(Assembly(number, mechanism, circuit, x.branch, x.hits, away[k], x.smallest))
         ranked = sorted(renumbered, key=lambda circuit: renumbered[circuit])
         ranked_circuits = tuple(circuits[k - 1] for k in ranked)
-        return Assemblies(found, self.starts, self.since_last_new, ranked_circuits, self.movable)
+        return Assemblies(members, self.starts, self.since_last_new, ranked_circuits, self.movable)

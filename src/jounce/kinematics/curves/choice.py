@@ -11,7 +11,7 @@ from jounce.mechanism import Mechanism, build
 from jounce.mechanism.mechanism import NEAREST, SIDES
 from jounce.rigid.planar import PlanarPose
 
-APART = 1e-6  # sizes of the mechanism, by which a wish must tell assemblies apart
+DIFFERENT = 1e-6  # sizes of the mechanism, by which a wish must tell assemblies apart
 
 
 def chosen(mechanism: Mechanism, instant: float) -> Mechanism:
@@ -27,11 +27,11 @@ def chosen(mechanism: Mechanism, instant: float) -> Mechanism:
         return mechanism
     drivers = {**mechanism.drivers, **mechanism.initial}
     driven = dataclasses.replace(mechanism, drivers=drivers, initial={}, forces={}, outputs={}, assembly=None)
-    found = assemblies(driven, instant, circuits=isinstance(wish, int))
+    candidates = assemblies(driven, instant, circuits=isinstance(wish, int))
     if isinstance(wish, int):
-        picked = found.number(wish)
+        picked = candidates.number(wish)
     else:
-        picked = found[0] if wish == NEAREST else _by_wish(found, wish)
+        picked = candidates[0] if wish == NEAREST else _by_wish(candidates, wish)
     return dataclasses.replace(mechanism, bodies={**mechanism.bodies, **_guesses(mechanism, picked)}, assembly=None)
 
 
@@ -42,13 +42,15 @@ def _guesses(mechanism: Mechanism, picked: Assembly) -> dict:
     }
 
 
-def _by_wish(found: Assemblies, wish: Mapping[str, str]) -> Assembly:
+def _by_wish(candidates: Assemblies, wish: Mapping[str, str]) -> Assembly:
     """Return the assembly in which each body lies farthest to the side wished for, the first wish first."""
-    left = list(found)
+    left = list(candidates)
     for body, side in wish.items():
         axis, sign = SIDES[side]
         sizes = np.array([sign * _middle(assembly.mechanism, body)[axis] for assembly in left])
-        left = [x for x, size in zip(left, sizes, strict=True) if size > sizes.max() - APART * _size(left[0].mechanism)]
+        left = [
+            x for x, size in zip(left, sizes, strict=True) if size > sizes.max() - DIFFERENT * _size(left[0].mechanism)
+        ]
     if len(left) > 1:
         numbers = " and ".join(str(x.number) for x in left)
         message = f"assemblies {numbers} fit equally well: add the side of another body, or give a number"

@@ -15,9 +15,9 @@ from jounce.kinematics.curves.path_tracker import CurvePoint, PathTracker, all_f
 from jounce.kinematics.status import Status
 from jounce.linear_algebra.quadratic_forms import polarized
 
-PASSAGE_ORDER = 8  # of the series that leads through: rounding spoils higher coefficients near a singular place
+PASSAGE_ORDER = 8  # of the series that leads through: rounding spoils higher coefficients near a singular point
 NEAR = 0.02  # of the radius of the series: from so near its terms up to that order are good to rounding
-REAL = 0.02  # a singular place whose imaginary part is more than this part of its distance is not on the curve
+REAL = 0.02  # a singular point whose imaginary part is more than this part of its distance is not on the curve
 NEARLY_SINGULAR = 1e-6  # of the largest singular value
 OPEN = 1e-12  # of the residual at the crossing: branches a gap of g apart leave g^2
 LARGEST_DEPARTURE = 1e-8
@@ -27,7 +27,7 @@ SAME_DIRECTION = 1e-6
 FIRST_STEPS, LARGEST_BEND = (2e-3, 2e-4, 2e-5), 1e-3  # into a branch
 STARTS, MAX_TURNS = 16, 60
 MOST_MULTIPLE = 4  # directions in which branches touch; more are a surface
-LEAST_ANGLE = 1e-3  # between branches, by the slopes of the forms: nearer ones are not told apart
+LEAST_ANGLE = 1e-3  # between branches, by the slopes of the forms: nearer ones count as one
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,7 +72,7 @@ class ChangePoint:
 
 
 def crossing(tracker: PathTracker, here: CurvePoint, ahead: complex) -> tuple[ChangePoint, CurvePoint] | None:
-    """Return the change point just ahead and the place beyond it, as far from it as this one, if there is one.
+    """Return the change point just ahead and the point beyond it, as far from it as this one, if there is one.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def crossing(tracker: PathTracker, here: CurvePoint, ahead: complex) -> tuple[Ch
     here : Place
         Before it.
     ahead : complex
-        Arc length to the nearest singular place, to first order.
+        Arc length to the nearest singular point, to first order.
     """
     near = NEAR * tracker.radius(here, PASSAGE_ORDER - 2)
     if not (0 < ahead.real < near and abs(ahead.imag) <= REAL * ahead.real):
@@ -105,7 +105,7 @@ def crossing(tracker: PathTracker, here: CurvePoint, ahead: complex) -> tuple[Ch
 
 
 def departed(tracker: PathTracker, change_point: ChangePoint, branch: int) -> CurvePoint:
-    """Return a place on a branch a little way off a change point, from which arc length is counted.
+    """Return a point on a branch a little way off a change point, from which arc length is counted.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def departed(tracker: PathTracker, change_point: ChangePoint, branch: int) -> Cu
 
 
 def _located(tracker: PathTracker, short: CurvePoint, step: float) -> CurvePoint | None:
-    """Return the place on the series where the bordered Jacobian is singular, if the rows hold there."""
+    """Return the point on the series where the bordered Jacobian is singular, if the rows hold there."""
 
     def at(step: float) -> tuple[CurvePoint, float]:
         points = tracker.points(short, np.array([step]), corrected=False)
@@ -157,9 +157,9 @@ def _tangents(
     known = null.T @ own
     if not size > VANISHING:
         return own[None], False
-    found, decided = _common_zeros(forms / size)
-    along = [x for x in found if abs(x @ known) < (1 - SAME_DIRECTION) * np.linalg.norm(known)]
-    decided &= len(along) < len(found)  # the branch that is followed is among them
+    zeros, decided = _common_zeros(forms / size)
+    along = [x for x in zeros if abs(x @ known) < (1 - SAME_DIRECTION) * np.linalg.norm(known)]
+    decided &= len(along) < len(zeros)  # the branch that is followed is among them
     others = [null @ x for x in along]
     scaled = [x / np.linalg.norm(x[: tracker.columns]) for x in others]
     return np.stack([own, *scaled]), decided
@@ -178,10 +178,10 @@ def _common_zeros(forms: Float[np.ndarray, "form k k"]) -> tuple[list[np.ndarray
         if x is None:
             continue
         sizes = np.linalg.svd(np.concatenate([2 * forms @ x, x[None]]), compute_uv=False)
-        alone = len(sizes) == count and bool(sizes[-1] > LEAST_ANGLE)
-        found, apart = (single, SAME_DIRECTION) if alone else (several, LEAST_ANGLE)
-        if all(abs(x @ other) < 1 - apart for other in found):
-            found.append(x)
+        is_single = len(sizes) == count and bool(sizes[-1] > LEAST_ANGLE)
+        zeros, least_angle = (single, SAME_DIRECTION) if is_single else (several, LEAST_ANGLE)
+        if all(abs(x @ other) < 1 - least_angle for other in zeros):
+            zeros.append(x)
     if len(several) > MOST_MULTIPLE:
         return single, False  # a surface of them
     return [*single, *several], not several

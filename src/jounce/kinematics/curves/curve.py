@@ -16,8 +16,8 @@ from jounce.jet.turns import WHOLE_TURN
 from jounce.kinematics.curves.crossings import ChangePoint, departed
 from jounce.kinematics.curves.limits import LimitPosition, limits_between, values_between
 from jounce.kinematics.curves.path import End, Path, step_to_configuration, track_both_directions
-from jounce.kinematics.curves.path_tracker import LANES, CurvePoint, PathTracker, spin
-from jounce.kinematics.curves.start import Freed
+from jounce.kinematics.curves.path_tracker import LANES, CurvePoint, PathTracker, with_angular_velocity
+from jounce.kinematics.curves.start import Freed, posed
 from jounce.kinematics.results.motion import Motion
 from jounce.kinematics.results.pose_outputs import output_values
 from jounce.kinematics.status import Status
@@ -28,7 +28,7 @@ from jounce.mechanism.outputs import AbstractMotionOutput
 if TYPE_CHECKING:
     import xarray
 
-PLACES = 8  # in each step at which attitudes are looked at for turns
+SAMPLES = 8  # in each step at which attitudes are looked at for turns
 AXES = ("point", "arc_length", "driver_value")
 MOST_CURVES = 64  # of a circuit
 FULL_TURN = 1e-6  # rad, by which a gain of the driver may differ from whole turns
@@ -125,8 +125,8 @@ class Curve(Displayed):
         if self.driver is None:
             return ()
         unit, stops = self._tracker.value_scale, [*(p.arc_length for p in self._track[1:]), self.stop]
-        found = [x for p, stop in zip(self._track, stops, strict=True) for x in limits_between(p, stop, unit)]
-        return tuple(sorted(found, key=lambda x: x.arc_length))
+        positions = [x for p, stop in zip(self._track, stops, strict=True) for x in limits_between(p, stop, unit)]
+        return tuple(sorted(positions, key=lambda x: x.arc_length))
 
     @property
     def turning_points(self) -> tuple[LimitPosition, ...]:
@@ -156,9 +156,9 @@ class Curve(Displayed):
             ends = [(ends[-1][0] - self.length, ends[-1][1] - self._gain), *ends]  # over the start
         else:
             ends = [(self.start, self.value(self.start)), *ends, (self.stop, self.value(self.stop))]
-        found = [CurveBranch(a, b, *sorted((v, w))) for (a, v), (b, w) in itertools.pairwise(ends)]
-        holding = next((k for k, x in enumerate(found) if x.start <= 0 <= x.stop), 0)
-        return tuple(found[holding:] + found[:holding])
+        branches = [CurveBranch(a, b, *sorted((v, w))) for (a, v), (b, w) in itertools.pairwise(ends)]
+        holding = next((k for k, x in enumerate(branches) if x.start <= 0 <= x.stop), 0)
+        return tuple(branches[holding:] + branches[:holding])
 
     @property
     def range(self) -> tuple[float, float]:
@@ -185,7 +185,7 @@ class Curve(Displayed):
         return arc_length
 
     def _at(self, arc_length: float) -> CurvePoint:
-        """Return the place at an arc length, with the series of the nearest of those that were solved."""
+        """Return the point at an arc length, with the series of the nearest of those that were solved."""
         known = [point.arc_length for point in self._track]
         after = bisect.bisect_left(known, arc_length)
         near = min(self._track[max(after - 1, 0) : after + 1], key=lambda p: abs(p.arc_length - arc_length))
@@ -237,17 +237,17 @@ class Curve(Displayed):
 
     def connected(self) -> tuple["Curve", ...]:
         """Return this curve and those that cross it at change points, and those that cross these: the whole circuit."""
-        found: list[Curve] = [self]
+        curves: list[Curve] = [self]
         waiting: list[Curve] = [self]
-        while waiting and len(found) < MOST_CURVES:
+        while waiting and len(curves) < MOST_CURVES:
             curve = waiting.pop()
             for number, point in enumerate(curve.change_points):
                 for branch in range(1, len(point.tangents)):
                     other = curve.follow(number, branch)
-                    if not any(known.passes(other.coordinates_at(0.0)) for known in found):
-                        found.append(other)
+                    if not any(known.passes(other.coordinates_at(0.0)) for known in curves):
+                        curves.append(other)
                         waiting.append(other)
-        return tuple(found)
+        return tuple(curves)
 
     def follow(self, change_point: int, branch: int = 1) -> "Curve":
         """Return the curve of another branch through a change point.
@@ -287,17 +287,17 @@ class Curve(Displayed):
             turn, (1,) or (3,) in rad about the axes of the body. The sign of the others is arbitrary.
         """
         point = _one_of(self.change_points, change_point, "change_point", "change points")
-        found = [self._tracker.parts(tangent) for tangent in point.tangents]
+        directions = [self._tracker.parts(tangent) for tangent in point.tangents]
         names = list(enumerate(self.mechanism.bodies, start=1))
-        return [{name: (shift[:, k], turn[:, k]) for k, name in names} for shift, turn in found]
+        return [{name: (shift[:, k], turn[:, k]) for k, name in names} for shift, turn in directions]
 
     @cached_property
     def arc_lengths(self) -> Float[np.ndarray, " point"]:
         """Arc lengths of the points of the dataset, evenly spaced, with the limit positions and change points."""
-        told = [x.arc_length for x in (*self.limits, *self.change_points)]
+        special = [x.arc_length for x in (*self.limits, *self.change_points)]
         even = np.linspace(self.start, self.stop, self._count)
         spacing = self.length / max(1, self._count - 1)
-        there = np.array([s for s in told if np.min(np.abs(even - s)) > 1e-9 * spacing])
+        there = np.array([s for s in special if np.min(np.abs(even - s)) > 1e-9 * spacing])
         return np.sort(np.concatenate([even, there]))
 
     @cached_property
@@ -332,7 +332,7 @@ class Curve(Displayed):
             return None
         stops = [point.arc_length for point in self._track[1:]] + [self.stop]
         parts = [
-            np.linspace(p.arc_length, stop, PLACES, endpoint=False) for p, stop in zip(self._track, stops, strict=True)
+            np.linspace(p.arc_length, stop, SAMPLES, endpoint=False) for p, stop in zip(self._track, stops, strict=True)
         ]
         begun = float(self._track[0].arc_length)
         instants = np.concatenate([*parts, [self.stop]])
@@ -349,14 +349,14 @@ class Curve(Displayed):
     @cached_property
     def smallest_singular_values(self) -> Float[np.ndarray, " point"]:
         """Smallest singular value of the scaled Jacobian with the driver held, at the points: zero at dead points."""
-        columns, found = self._tracker.columns, []
+        columns, smallest = self._tracker.columns, []
         points = [self._at(s) for s in self.arc_lengths]
         for first in range(0, len(points), LANES):
             some = points[first : first + LANES]
             lanes = [dataclasses.replace(point, rows=some[0].rows) for point in some]
             batch = self._tracker.points(lanes, np.zeros(len(lanes)), corrected=False)
-            found.append(np.linalg.svd(np.moveaxis(batch.jacobian[:, :columns], -1, 0), compute_uv=False)[:, -1])
-        return np.concatenate(found)
+            smallest.append(np.linalg.svd(np.moveaxis(batch.jacobian[:, :columns], -1, 0), compute_uv=False)[:, -1])
+        return np.concatenate(smallest)
 
     @cached_property
     def outputs(self) -> Mapping[str, np.ndarray]:
@@ -386,32 +386,9 @@ class Curve(Displayed):
         return self._motion.evaluate(output, name).rename(time="point")
 
 
-def with_angular_velocity(coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return series of coordinates with the body-fixed angular velocity that their Euler parameters tell."""
-    if "quaternion" not in coordinates:
-        return coordinates
-    p = coordinates["quaternion"]
-    rates = p[1:] * np.arange(1, len(p)).reshape(-1, *[1] * (p.ndim - 1))
-    found = [sum((spin(p[j], rates[k - j]) for j in range(k + 1)), np.zeros_like(p[0, 1:])) for k in range(len(rates))]
-    return {**coordinates, "angular_velocity": np.array(found).reshape(len(rates), *p[0, 1:].shape)}
-
-
-def _one_of(found: Any, number: Any, name: str, what: str) -> Any:
+def _one_of(items: Any, number: Any, name: str, what: str) -> Any:
     """Return one of some, by a number that there is."""
-    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
-        there = f"there are {len(found)}, counted from 0" if len(found) else "there are none"
+    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(items):
+        there = f"there are {len(items)}, counted from 0" if len(items) else "there are none"
         raise MechanismError(f"no such one among the {what}: {there}", name=name, value=number)
-    return found[number]
-
-
-def posed(mechanism: Mechanism, coordinates: dict[str, np.ndarray]) -> Mechanism:
-    """Return a mechanism with other starting guesses of its bodies; coordinates have the ground first."""
-    bodies = {}
-    for k, (name, body) in enumerate(mechanism.bodies.items(), start=1):
-        given: dict[str, Any] = {"position": coordinates["position"][:, k].tolist()}
-        if "angle" in coordinates:
-            given["angle"] = float(coordinates["angle"][k])
-        else:
-            given["orientation"] = coordinates["quaternion"][:, k].tolist()
-        bodies[name] = dataclasses.replace(body, **given)
-    return dataclasses.replace(mechanism, bodies=bodies, assembly=None)
+    return items[number]

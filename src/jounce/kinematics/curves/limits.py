@@ -43,7 +43,7 @@ class LimitPosition:
 
 
 def limits_between(point: CurvePoint, stop: float, unit: float) -> list[LimitPosition]:
-    """Return the limit positions from a place, that excluded, to an arc length, that included.
+    """Return the limit positions from a point, that excluded, to an arc length, that included.
 
     The unit of the value is what it is worth as an unknown; a driver that stands all the way has none.
     """
@@ -53,13 +53,13 @@ def limits_between(point: CurvePoint, stop: float, unit: float) -> list[LimitPos
     size = np.max(np.abs(slopes), initial=0.0)
     if size <= STANDING * unit * step or abs(slopes[0]) > np.sum(np.abs(slopes[1:])):
         return []
-    found = []
+    limits = []
     for part in roots(slopes):
         if not 0 < part <= 1:
             continue
         here = point.recentered(part * step)
-        found.append(LimitPosition(here.arc_length, float(here.value[0]), _kind(slopes, part, size)))
-    return found
+        limits.append(LimitPosition(here.arc_length, float(here.value[0]), _kind(slopes, part, size)))
+    return limits
 
 
 def roots(coefficients: Float[np.ndarray, " order"]) -> list[float]:
@@ -71,7 +71,7 @@ def roots(coefficients: Float[np.ndarray, " order"]) -> list[float]:
     significant = np.flatnonzero(np.abs(coefficients) > ROUNDING * size)
     coefficients = coefficients[: significant[-1] + 1]
     slopes = (coefficients * np.arange(len(coefficients)))[1:]
-    found: list[float] = []
+    real_roots: list[float] = []
     for root in np.polynomial.polynomial.polyroots(coefficients):
         if abs(root.imag) > ON_THE_CURVE or not -ON_THE_CURVE < root.real < 1 + ON_THE_CURVE:
             continue
@@ -83,9 +83,9 @@ def roots(coefficients: Float[np.ndarray, " order"]) -> list[float]:
                 break
             part -= change
         vanishes = abs(_value(coefficients, part)) <= VANISHING * size
-        if vanishes and all(abs(part - other) > 2 * ON_THE_CURVE for other in found):
-            found.append(part)
-    return sorted(found)
+        if vanishes and all(abs(part - other) > 2 * ON_THE_CURVE for other in real_roots):
+            real_roots.append(part)
+    return sorted(real_roots)
 
 
 def _value(coefficients: Float[np.ndarray, " order"], part: float) -> float:
@@ -100,7 +100,7 @@ def _kind(slopes: Float[np.ndarray, " order"], part: float, size: float) -> Kind
 
 
 def values_between(point: CurvePoint, stop: float, value: float, period: float | None) -> list[float]:
-    """Return the arc lengths from a place to another at which the driver has a value, or one some periods away."""
+    """Return the arc lengths from a point to another at which the driver has a value, or one some periods away."""
     step = stop - point.arc_length
     terms = point.value * step ** np.arange(len(point.value))
     reach = float(np.sum(np.abs(terms[1:])))
@@ -110,5 +110,5 @@ def values_between(point: CurvePoint, stop: float, value: float, period: float |
     if period is not None:
         least, most = ((terms[0] + side * reach - value) / period for side in (-1, 1))
         targets = [value + period * k for k in range(int(np.floor(least)), int(np.ceil(most)) + 1)]
-    found = [part for target in targets for part in roots(np.array([terms[0] - target, *terms[1:]]))]
-    return [point.arc_length + part * step for part in found]
+    steps = [part for target in targets for part in roots(np.array([terms[0] - target, *terms[1:]]))]
+    return [point.arc_length + part * step for part in steps]

@@ -1,9 +1,9 @@
 """Walking along a curve of configurations: steps that no other branch hides in, from the start to its end.
 
-A step is as long as the series is good to rounding, and at most half as long as the way to the nearest singular place
+A step is as long as the series is good to rounding, and at most half as long as the way to the nearest singular point
 of the bordered Jacobian, real or complex. It is accepted where Newton-Raphson finds the curve where the series has it,
-at all of the places looked at in between, with the same sign of the determinant. Turning points of the driver are
-nothing special to it. Where branches cross, the steps shrink; the crossing is then located, told and passed.
+at all of the points looked at in between, with the same sign of the determinant. Turning points of the driver are
+nothing special to it. Where branches cross, the steps shrink; the crossing is then located, recorded and passed.
 """
 
 import dataclasses
@@ -32,7 +32,7 @@ SMALLEST_STEP = 1e-9
 NEGLIGIBLE = 1e-9
 SAME_DIRECTION = 1e-6
 MOST_CORRECTIONS = 50
-SHARE_OF_DISTANCE = 0.5  # to a singular place, made in one step
+SHARE_OF_DISTANCE = 0.5  # to a singular point, made in one step
 
 
 class End(enum.Enum):
@@ -46,7 +46,7 @@ class End(enum.Enum):
 
 @dataclasses.dataclass
 class Path:
-    """Places on a curve in the order of arc length, the change points passed, and how it ends."""
+    """Points on a curve in the order of arc length, the change points passed, and how it ends."""
 
     points: list[CurvePoint]
     change_points: list[ChangePoint] = dataclasses.field(default_factory=list)
@@ -61,13 +61,13 @@ class Path:
 
 
 def track_both_directions(tracker: PathTracker, start: CurvePoint, length: float) -> tuple[Path, Path | None]:
-    """Return the path from a place forward, and unless that closes, the one backward."""
+    """Return the path from a point forward, and unless that closes, the one backward."""
     forward = track(tracker, start, length)
     return forward, None if forward.end is End.CLOSED else track(tracker, start.reversed(), length)
 
 
 def track(tracker: PathTracker, start: CurvePoint, length: float) -> Path:
-    """Follow a curve from a place, until it closes, ends, or is as long as asked for."""
+    """Follow a curve from a point, until it closes, ends, or is as long as asked for."""
     path, point = Path([start]), start
     while point.arc_length - start.arc_length < length:
         ahead = tracker.singularity_distance(point)
@@ -93,12 +93,12 @@ def track(tracker: PathTracker, start: CurvePoint, length: float) -> Path:
 
 
 def nominal_step(tracker: PathTracker, point: CurvePoint) -> float:
-    """Return the arc length over which the series of a place is good to rounding."""
+    """Return the arc length over which the series of a point is good to rounding."""
     return tracker.radius(point) * TAIL ** (1 / ORDER)
 
 
 def _next_point(tracker: PathTracker, point: CurvePoint, reach: float) -> CurvePoint | End:
-    """Return a place further on, or why there is none."""
+    """Return the next accepted point, or the reason why there is none."""
     step = min(nominal_step(tracker, point), SHARE_OF_DISTANCE * reach)
     parts = np.arange(1, LANES + 1) / LANES
     end = End.SINGULAR
@@ -140,7 +140,7 @@ def _closing_step(tracker: PathTracker, point: CurvePoint, start: CurvePoint, le
 def step_to_configuration(
     tracker: PathTracker, point: CurvePoint, length: float, target: dict[str, np.ndarray]
 ) -> float | None:
-    """Return how far from a place, within a length, its curve goes through a configuration, if it does."""
+    """Return the step, within a length, at which a curve passes a configuration; None if it does not."""
     if np.max(np.abs(tracker.difference(point.at(0.0), target))) > 1.5 * length + NEGLIGIBLE:
         return None
     step = 0.0

@@ -1,4 +1,4 @@
-"""What walks along a curve of configurations: places on it with their series, and what a series tells on the host."""
+"""Numerical continuation along a curve of configurations: its points, with Taylor series in arc length, on the host."""
 
 import dataclasses
 from functools import cached_property
@@ -14,7 +14,7 @@ from jounce.rigid import PlanarPose
 from jounce.shapes import Numbers
 
 ORDER = 20
-LANES = 8  # places solved side by side: a number compiles once
+LANES = 8  # points solved side by side: a number compiles once
 TAIL = 1e-15  # of the series over a step, rad or sizes of the mechanism: rounding
 RANK_TOLERANCE = 1e-8  # of the largest singular value
 
@@ -30,7 +30,7 @@ def comb(n: np.ndarray, k: np.ndarray) -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True)
 class CurvePoint:
-    """A place on a curve, with the series of the curve in arc length from there.
+    """A point on a curve, with the series of the curve in arc length from there.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class CurvePoint:
         return {name: evaluate_series(c, step) for name, c in self.coordinates.items()}
 
     def recentered(self, step: float, order: int = ORDER) -> "CurvePoint":
-        """Return the place a step on that the series gives, with its terms up to an order."""
+        """Return the point a step on that the series gives, with its terms up to an order."""
         power = np.arange(order + 1)
         away = power[None] - power[:, None]
         shift = np.where(away >= 0, comb(power[None], power[:, None]) * step ** np.maximum(away, 0), 0.0)
@@ -71,7 +71,7 @@ class CurvePoint:
         return dataclasses.replace(self, coordinates=coordinates, **known)
 
     def reversed(self) -> "CurvePoint":
-        """Return the place on the same curve, gone along the other way."""
+        """Return the point with its series in the opposite direction."""
 
         def alternated(c: np.ndarray) -> np.ndarray:
             return c * ((-1.0) ** np.arange(len(c))).reshape(-1, *[1] * (c.ndim - 1))
@@ -81,11 +81,11 @@ class CurvePoint:
         return dataclasses.replace(self, coordinates=coordinates, **known)
 
     def shifted(self, arc_length: float) -> "CurvePoint":
-        """Return the place with its arc length counted from somewhere else."""
+        """Return the point with its arc length increased by that of another start."""
         return dataclasses.replace(self, arc_length=self.arc_length + arc_length)
 
     def shortened(self, order: int) -> "CurvePoint":
-        """Return the place with the coefficients above an order set to zero: rounding spoils those first."""
+        """Return the point with the coefficients above an order set to zero: rounding spoils those first."""
 
         def truncated(c: np.ndarray) -> np.ndarray:
             return np.concatenate([c[: order + 1], np.zeros_like(c[order + 1 :])])
@@ -96,10 +96,10 @@ class CurvePoint:
 
 def evaluate_series(coefficients: np.ndarray, step: float) -> np.ndarray:
     """Return what a series gives a step away."""
-    found = np.zeros_like(coefficients[0])
+    value = np.zeros_like(coefficients[0])
     for c in coefficients[::-1]:
-        found = found * step + c
-    return found
+        value = value * step + c
+    return value
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,7 +109,7 @@ class PathTracker:
     model: Model
     driven: bool
     value_scale: float = 1.0
-    timed: bool = False  # the value is the instant: the same pose at another one is another place
+    timed: bool = False  # the value is the instant: the same pose at another one is another point
 
     @property
     def columns(self) -> int:
@@ -130,10 +130,10 @@ class PathTracker:
     def _lengths(self) -> np.ndarray:
         return np.asarray(self.model.system.column_scale)[: self.model.pose_type.shifts, None]
 
-    # places
+    # points
 
     def point_without_series(self, coordinates: dict[str, Any], value: float) -> CurvePoint:
-        """Return a place without a series, of coordinates of shape (..., bodies, 1)."""
+        """Return a point without a series, of coordinates of shape (..., bodies, 1)."""
         series = {}
         for name, x in coordinates.items():
             series[name] = np.zeros((ORDER + 1, *np.shape(x)[:-1]))
@@ -145,14 +145,14 @@ class PathTracker:
         return self.with_jacobian(CurvePoint(0.0, series, values, nothing, nothing, first))
 
     def with_jacobian(self, point: CurvePoint) -> CurvePoint:
-        """Return a place with the Jacobian of its configuration and rows that are independent."""
+        """Return a point with the Jacobian of its configuration and rows that are independent."""
         points = self.points(point, np.zeros(1), np.ones(self.columns), corrected=False)
         jacobian = points.jacobian[..., 0]
         rows = self.independent(jacobian)
         return dataclasses.replace(point, jacobian=jacobian, rows=point.rows if rows is None else rows)
 
     def directed(self, point: CurvePoint, direction: Float[np.ndarray, " unknown"]) -> CurvePoint:
-        """Return a place with a straight line in a direction in the place of its series."""
+        """Return a point whose series is a straight line in a direction."""
         pose_type = self.model.pose_type
         shift, turn = self.parts(direction)
         first = {"position": shift, "angle": turn[0]} if pose_type is PlanarPose else {"position": shift}
@@ -173,7 +173,7 @@ class PathTracker:
         return np.asarray(shift)[..., 0], np.asarray(turn)[..., 0]
 
     def with_series(self, point: CurvePoint, direction: Float[np.ndarray, " unknown"] | None = None) -> CurvePoint:
-        """Return a place with its series, in a direction; unless told, that in which the value grows."""
+        """Return a point with its series, in a direction; by default that in which the value grows."""
         rows = point.rows
         jacobian = self.with_jacobian(point).jacobian
         tangent = self.null_space(jacobian[rows], 0.0)[:, -1] if direction is None else direction
@@ -212,7 +212,7 @@ class PathTracker:
         *,
         corrected: bool = True,
     ) -> CurvePoints:
-        """Return points of the curve some steps from one place, or from one place each with the same rows."""
+        """Return points of the curve some steps from one point, or from one point each with the same rows."""
         several = [centers] if isinstance(centers, CurvePoint) else centers
         rows, count = several[0].rows, len(steps)
 
@@ -223,7 +223,7 @@ class PathTracker:
         coordinates = {name: lanes([p.coordinates[name] for p in several]) for name in several[0].coordinates}
         directions = [self.tangent(p)[: self.columns] for p in several] if tangent is None else [tangent]
         padded = np.concatenate([steps, np.full(LANES - count, steps[-1])])
-        found = curve_points(
+        solved = curve_points(
             self.model.system,
             coordinates,
             lanes([p.value for p in several]),
@@ -236,8 +236,8 @@ class PathTracker:
             order=ORDER,
             driven=self.driven,
         )
-        cut = {name: np.asarray(x)[..., :count] for name, x in found.coordinates.items()}
-        others = [np.asarray(x)[..., :count] for x in found[1:]]
+        cut = {name: np.asarray(x)[..., :count] for name, x in solved.coordinates.items()}
+        others = [np.asarray(x)[..., :count] for x in solved[1:]]
         return CurvePoints(cut, *others)
 
     # what series tell
@@ -260,7 +260,7 @@ class PathTracker:
         return np.concatenate([column, value[1][None] / self.value_scale]) if self.driven else column
 
     def tangent(self, point: CurvePoint) -> Float[np.ndarray, " unknown"]:
-        """Return the direction of the curve at a place, of length one in the coordinates."""
+        """Return the direction of the curve at a point, of length one in the coordinates."""
         return self.rates(point.coordinates, point.value)
 
     def _curvature(self, point: CurvePoint) -> Float[np.ndarray, " unknown"]:
@@ -282,8 +282,8 @@ class PathTracker:
         scaled = point.coordinates["position"][1:] / self._lengths
         attitude = point.coordinates["angle" if self.is_planar else "quaternion"][1:]
         sizes = [np.abs(x).reshape(len(x), -1).max(axis=1) for x in (scaled, attitude)]
-        found = np.maximum(*sizes)
-        return np.where(np.isfinite(found), found, np.inf)
+        largest = np.maximum(*sizes)
+        return np.where(np.isfinite(largest), largest, np.inf)
 
     def radius(self, point: CurvePoint, highest: int = ORDER) -> float:
         """Return about how far the series converges, by its coefficients from the first to some order; at most one."""
@@ -303,7 +303,7 @@ class PathTracker:
         return np.linalg.slogdet(np.where(np.isfinite(whole), whole, 0.0))[0]
 
     def singularity_distance(self, point: CurvePoint) -> complex:
-        """Return the arc length to the nearest place where the bordered Jacobian is singular; it may be complex.
+        """Return the arc length to the nearest point where the bordered Jacobian is singular; it may be complex.
 
         As for motions in time (see `det_rate`): minus the inverse of the eigenvalue of ``B^-1 B'`` of largest size.
         """
@@ -320,15 +320,15 @@ class PathTracker:
 
     def independent(self, jacobian: Float[np.ndarray, "row unknown"]) -> Int[np.ndarray, " independent"] | None:
         """Return rows that are independent, one less than unknowns; None where there are not so many."""
-        wanted = self.unknowns - 1
-        if len(jacobian) == wanted:
-            return np.arange(wanted)
-        if len(jacobian) < wanted:
+        rank = self.unknowns - 1
+        if len(jacobian) == rank:
+            return np.arange(rank)
+        if len(jacobian) < rank:
             return None
         from scipy.linalg import qr  # here, since importing SciPy takes half a second
 
         order = np.asarray(qr(jacobian.T, mode="r", pivoting=True)[-1])
-        return np.sort(order[:wanted])
+        return np.sort(order[:rank])
 
     def null_space(
         self, jacobian: Float[np.ndarray, "row unknown"], tolerance: float = RANK_TOLERANCE
@@ -348,14 +348,14 @@ class PathTracker:
         """Return half the second derivatives of the residual along directions."""
         coordinates = {name: c[0][..., None] for name, c in point.coordinates.items()}
         scale, value = np.asarray(self.value_scale if self.driven else 0.0), np.asarray(point.value[0])
-        found = []
+        columns = []
         for first in range(0, directions.shape[1], LANES):
             some = directions[:, first : first + LANES]
             padded = np.zeros((self.columns + 1, LANES))
             padded[: self.unknowns, : some.shape[1]] = some
             arguments = (self.model.system, coordinates, value, padded, scale)
-            found.append(np.asarray(second_order(*arguments, pose_type=self.model.pose_type))[:, : some.shape[1]])
-        return np.concatenate(found, axis=1)
+            columns.append(np.asarray(second_order(*arguments, pose_type=self.model.pose_type))[:, : some.shape[1]])
+        return np.concatenate(columns, axis=1)
 
 
 def _rank(sizes: Float[np.ndarray, " k"], tolerance: float) -> int:
@@ -379,3 +379,13 @@ def all_finite(points: CurvePoints) -> Bool[np.ndarray, " lane"]:
     """Tell which points are finite with the series of the curve."""
     parts = (*points.coordinates.values(), points.value)
     return np.all([np.isfinite(x).reshape(-1, x.shape[-1]).all(axis=0) for x in parts], axis=0)
+
+
+def with_angular_velocity(coordinates: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return series of coordinates with the body-fixed angular velocity that follows from their Euler parameters."""
+    if "quaternion" not in coordinates:
+        return coordinates
+    p = coordinates["quaternion"]
+    rates = p[1:] * np.arange(1, len(p)).reshape(-1, *[1] * (p.ndim - 1))
+    terms = [sum((spin(p[j], rates[k - j]) for j in range(k + 1)), np.zeros_like(p[0, 1:])) for k in range(len(rates))]
+    return {**coordinates, "angular_velocity": np.array(terms).reshape(len(rates), *p[0, 1:].shape)}

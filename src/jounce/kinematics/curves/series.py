@@ -32,7 +32,7 @@ Lanes = Float[Numbers, " lane"]
 
 
 class CurvePoints(NamedTuple):
-    """Places on a curve of configurations; every array has the lanes last.
+    """Points on a curve of configurations; every array has the lanes last.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ def curve_points(
     value_scale : float
         Unit in which the value counts as an unknown.
     pose_type, order, driven
-        PlanarPose or SpatialPose; order of the series wanted; whether a driver is free.
+        PlanarPose or SpatialPose; order of the series requested; whether a driver is free.
     """
     curve = _Curve(system, rows, value_scale, driven)
     series = {name: Jet(tuple(c)) for name, c in coordinates.items()}
@@ -141,12 +141,13 @@ def curve_points(
     pose, reached, sizes = _corrected(curve, pose, reached, tangent, corrected)
     jacobian = curve.jacobian(pose, reached)
     factor = curve.bordered(jacobian, tangent)
-    found, whole = _differentiated(curve, pose, reached, factor, order)
-    slope = _slope(curve, pose, reached, _moved_on(series, step), Jet(tuple(value)).differentiate().evaluate(step))
+    value_rate = Jet(tuple(value)).differentiate().evaluate(step)
+    solved, value = _differentiated(curve, pose, reached, factor, order)
+    slope = _slope(curve, pose, reached, _moved_on(series, step), value_rate)
     residual = jnp.max(jnp.abs(curve.residual(pose.truncate(0), reached)), axis=0, initial=0.0)
     admissible = jnp.all(system.admissible(Jet([reached[None]])), axis=0)
     first, last, contraction = sizes
-    return CurvePoints(found, whole, jacobian, slope, first, last, contraction, residual, admissible)
+    return CurvePoints(solved, value, jacobian, slope, first, last, contraction, residual, admissible)
 
 
 def _corrected(curve: _Curve, pose: Any, value: Any, tangent: Any, corrected: Any) -> Any:
@@ -226,7 +227,7 @@ def _differentiated(curve: _Curve, pose: Any, value: Any, factor: DenseFactor, o
 
 
 def _still(point: Any, attitude: Any) -> Any:
-    """Return the pose of order zero at a place; Euler parameters are of unit length already."""
+    """Return the pose of order zero at a point; Euler parameters are of unit length already."""
     if attitude.ndim < point.ndim:
         return PlanarPose.from_jets(Jet([point]), Jet([attitude]))
     spins, axes = (tuple(Jet([x]) for x in f(attitude)) for f in (quaternion_spins, body_axes))
@@ -246,10 +247,10 @@ def _known_spin(quaternion: Any, turns: Any, k: Any) -> Any:
 
 def _convolved(left: Any, right: Any, order: Any, product: Any) -> Any:
     """Return the terms of the coefficient of an order of a product; what is not known yet is zero."""
-    places = order - np.arange(len(right))
+    counterparts = order - np.arange(len(right))
     left = left[: len(right)]
-    there = (places >= 0).reshape(-1, *[1] * (right.ndim - 1))
-    return product(left, jnp.where(there, jnp.take(right, jnp.clip(places, 0, len(right) - 1), axis=0), 0.0))
+    there = (counterparts >= 0).reshape(-1, *[1] * (right.ndim - 1))
+    return product(left, jnp.where(there, jnp.take(right, jnp.clip(counterparts, 0, len(right) - 1), axis=0), 0.0))
 
 
 def begun_series(coefficients: list[Any], order: int) -> Any:

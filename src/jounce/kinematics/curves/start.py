@@ -10,7 +10,7 @@ from jounce.constraints.facts import dimension_of_field, field_kinds
 from jounce.errors import MechanismError, MobilityError, SingularityError, check_name
 from jounce.execution.device import resident
 from jounce.jet import Jet
-from jounce.kinematics.assembly.assemble import check_assembled, freely_moving, settled
+from jounce.kinematics.assembly.assemble import check_assembled, find_assembly, freely_moving
 from jounce.kinematics.curves.path_tracker import CurvePoint, PathTracker
 from jounce.mechanism import Mechanism, build, time_grid
 from jounce.modules import with_fields
@@ -60,21 +60,21 @@ def freed(mechanism: Mechanism, instant: float, driver: str | None) -> Freed:
         If there are several drivers and none is named, or none has the name.
     """
     kind = "drivers" if mechanism.drivers else "initial"
-    found = getattr(mechanism, kind)
-    if driver == TIME and TIME not in found and found:
-        return Freed(_driven(mechanism, found), TIME, instant, "s")
+    elements = getattr(mechanism, kind)
+    if driver == TIME and TIME not in elements and elements:
+        return Freed(_driven(mechanism, elements), TIME, instant, "s")
     if driver is not None:
-        check_name("driver", driver, tuple(found), MechanismError, name="driver")
-    if not found:
+        check_name("driver", driver, tuple(elements), MechanismError, name="driver")
+    if not elements:
         return Freed(mechanism, None, 0.0, "")
     if driver is None:
-        if len(found) > 1:
-            message = f"there are several drivers, {', '.join(found)}: name the one whose value is to be free"
+        if len(elements) > 1:
+            message = f"there are several drivers, {', '.join(elements)}: name the one whose value is to be free"
             raise MechanismError(message, name="driver", value=None)
-        driver = next(iter(found))
-    values = law_values(_driven(mechanism, found), instant)
-    laws = {name: _with_law(x, "t" if name == driver else repr(values[name])) for name, x in found.items()}
-    return Freed(_driven(mechanism, laws), driver, values[driver], _unit(found[driver]))
+        driver = next(iter(elements))
+    values = law_values(_driven(mechanism, elements), instant)
+    laws = {name: _with_law(x, "t" if name == driver else repr(values[name])) for name, x in elements.items()}
+    return Freed(_driven(mechanism, laws), driver, values[driver], _unit(elements[driver]))
 
 
 def _driven(mechanism: Mechanism, drivers: Any) -> Mechanism:
@@ -85,11 +85,11 @@ def law_values(mechanism: Mechanism, instant: float) -> dict[str, float]:
     """Return what the laws of all drivers prescribe at an instant, by name."""
     model = build(mechanism)
     groups = [group for group in model.system.groups if group.is_driver]
-    found = []
+    values = []
     for group in groups:
         value = group.element.motion(Jet([np.full((1, 1), instant)])).coefficients[0]
-        found += np.broadcast_to(value, (group.instances, 1))[:, 0].tolist()
-    return {name.partition(".")[2]: value for name, value in zip(model.drivers, found, strict=True)}
+        values += np.broadcast_to(value, (group.instances, 1))[:, 0].tolist()
+    return {name.partition(".")[2]: value for name, value in zip(model.drivers, values, strict=True)}
 
 
 def _with_law(driver: Any, text: str) -> Any:
@@ -127,13 +127,13 @@ def start_of_curve(free: Freed, tolerance: float = 1e-12) -> tuple[PathTracker, 
     model = build(free.mechanism)
     if not model.rows:
         raise MobilityError(f"the mechanism has no joints: {model.system.shape[1]} degrees of freedom are left")
-    model, found = settled(model, free.value, tolerance)
+    model, attempt = find_assembly(model, free.value, tolerance)
     driven = free.driver is not None
-    check_assembled(model, found, free.value, free=not driven)
-    system = resident(with_fields(model.system, row_scale=found.scale[:, None]))
+    check_assembled(model, attempt, free.value, free=not driven)
+    system = resident(with_fields(model.system, row_scale=attempt.scale[:, None]))
     model = dataclasses.replace(model, system=system)
     tracker = PathTracker(model, driven, timed=free.driver == TIME)
-    point = tracker.point_without_series(found.coordinates, free.value)
+    point = tracker.point_without_series(attempt.coordinates, free.value)
     _check_freedom(tracker, point)
     tracker = tracker.scaled_at(point)
     return tracker, tracker.with_series(point)
@@ -173,3 +173,16 @@ def _unopposed(
     rows = tracker.left_null_space(jacobian)
     half = tracker.second_order(point, null)
     return bool(np.max(np.abs(rows.T @ half), initial=0.0) < VANISHING)
+
+
+def posed(mechanism: Mechanism, coordinates: dict[str, np.ndarray]) -> Mechanism:
+    """Return a mechanism with other starting guesses of its bodies; coordinates have the ground first."""
+    bodies = {}
+    for k, (name, body) in enumerate(mechanism.bodies.items(), start=1):
+        given: dict[str, Any] = {"position": coordinates["position"][:, k].tolist()}
+        if "angle" in coordinates:
+            given["angle"] = float(coordinates["angle"][k])
+        else:
+            given["orientation"] = coordinates["quaternion"][:, k].tolist()
+        bodies[name] = dataclasses.replace(body, **given)
+    return dataclasses.replace(mechanism, bodies=bodies, assembly=None)

@@ -71,5 +71,5 @@ def assemble_side_by_side(
 
     gaps = residual(pose_at(coordinates, pose_type))
     start = (coordinates, gaps, np.full(lanes, FIRST_DAMPING), 0)
-    found, gaps, _, _ = jax.lax.while_loop(unfinished, iterate, start)
-    return found, jnp.max(jnp.abs(gaps), axis=0, initial=0.0)
+    assembled, gaps, _, _ = jax.lax.while_loop(unfinished, iterate, start)
+    return assembled, jnp.max(jnp.abs(gaps), axis=0, initial=0.0)

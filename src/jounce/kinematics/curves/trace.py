@@ -11,7 +11,7 @@ from jounce.mechanism.carriages import check_without_ends
 from jounce.mechanism.preconditions import check_holonomic, concrete
 from jounce.shapes import Real
 
-HIGHEST_ORDER = 8  # of derivatives with respect to arc length: those above are worse than rounding between the places
+HIGHEST_ORDER = 8  # of derivatives with respect to arc length: those above are worse than rounding between the points
 
 
 @concrete

@@ -190,14 +190,14 @@ def _loop(hinges: list[Hinge], crank: str, links: int) -> list[tuple[str, Hinge,
     first = [h for h in hinges if set(h[0]) == {GROUND, crank}]
     if len(first) != 1:
         return None
-    found, body, hinge = [], crank, first[0]
-    while body != GROUND and len(found) < links:
+    members, body, hinge = [], crank, first[0]
+    while body != GROUND and len(members) < links:
         following = [h for h in hinges if body in h[0] and h is not hinge]
         if len(following) != 1:
             return None
-        found.append((body, hinge, following[0]))
+        members.append((body, hinge, following[0]))
         body, hinge = _other(following[0], body), following[0]
-    return found if body == GROUND and len(found) == links else None
+    return members if body == GROUND and len(members) == links else None
 
 
 def _four_bar(loop: list[tuple[str, Hinge, Hinge]]) -> FourBar | None:

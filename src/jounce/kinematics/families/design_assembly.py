@@ -1,4 +1,4 @@
-"""Designs put together side by side, as each would be alone: by damped Gauss-Newton from its starting guess."""
+"""Designs assembled side by side, with the steps of each: damped Gauss-Newton from its starting guess."""
 
 from typing import Any, NamedTuple
 
@@ -58,7 +58,7 @@ def _assembled(
     def scale_at(pose: Any) -> Any:
         entries = jnp.abs(unscaled.entries(pose, time))
         padded = jnp.concatenate([entries, jnp.zeros((1, entries.shape[-1]))])
-        largest = jnp.max(padded[system.pattern.places], axis=(1, 2))
+        largest = jnp.max(padded[system.pattern.entry_indices], axis=(1, 2))
         return 1 / jnp.where((largest > 0) & jnp.isfinite(largest), largest, 1.0)
 
     def going(state: Any) -> Any:
@@ -87,9 +87,9 @@ def _assembled(
         part, good, _ = jax.lax.while_loop(
             lambda s: jnp.any(moving & ~s[1]) & (s[2] < HALVINGS), halve, (whole, better(whole), jnp.zeros((), int))
         )
-        found = {name: jet.coefficients[0] for name, jet in displaced(part).coordinates().items()}
+        trial = {name: jet.coefficients[0] for name, jet in displaced(part).coordinates().items()}
         take = moving & good
-        coordinates = {name: jnp.where(_wide(take, x), found[name], x) for name, x in coordinates.items()}
+        coordinates = {name: jnp.where(_wide(take, x), trial[name], x) for name, x in coordinates.items()}
         return coordinates, take & (size > tolerance), count + 1
 
     lag = jnp.where(driven, jnp.abs(unscaled.residual(pose_at(guess, pose_type), time).coefficients[0]), 0.0)
@@ -112,7 +112,7 @@ def _of_many(shared: Any, designs: Any, *, pose_type: type[Pose]) -> Trials:
 
 @mapped(by_xla=_of_many, made_of=(_assembled,))
 def assemble_from_guess(shared: Any, designs: Any, *, pose_type: type[Pose]) -> Trials:
-    """Put a design together by the steps that it would take alone; see `assembly.gauss_newton.assemble_from_guess`.
+    """Assemble a design by damped Gauss-Newton; see `assembly.gauss_newton.assemble_from_guess`.
 
     Parameters
     ----------

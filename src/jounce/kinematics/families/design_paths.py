@@ -17,7 +17,12 @@ from jounce.execution.threads import Threads
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near
 from jounce.kinematics.continuation.correct_and_differentiate import SolvedState
-from jounce.kinematics.continuation.path_following import PLACES, SMALLEST_STEP, blended_attitudes, is_spoiled_outside
+from jounce.kinematics.continuation.path_following import (
+    SAMPLES_A_STEP,
+    SMALLEST_STEP,
+    blended_attitudes,
+    is_spoiled_outside,
+)
 from jounce.kinematics.continuation.solver import Solver
 from jounce.kinematics.continuation.step_control import (
     ExpansionPoint,
@@ -122,7 +127,7 @@ class DesignPaths:
 
     def _followed(self, coordinates: Coordinates, lanes: Indices) -> Group:
         """Follow some designs."""
-        solver, (first, last), found = self.solver, self._ends, Group(lanes, [])
+        solver, (first, last), group = self.solver, self._ends, Group(lanes, [])
         limits = StepLimits(np.asarray(last), np.asarray(SMALLEST_STEP * (last - first)))
         known = solver.needed(solver.still({name: x[..., lanes] for name, x in coordinates.items()}))
         start = np.full(len(lanes), first)
@@ -134,7 +139,7 @@ class DesignPaths:
         )
         for _ in range(MOST_STEPS):
             if not lanes.size:
-                return found
+                return group
             away, own = control.target - control.expansion_point.instant, self.designs.own(lanes)
             arrival = solver.program((known, away, control.target, own, np.ones(len(lanes), bool)))
             there: Any = ExpansionPoint(control.target, arrival.safe_step, arrival.radius, arrival.det_rate)
@@ -144,14 +149,14 @@ class DesignPaths:
             ended = control.ending != StopReason.UNFINISHED
             self.apart[lanes[unlike | ended & (control.ending != StopReason.ARRIVED)]] = True
             reached = arrival.state(slice(None) if taken.all() else taken)
-            found.steps.append(Anchors(lanes[taken], there.instant[taken], reached))
+            group.steps.append(Anchors(lanes[taken], there.instant[taken], reached))
             known = solver.needed(reached) if taken.all() else _replaced(known, taken, solver.needed(reached))
             if (left := ~(ended | unlike)).all():
                 continue
             lanes = lanes[left]
             control, known = jax.tree.map(lambda x, some=left: x[..., some], (control, known))
         self.apart[lanes] = True
-        return found
+        return group
 
     def solved(self, threads: int) -> tuple[list[list[np.ndarray]], Int[np.ndarray, "design time"]]:
         """Return the outputs of all designs, and their status.
@@ -183,9 +188,9 @@ class DesignPaths:
         def put(item: tuple[Group, Indices], state: SolvedState, outcome: Indices) -> None:
             block = item[1]
             status[block] = self._as_given(outcome.reshape(len(block), times), block)
-            for whole, found in zip(wholes, state[1], strict=True):
+            for whole, part in zip(wholes, state[1], strict=True):
                 with np.errstate(over="ignore"):  # of what failed
-                    derivatives = plain_derivatives(found[:levels])
+                    derivatives = plain_derivatives(part[:levels])
                 values = derivatives.reshape(*derivatives.shape[:-1], len(block), times)
                 whole[..., block, :] = self._as_given(values, block)
 
@@ -233,7 +238,7 @@ class DesignPaths:
         owner, at, parts, order = group.anchors_of(designs)
         owner, at = owner[order], at[order]
         system = self.designs.system(designs[owner])
-        measuring = [(g, found) for g, found in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
+        measuring = [(g, output) for g, output in zip(system.outputs, outputs, strict=True) if measures_angle(g)]
         if not measuring:
             return
         leaves = [np.concatenate(part, axis=-1)[..., order] for part in parts]
@@ -245,7 +250,7 @@ class DesignPaths:
         def instants(anchor: Indices, share: Lanes) -> Lanes:
             return at[anchor] + share * (at[following[anchor]] - at[anchor])
 
-        for counted, found in measuring:
+        for counted, output in measuring:
 
             def measured(anchor: Indices, share: Lanes, group: Any = counted) -> Float[np.ndarray, "angle lane"]:
                 ends = anchor, following[anchor]
@@ -254,10 +259,10 @@ class DesignPaths:
                 return raw_angles([own], {"quaternion": attitudes})[0]
 
             begun = np.broadcast_to(counted.element.datum.near, (counted.instances, len(owner)))
-            places = counted_along(measured, owner, begun, PLACES)
-            known = owner[places.path], instants(places.path, places.share)
+            samples = counted_along(measured, owner, begun, SAMPLES_A_STEP)
+            known = owner[samples.path], instants(samples.path, samples.share)
             nearest = _nearest(*known, self._instants[designs], self._ends)
-            for values, angle in zip(found, places.angle, strict=True):
+            for values, angle in zip(output, samples.angle, strict=True):
                 expected = self._as_given(angle[nearest], designs)
                 values[designs, :, 0, 0] = brought_near(values[designs, :, 0, 0], expected)
 
@@ -284,7 +289,7 @@ def _nearest(
 ) -> Int[np.ndarray, "design time"]:
     """Return the anchor of its design that is nearest to each instant, by index; anchors are in order.
 
-    Owners and instants are told by one number, so that all are found in one search.
+    One number encodes owner and instant, so that one search finds all.
     """
     first, last = ends
     scale, design = 0.5 / max(last - first, 1e-300), np.arange(len(instants))[:, None]
@@ -294,7 +299,7 @@ def _nearest(
     return np.where(instants - at[before] <= at[after] - instants, before, after)
 
 
-def _replaced(state: Any, lanes: Any, found: Any) -> Any:
+def _replaced(state: Any, lanes: Any, new: Any) -> Any:
     """Return a state with that of some lanes in its place."""
 
     def replaced(whole: np.ndarray, part: np.ndarray) -> np.ndarray:
@@ -302,4 +307,4 @@ def _replaced(state: Any, lanes: Any, found: Any) -> Any:
         whole[..., lanes] = part
         return whole
 
-    return jax.tree.map(replaced, state, found)
+    return jax.tree.map(replaced, state, new)

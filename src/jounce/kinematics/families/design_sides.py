@@ -29,7 +29,7 @@ class Sides:
 
     def like(self, values: Mapping[str, np.ndarray]) -> "Sides":
         """Return them with the axes of other values of the same outputs."""
-        named = {name: found.reshape(*found.shape[:3], *values[name].shape[3:]) for name, found in self.values.items()}
+        named = {name: array.reshape(*array.shape[:3], *values[name].shape[3:]) for name, array in self.values.items()}
         return dataclasses.replace(self, values=named)
 
 
@@ -52,17 +52,17 @@ def sides_of_designs(
     different = 0
     if laws_may_break(mechanism, forces=forces):
         different = count if breaks_depend_on(mechanism, parameters) else 1
-    found = []
+    sides = []
     for k in range(different):
         try:
             design = mechanism.with_parameters(**{name: float(values[k]) for name, values in parameters.items()})
             breaks = breaks_of_laws(design, first, last, order, forces=forces)
-        except JounceError:  # told when the design is solved
+        except JounceError:  # solving the design raises it
             breaks = np.zeros(0)
-        sides, which = both_sides(breaks, first, last)
-        found.append((breaks[which], sides))
-    most = max((len(sides) for _, sides in found), default=0)
+        instants, which = both_sides(breaks, first, last)
+        sides.append((breaks[which], instants))
+    most = max((len(instants) for _, instants in sides), default=0)
     both = np.full((2, count, most), first)
-    for k, pair in enumerate(found * (count // max(different, 1))):
+    for k, pair in enumerate(sides * (count // max(different, 1))):
         both[:, k, : len(pair[0])] = pair
     return both[0], both[1]

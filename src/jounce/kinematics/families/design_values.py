@@ -48,8 +48,8 @@ class Designs:
 
         def one(row: Any) -> tuple[list[Any], Any]:
             varied = self.design(row)
-            found = traced_model(varied, model.length).system
-            leaves = jax.tree.leaves((found.groups, found.outputs))
+            system = traced_model(varied, model.length).system
+            leaves = jax.tree.leaves((system.groups, system.outputs))
             fixed[:] = [None if isinstance(leaf, Tracer) else leaf for leaf in leaves]
             guess = starting_guess(varied, varied.parameter_values, POSITION_COMPONENTS[varied.space])
             return [leaf for leaf in leaves if isinstance(leaf, Tracer)], jax.tree.map(jnp.asarray, guess)
@@ -68,8 +68,8 @@ class Designs:
         whole = [jax.tree.leaves((model.system.groups, model.system.outputs)) for model in models]
         columns = [[np.asarray(leaf, float) for leaf in column] for column in zip(*whole, strict=True)]
         same = [all(np.array_equal(leaf, column[0]) for leaf in column) for column in columns]
-        fixed = [leaf if held else None for leaf, held in zip(whole[0], same, strict=True)]
-        self._set(fixed, [np.concatenate(c, axis=-1) for c, held in zip(columns, same, strict=True) if not held])
+        fixed = [leaf if fixes else None for leaf, fixes in zip(whole[0], same, strict=True)]
+        self._set(fixed, [np.concatenate(c, axis=-1) for c, fixes in zip(columns, same, strict=True) if not fixes])
         return self
 
     def _set(self, fixed: list[Any], values: list[np.ndarray]) -> None:
@@ -96,11 +96,11 @@ class Designs:
     def _varied(self) -> tuple[int, ...]:
         """Which leaves of their system have an entry for each lane."""
         groups, outputs = jax.tree.unflatten(self._structure, [leaf is None for leaf in self._fixed])
-        held = jax.tree.map(lambda _: False, self.model.system)
-        return tuple(np.flatnonzero(jax.tree.leaves(with_fields(held, groups=groups, outputs=outputs))).tolist())
+        constant = jax.tree.map(lambda _: False, self.model.system)
+        return tuple(np.flatnonzero(jax.tree.leaves(with_fields(constant, groups=groups, outputs=outputs))).tolist())
 
     def assembled(self, instant: float, tolerance: float) -> Trials:
-        """Return how all designs could be put together at an instant, s, to a tolerance, rad or sizes."""
+        """Assemble all designs at an instant, s, to a tolerance, rad or sizes of the mechanism."""
         count, model = len(self.rows), self.model
         driven = np.array([[name.startswith("drivers.")] for name in model.rows])
         designs = self.guess, np.full(count, instant), self.own(slice(None))

@@ -14,7 +14,7 @@ from jounce.mechanism.carriages import joint_of
 from jounce.trajectory.curves import CurveLaw
 
 SLACK = 1e-9  # of the length of a curve: how far rounding may take a point beyond its end
-PLACES = 24  # in each step of a motion at which its parameters are looked at
+SAMPLES = 24  # in each step of a motion at which its parameters are looked at
 HALVINGS = 60
 
 
@@ -34,7 +34,7 @@ class CurveEnds:
         By which that coordinate is the parameter, m.
     low, high : float
         The least and the greatest value of the parameter.
-    alone : bool
+    is_only : bool
         Whether it is the only parameter: that of a curve.
     """
 
@@ -45,7 +45,7 @@ class CurveEnds:
     unit: float
     low: float
     high: float
-    alone: bool
+    is_only: bool
 
     @property
     def slack(self) -> float:
@@ -53,7 +53,7 @@ class CurveEnds:
         return SLACK * (self.high - self.low)
 
     def excess(self, position: Float[np.ndarray, "component body *time"]) -> Float[np.ndarray, "*time"]:
-        """Return how far places of bodies are beyond an end, below zero where they are between both."""
+        """Return how far positions of bodies are beyond an end, below zero where they are between both."""
         value = np.asarray(position)[self.component, self.body] / self.unit
         return np.asarray(np.maximum(self.low - value, value - self.high) - self.slack)
 
@@ -64,19 +64,19 @@ class CurveEnds:
 
 def ends_of(model: Model) -> list[CurveEnds]:
     """Return the ends of all open curves of a mechanism."""
-    found = []
+    ends = []
     for group in model.system.groups:
         for curve in (value for value in vars(group.element).values() if isinstance(value, CurveLaw)):
             if curve.ends is None:
                 continue
-            ends, unit = (np.asarray(x, float) for x in (curve.ends, curve.unit))
+            limits, unit = (np.asarray(x, float) for x in (curve.ends, curve.unit))
             for k, body in enumerate(group.bodies[-1]):
                 joint = joint_of(model.bodies[body - 1])
                 for component, name in enumerate(group.element.hidden):
-                    low, high = ends[2 * component : 2 * component + 2, k, 0].tolist()
-                    alone = len(group.element.hidden) == 1
-                    found.append(CurveEnds(joint, name, body, component, float(unit[k, 0]), low, high, alone))
-    return found
+                    low, high = limits[2 * component : 2 * component + 2, k, 0].tolist()
+                    is_only = len(group.element.hidden) == 1
+                    ends.append(CurveEnds(joint, name, body, component, float(unit[k, 0]), low, high, is_only))
+    return ends
 
 
 def beyond_end(model: Model, coordinates: Mapping[str, Float[np.ndarray, "..."]]) -> str:
@@ -94,18 +94,18 @@ def cut_at_ends(path: FollowedPath, model: Model, grid: Float[np.ndarray, " time
     The grid has the instants that were solved on the way, s.
     """
     for ends in ends_of(model):
-        found = _leaves(path, ends)
-        if found is None:
+        end = _leaves(path, ends)
+        if end is None:
             continue
-        instant, beyond_high = found
+        instant, beyond_high = end
         if instant >= path.ended_at:
             continue
         path.anchors = [anchor for anchor in path.anchors if anchor.instant <= instant] or path.anchors[:1]
         path.change_points = [point for point in path.change_points if point.instant <= instant]
         path.solved_instants = [
-            (lanes[kept], jax.tree.map(lambda x, kept=kept: x[..., kept], state))
+            (lanes[inside], jax.tree.map(lambda x, inside=inside: x[..., inside], state))
             for lanes, state in path.solved_instants
-            for kept in [grid[lanes] < instant]
+            for inside in [grid[lanes] < instant]
         ]
         path.ended(Status.END_OF_CURVE, instant, ends.words(beyond_high))
     return path
@@ -117,21 +117,21 @@ def _leaves(path: FollowedPath, ends: CurveEnds) -> tuple[float, bool] | None:
     series = [np.asarray(anchor.state[0]["position"])[:, :, ends.body : ends.body + 1] for anchor in path.anchors]
     whole = np.concatenate(series, axis=-1)
     whole = np.where(np.isfinite(whole), whole, 0.0)
-    alone = dataclasses.replace(ends, body=0)
+    shared = dataclasses.replace(ends, body=0)
 
-    def places(instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, "component 1 time"]:
+    def positions(instants: Float[np.ndarray, " time"]) -> Float[np.ndarray, "component 1 time"]:
         return attitudes_between(times, whole, instants)
 
-    since = np.diff(times)[:, None] * (np.arange(PLACES) / PLACES)
+    since = np.diff(times)[:, None] * (np.arange(SAMPLES) / SAMPLES)
     instants = np.append((times[:-1, None] + since).ravel(), times[-1])
-    beyond = alone.excess(places(instants)) > 0
+    beyond = shared.excess(positions(instants)) > 0
     if not beyond.any():
         return None
     first = int(np.argmax(beyond))
     low, high = float(instants[max(first - 1, 0)]), float(instants[first])
     for _ in range(HALVINGS if first else 0):
         middle = 0.5 * (low + high)
-        out = bool(alone.excess(places(np.array([middle])))[0] > 0)
+        out = bool(shared.excess(positions(np.array([middle])))[0] > 0)
         low, high = (low, middle) if out else (middle, high)
-    value = float(places(np.array([high]))[ends.component, 0, 0]) / ends.unit
+    value = float(positions(np.array([high]))[ends.component, 0, 0]) / ends.unit
     return high, value > ends.high

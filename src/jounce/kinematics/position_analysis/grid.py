@@ -136,7 +136,7 @@ class GridSolver:
         return np.where(nearer & known, neighbor, nearest)
 
     def _solve_batch(self, batch: tuple[Indices, Indices]) -> StepResult:
-        """Return what comes of a batch of instants, with their sources; nothing is kept but the state at its lanes."""
+        """Solve a batch of instants from their sources, and store the states of its lanes."""
         lanes, source = batch
         known = jax.tree.map(lambda x: x[..., source], self.solver.needed(self._store))
         arrival = self.solver(known, self.time[lanes] - self._instants[source], self.time[lanes])
@@ -144,7 +144,7 @@ class GridSolver:
         return arrival
 
     def _finish_batch(self, lanes: Indices, arrival: StepResult) -> None:
-        """Keep the outcome of a batch, and follow the motion to the instants that failed."""
+        """Store the outcome of a batch, and follow the motion to the instants that failed."""
         self.status[lanes] = arrival.status
         for k in np.flatnonzero(arrival.status != Status.OK).tolist():
             self.faults[int(lanes[k])] = self.solver.fault(arrival, k)
@@ -194,8 +194,8 @@ class GridSolver:
             return
         solved = self.status[lanes] == Status.OK
         names = self.solver.model.pose_type.predictor
-        apart = [np.abs(state[0][name][0] - self._store[0][name][0][..., lanes])[..., solved] for name in names]
-        if max(np.max(x, initial=0.0) for x in apart) > LARGEST_DISAGREEMENT:
+        deviations = [np.abs(state[0][name][0] - self._store[0][name][0][..., lanes])[..., solved] for name in names]
+        if max(np.max(x, initial=0.0) for x in deviations) > LARGEST_DISAGREEMENT:
             self._refuse(away < spoiled_width(point, self.solver.order))
             return
         self.status[lanes] = Status.OK

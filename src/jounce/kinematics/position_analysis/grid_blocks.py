@@ -4,7 +4,7 @@ An instant is predicted from the one whose index is its own with the last binary
 multiple of a stride, a power of two, and starts from an anchor; or from the anchor, where that is nearer. So the
 instants from a multiple of the stride up to the next one start from nothing beyond it. A block is as many of these as a
 round has instants: a vector of machine code, or what XLA solves side by side. They are solved round after round, in the
-memory of a thread, which stays in the cache; what is wanted of them is copied out of it.
+memory of a thread, which stays in the cache; the requested results are copied out of it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -42,7 +42,7 @@ class Block(NamedTuple):
     stride: int
 
     @property
-    def place(self) -> slice:
+    def indices(self) -> slice:
         """Where they are in arrays of all instants."""
         return slice(self.first, self.first + self.count)
 
@@ -93,13 +93,13 @@ def rounds(count: int, stride: int, width: int) -> Int[np.ndarray, "round lane"]
     round is solved again.
     """
     group = min(GROUP, stride)
-    found = [np.empty((0, width), np.int64)]
-    for turns, members, apart in ((range(stride // group), stride // group, group), (range(1, group), group, 1)):
-        lanes = np.arange(width) * (members * apart)
-        block = np.array(turns, np.int64)[:, None] * apart + lanes
-        starts = np.arange(0, count, members * apart * width)
-        found.append((starts[:, None, None] + block).reshape(-1, width))
-    whole = np.concatenate(found)
+    result = [np.empty((0, width), np.int64)]
+    for turns, members, distance in ((range(stride // group), stride // group, group), (range(1, group), group, 1)):
+        lanes = np.arange(width) * (members * distance)
+        block = np.array(turns, np.int64)[:, None] * distance + lanes
+        starts = np.arange(0, count, members * distance * width)
+        result.append((starts[:, None, None] + block).reshape(-1, width))
+    whole = np.concatenate(result)
     whole = whole[whole[:, 0] < count]
     return np.where(whole < count, whole, whole[:, :1])
 
@@ -160,11 +160,11 @@ def solve_blocks(
     most = max(map(len, around.values()), default=0)
 
     def begin(buffer: SolveBuffer, block: Block) -> int:
-        _begin(buffer, time[block.place], around[block], block.stride)
+        _begin(buffer, time[block.indices], around[block], block.stride)
         return block.count
 
     def put_block(block: Block, state: Any, status: Indices) -> None:
-        put(block.place, state, status)
+        put(block.indices, state, status)
 
     return solve_in_buffers(
         lambda: SolveBuffer(solver, path.anchors[0].state, size, most), blocks, begin, put_block, each

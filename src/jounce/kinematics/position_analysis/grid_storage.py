@@ -22,7 +22,7 @@ CHUNK = 2**16  # instants
 
 
 class Solved(NamedTuple):
-    """What is known of all instants of a grid.
+    """The solution at all instants of a grid.
 
     Attributes
     ----------
@@ -67,9 +67,9 @@ def solve_grid(
         Whether the jets of all bodies are kept; where they fit into one chunk, unless given. They are computed again
         when they are asked for.
     """
-    kept = len(time) <= CHUNK if keep is None else keep
+    keeps_series = len(time) <= CHUNK if keep is None else keep
     status, faults = np.empty(len(time), int), {}
-    store = None if len(time) <= CHUNK else _Store(path.anchors[0].state, len(time), kept=kept)
+    store = None if len(time) <= CHUNK else _Store(path.anchors[0].state, len(time), keeps_series=keeps_series)
     report = None if progress is None else _without_decrease(progress)
     solved = frozenset() if store is None else _solved_at_once(solver, path, time, report, threads, (store, status))
     state: Any = None
@@ -81,13 +81,13 @@ def solve_grid(
         else:
             store.put(slice(first, first + len(part.time)), *part.state)
     coordinates, outputs = state if store is None else store.state
-    if kept:
+    if keeps_series:
         return Solved(coordinates, outputs, status, faults)
     return Solved(lambda: _coordinates(solver, path, time, threads), outputs, status, faults)
 
 
 def _without_decrease(progress: Callable[[int, int], None]) -> Callable[[int, int], None]:
-    """Return what tells the progress, where some instants may be solved twice: it never goes back."""
+    """Return a progress callback that never decreases, although some instants may be solved twice."""
     furthest = 0
 
     def report(done: int, total: int) -> None:
@@ -122,14 +122,14 @@ def _solved_at_once(
         if count > LONG_GRID and end < path.ended_at and not near:
             stride = stride_of(solver, count, count, len(path.anchors_around(begin, end)))
             blocks[first] = blocks_for(solver, first, count, stride)
-    done, wanted = 0, [*itertools.chain(*blocks.values())]
+    done, queue = 0, [*itertools.chain(*blocks.values())]
 
     def put(lanes: slice, state: SolvedState, outcome: Int[np.ndarray, " lane"]) -> None:
         store.put(lanes, *state[:2], series=True)
         status[lanes] = outcome
 
     with Threads(threads, compiled=solver.is_compiled) as pool:
-        for solved in solve_blocks(solver, path, time, wanted, put, pool.map):
+        for solved in solve_blocks(solver, path, time, queue, put, pool.map):
             done += solved
             if progress is not None:
                 progress(done, len(time))
@@ -139,8 +139,8 @@ def _solved_at_once(
 class _Store:
     """Arrays for the states of all instants of a grid of several chunks: of outputs and, if kept, of coordinates."""
 
-    def __init__(self, like: SolvedState, count: int, *, kept: bool):
-        self.state: Any = empty_state((like[0] if kept else {}, like[1]), count)
+    def __init__(self, like: SolvedState, count: int, *, keeps_series: bool):
+        self.state: Any = empty_state((like[0] if keeps_series else {}, like[1]), count)
 
     def put(
         self, lanes: slice, coordinates: Mapping[str, Any], outputs: Sequence[Any], *, series: bool = False
@@ -149,10 +149,10 @@ class _Store:
 
         Series are of any size where an instant failed, which is solved again.
         """
-        kept, shown = self.state
-        for name, whole in kept.items():
+        coordinates_kept, outputs_kept = self.state
+        for name, whole in coordinates_kept.items():
             whole[..., lanes] = coordinates[name]
-        for whole, part in zip(shown, outputs, strict=True):
+        for whole, part in zip(outputs_kept, outputs, strict=True):
             if series:
                 with np.errstate(over="ignore"):
                     plain_derivatives(part, out=whole[..., lanes])
@@ -164,8 +164,8 @@ def _coordinates(
     solver: Solver, path: FollowedPath, time: Float[np.ndarray, " time"], threads: int
 ) -> dict[str, np.ndarray]:
     """Return the jets of the coordinates of all bodies, solved once more."""
-    found: Any = solve_grid(solver, path, time, None, threads, keep=True).coordinates
-    return found
+    coordinates: Any = solve_grid(solver, path, time, None, threads, keep=True).coordinates
+    return coordinates
 
 
 def solved_chunks(

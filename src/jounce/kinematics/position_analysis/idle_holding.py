@@ -1,4 +1,4 @@
-"""Motions of mechanisms with idle motions: these are held by the least motion, and nothing told may depend on them."""
+"""Motions of mechanisms with idle motions: they are held by the least motion, and no output may depend on them."""
 
 import dataclasses
 import functools
@@ -31,7 +31,7 @@ ORDER = 4  # of the derivatives by which outputs are compared
 BETWEEN = 0.618  # of the time: an instant at which they are compared, beside the first and the last
 
 
-def with_idle_held(mechanism: Mechanism, idle: IdleMotions) -> Mechanism:
+def with_idle_motions_held(mechanism: Mechanism, idle: IdleMotions) -> Mechanism:
     """Return the mechanism with joints by which its idle motions are the least: no spin about the axes."""
     taken = {*mechanism.joints, *mechanism.drivers, *mechanism.initial}
     holds = {}
@@ -43,8 +43,8 @@ def with_idle_held(mechanism: Mechanism, idle: IdleMotions) -> Mechanism:
     return dataclasses.replace(mechanism, joints={**mechanism.joints, **holds})
 
 
-def spins_held(mechanism: Mechanism) -> dict[str, SpinHold]:
-    """Return what holds idle motions of a mechanism, by name."""
+def spin_holds(mechanism: Mechanism) -> dict[str, SpinHold]:
+    """Return the joints that hold idle motions of a mechanism, by name."""
     return {name: joint for name, joint in mechanism.joints.items() if isinstance(joint, SpinHold)}
 
 
@@ -56,11 +56,11 @@ def idle_words(idle: IdleMotions, *, axes: bool = False) -> str:
     >>> idle_words({"rod": (("rod", "cap"), (0.0, 0.6, 0.8))}, axes=True)
     'rod and cap as one about [0, 0.6, 0.8] of rod'
     """
-    told = []
+    reported = []
     for first, (bodies, axis) in idle.items():
         about = f" about [{', '.join(f'{x + 0.0:.4g}' for x in axis)}] of {first}" if axes else ""
-        told.append(" and ".join(bodies) + (" as one" if len(bodies) > 1 else "") + about)
-    return "; ".join(told)
+        reported.append(" and ".join(bodies) + (" as one" if len(bodies) > 1 else "") + about)
+    return "; ".join(reported)
 
 
 def warn_of_idle(idle: IdleMotions) -> None:
@@ -94,16 +94,16 @@ def holding_idle(solver: Callable[[], Callable[..., Any]]) -> Callable[[Callable
             if holds_tracer(given):  # a change of design may end an idle motion, and depend on how far it has gone
                 message = f"these bodies may spin about themselves: {idle_words(idle)}; hold them by joints"
                 raise UnsupportedError(f"{message} where a motion is differentiated", name="mechanism")
-            mechanism = with_idle_held(given["mechanism"], idle)
+            mechanism = with_idle_motions_held(given["mechanism"], idle)
             check: Any = functools.partial(check_independent, mechanism, idle, given.get("time"), solver())
             check()
             warn_of_idle(idle)
             rest: Any = {name: value for name, value in keywords.items() if name != "mechanism"}
             solve_held: Any = function
-            found: Any = solve_held(mechanism, *arguments[1:], **rest)
-            if isinstance(found, Motion):  # what is asked for later must not depend on them either
-                vars(found).update(mechanism=given["mechanism"], check_idle=check)
-            return cast("R", found)
+            result: Any = solve_held(mechanism, *arguments[1:], **rest)
+            if isinstance(result, Motion):  # what is asked for later must not depend on them either
+                vars(result).update(mechanism=given["mechanism"], check_idle=check)
+            return cast("R", result)
 
         return door
 
@@ -125,16 +125,16 @@ def with_idle_held_in_family(
         assemble(model, first, tolerance)
     except MobilityError as error:
         idle = error.idle
-    except JounceError:  # told where the design is solved
+    except JounceError:  # solving the design raises it
         return mechanism
     else:
         return mechanism
     if not idle:
         return mechanism
     for design in designs:
-        check_independent(with_idle_held(design, idle), idle, instants, solve)
+        check_independent(with_idle_motions_held(design, idle), idle, instants, solve)
     warn_of_idle(idle)
-    return with_idle_held(mechanism, idle)
+    return with_idle_motions_held(mechanism, idle)
 
 
 def check_independent(
@@ -149,24 +149,24 @@ def check_independent(
     Outputs at some instants, with derivatives, are compared with those of bodies that spin. Those of forces are not:
     what they are without a spin follows, where nothing drives one, from what holds it exerting nothing.
     """
-    wanted = mechanism.outputs if outputs is None else outputs
-    wanted = {name: output for name, output in wanted.items() if not output.of_forces}
-    if not wanted:
+    checked = mechanism.outputs if outputs is None else outputs
+    checked = {name: output for name, output in checked.items() if not output.of_forces}
+    if not checked:
         return
     instants = instants_of(mechanism.time if time is None else time, mechanism.parameter_values)
-    first, span = float(instants[0]), abs(float(instants[-1]) - float(instants[0])) or 1.0
+    first, duration = float(instants[0]), abs(float(instants[-1]) - float(instants[0])) or 1.0
     holds = {
-        name: dataclasses.replace(joint, rate=rate / span)
-        for rate, (name, joint) in enumerate(spins_held(mechanism).items(), 1)
+        name: dataclasses.replace(joint, rate=rate / duration)
+        for rate, (name, joint) in enumerate(spin_holds(mechanism).items(), 1)
     }
-    posed = dataclasses.replace(mechanism, outputs=wanted, forces={}, initial={})
+    posed = dataclasses.replace(mechanism, outputs=checked, forces={}, initial={})
     spinning = dataclasses.replace(posed, joints={**posed.joints, **holds})
     middle = float(instants[0] + BETWEEN * (instants[-1] - instants[0]))
     some = sorted({first, middle, float(instants[-1])}, reverse=bool(instants[-1] < instants[0]))
     still, spun = (solve(made, some, ORDER, strict=False) for made in (posed, spinning))
     solved = (still.status == Status.OK) & (spun.status == Status.OK)
-    scale = span ** -np.arange(ORDER + 1.0) * still.model.length
-    for name in wanted:
+    scale = duration ** -np.arange(ORDER + 1.0) * still.model.length
+    for name in checked:
         one, other = (np.asarray(motion.outputs[name])[solved] for motion in (still, spun))
         size = np.maximum(np.abs(one), np.abs(other)).reshape(len(one), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)
         away = np.abs(one - other).reshape(len(one), ORDER + 1, -1).max(axis=(0, 2), initial=0.0)

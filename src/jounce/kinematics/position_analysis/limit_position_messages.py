@@ -1,4 +1,4 @@
-"""What is told of a motion in time that runs into a dead point: where its driver turns back, and what lies beyond."""
+"""Messages of a motion in time that runs into a dead point: where its driver turns back, and what lies beyond."""
 
 import math
 
@@ -32,19 +32,19 @@ def dead_end_words(motion: Motion, index: int) -> str:
     last = posed(mechanism, {name: np.asarray(c)[0, ..., index - 1] for name, c in coordinates.items()})
     name = next(iter(drivers)) if len(drivers) == 1 else TIME
     try:
-        wanted = here if name == TIME else law_values(mechanism, here)[name]
+        target = here if name == TIME else law_values(mechanism, here)[name]
         curve = trace(last, before, driver=name, order=0, count=2, length=LENGTH)
     except JounceError:
-        return ""  # what failed is told already
-    found = _end_before(curve, wanted)
-    if found is None:
+        return ""  # the message names what failed already
+    end = _end_before(curve, target)
+    if end is None:
         return ""
-    value, other = found
+    value, other = end
     if name == TIME:
         values = law_values(mechanism, value)
-        told = ", ".join(f"{driver} = {x:.9g}" for driver, x in values.items())
+        words = ", ".join(f"{driver} = {x:.9g}" for driver, x in values.items())
         return (
-            f"its drivers lead it to a dead point at t = {value:.9g} s, where {told}: from there they can only go back"
+            f"its drivers lead it to a dead point at t = {value:.9g} s, where {words}: from there they can only go back"
         )
     far = "" if other is None else f", on another branch, which leads to {_words(other, curve.unit)}"
     led = output_laws(motion.mechanism)
@@ -56,12 +56,12 @@ def dead_end_words(motion: Motion, index: int) -> str:
     return f"{name} can go no further than {_words(value, curve.unit)}: past this dead point it turns back{far}"
 
 
-def _end_before(curve: Curve, wanted: float) -> tuple[float, float | None] | None:
+def _end_before(curve: Curve, target: float) -> tuple[float, float | None] | None:
     """Return the end of the range of a driver that keeps it from a value, and the far end of the branch beyond."""
     low, high = curve.range
     slack = NEAR * max(abs(low), abs(high), 1e-300)
-    upwards = wanted >= high - slack
-    if not np.isfinite(low) or not (upwards or wanted <= low + slack) or not curve.turning_points:
+    upwards = target >= high - slack
+    if not np.isfinite(low) or not (upwards or target <= low + slack) or not curve.turning_points:
         return None
     value = high if upwards else low
     limits = [x.value for x in curve.turning_points]

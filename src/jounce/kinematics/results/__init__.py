@@ -1,1 +1,1 @@
-"""What a solution is handed out as."""
+"""Results of a solution: motions, and outputs of poses."""

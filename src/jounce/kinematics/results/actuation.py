@@ -1,4 +1,4 @@
-"""From a motion of which outputs were held to laws to that of the drivers that move them."""
+"""Actuation: the motion of the drivers that move outputs along their laws."""
 
 import dataclasses
 
@@ -40,25 +40,25 @@ def _law(motion: Motion, name: str) -> HermiteMotion:
     return HermiteMotion(motion.time[solved], derivatives.T[solved])
 
 
-def _row_scale(mechanism: Mechanism, held: Model, instant: float) -> Float[np.ndarray, "row 1"]:
+def _row_scale(mechanism: Mechanism, driven: Model, instant: float) -> Float[np.ndarray, "row 1"]:
     """Return the scales of the rows of drivers and joints, where the outputs were held first.
 
     Laws do not matter to them, and those found have as many pieces as there were instants: a program for each number.
     """
-    _, _, jacobian = Displacements(build(without_output_laws(mechanism)), instant).at(held.reference)
+    _, _, jacobian = Displacements(build(without_output_laws(mechanism)), instant).at(driven.reference)
     return jacobian.row_scale[:, None]
 
 
-def _counted(model: Model, held: Model, row_scale: Float[np.ndarray, "row 1"]) -> Model:
+def _counted(model: Model, driven: Model, row_scale: Float[np.ndarray, "row 1"]) -> Model:
     """Return the model of the drivers with all that was found when the outputs were held."""
     system = with_fields(
         model.system,
-        groups=counted_as_in(model.system.groups, held),
-        forces=held.system.forces,
-        outputs=held.system.outputs,
+        groups=counted_as_in(model.system.groups, driven),
+        forces=driven.system.forces,
+        outputs=driven.system.outputs,
         row_scale=row_scale,
-        rank=held.system.rank,
+        rank=driven.system.rank,
     )
     return dataclasses.replace(
-        model, system=system, reference=held.reference, prescribed=held.prescribed, history=held.history
+        model, system=system, reference=driven.reference, prescribed=driven.prescribed, history=driven.history
     )

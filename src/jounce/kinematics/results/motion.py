@@ -102,7 +102,7 @@ class Motion(Tabulated):
     passages : tuple of ChangePoint
         The same, each with the radius of the Taylor series of the motion there.
     derived : dict
-        What was computed of the motion and may be wanted again, by name: the forces, for one.
+        Values computed from the motion that may be needed again, by name: the forces, for one.
     backend : str
         Which arithmetic gave the numbers: "llvm", machine code, or "xla", with the device unless that is the processor;
         both where each computed a part.
@@ -163,8 +163,8 @@ class Motion(Tabulated):
     def continued_outputs(self) -> tuple[Float[np.ndarray, "component instance time"], ...]:
         """Values of the outputs of poses that are angles in a range, made continuous, for each group of such."""
         pairs = zip(self._groups.values(), self.model.system.outputs, strict=True)
-        found: Any = tuple(self._continued(g, c)[0] for c, g in pairs if getattr(g.element, "wraps", ()))
-        return found
+        continued: Any = tuple(self._continued(g, c)[0] for c, g in pairs if getattr(g.element, "wraps", ()))
+        return continued
 
     def moved_by(self, model: Model, actuated: Mechanism) -> "Motion":
         """Return the same motion of the same bodies, with a model of the drivers that move them, and their laws."""
@@ -183,7 +183,7 @@ class Motion(Tabulated):
         return self.mechanism if self._actuated is None else self._actuated
 
     def driver(self, name: str) -> "xarray.DataArray":
-        """Return the coordinate of a driver and its derivatives, as the bodies have it: what its law must be.
+        """Return the coordinate of a driver and its derivatives, from the poses of its bodies.
 
         Parameters
         ----------
@@ -239,8 +239,8 @@ class Motion(Tabulated):
         The nine components of a rotation matrix stand row by row. An output is computed when it is first asked for.
         """
         # not kept, as it refers to the motion: its arrays are to go with the last reference, not with the next search
-        found = OnDemand(self.mechanism.outputs, self._outputs_with, self._known_outputs)
-        return dict(found) if self.traced else found  # what JAX traces is a plain tree
+        outputs = OnDemand(self.mechanism.outputs, self._outputs_with, self._known_outputs)
+        return dict(outputs) if self.traced else outputs  # what JAX traces is a plain tree
 
     def _outputs_with(self, name: str) -> dict[str, Any]:
         """Return an output, and those that are found with it."""
@@ -248,7 +248,7 @@ class Motion(Tabulated):
         if isinstance(output, AbstractMotionOutput):
             return {name: self._derivatives(output.coefficients(self))}
         groups = zip(self._groups.items(), self.model.system.outputs, strict=True)
-        ((names, values), group) = next(found for found in groups if name in found[0][0])
+        ((names, values), group) = next(entry for entry in groups if name in entry[0][0])
         return dict(zip(names, self._each_shown(self._continued(group, values)), strict=True))
 
     def _each_shown(self, values: Float[Numbers, "order component instance time"]) -> Sequence[Any]:
@@ -360,7 +360,7 @@ class Motion(Tabulated):
             return coefficients
         for k, bodies in enumerate(zip(*group.bodies, strict=True)):
             angles = np.where(self.status == Status.OK, coefficients[0, :, k], np.nan)
-            passed = history.looked_at(lambda q, b=bodies: euler_angles_of(element.sequence, attitudes_of(b, q)))
+            passed = history.sampled(lambda q, b=bodies: euler_angles_of(element.sequence, attitudes_of(b, q)))
             coefficients[0, :, k] = continued(element, angles, self.time, passed)
         return coefficients
 
@@ -375,9 +375,9 @@ class Motion(Tabulated):
         The program is given the ground, which never moves, and the bodies of the group alone: it serves any others.
         """
         moving, index = [body for slot in group.bodies for body in slot if body], itertools.count(1)
-        places = tuple(tuple(next(index) if body else 0 for body in slot) for slot in group.bodies)
+        indices = tuple(tuple(next(index) if body else 0 for body in slot) for slot in group.bodies)
         coordinates = {name: part[..., [0, *moving], :] for name, part in self._coordinates.items()}
-        groups = tuple(with_fields(counted, bodies=places) for counted in self._counting((group,)))
+        groups = tuple(with_fields(counted, bodies=indices) for counted in self._counting((group,)))
 
         def chunk(lanes: np.ndarray) -> Any:
             known = {name: part[..., lanes] for name, part in coordinates.items()}

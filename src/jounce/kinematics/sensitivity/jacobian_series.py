@@ -88,13 +88,13 @@ def jacobian_series(system: System, pose: Pose, time: Jet) -> Float[Numbers, "or
     time : Jet
         Of shape (1, batch).
     """
-    found, scale = [], jnp.asarray(system.column_scale)[None, :, None, None, None]
+    terms, scale = [], jnp.asarray(system.column_scale)[None, :, None, None, None]
     for group in system.groups:
         poses = [pose.take(indices) for indices in group.bodies]
         for slot in group.moving_slots:
             slope = slopes(group.element, poses, time, slot) * scale
-            found.append(slope.reshape(len(slope), -1, slope.shape[-1]))
-    return jnp.concatenate(found, axis=1)
+            terms.append(slope.reshape(len(slope), -1, slope.shape[-1]))
+    return jnp.concatenate(terms, axis=1)
 
 
 def solved_series(system: System, entries: Float[Numbers, "order entry batch"], right: Series) -> Series:
@@ -138,7 +138,7 @@ def solved_series(system: System, entries: Float[Numbers, "order entry batch"], 
 def solver(
     product: Callable[[Any], Any], solve: Callable[[Any], Any], solve_transposed: Callable[[Any], Any]
 ) -> Callable[[Any], Any]:
-    """Return what solves equations with a matrix known by its product, and is differentiated as such equations are."""
+    """Return a solver of linear equations with a matrix given by its product, with implicit derivatives."""
     return lambda right: jax.lax.custom_linear_solve(
         product, right, lambda _, b: solve(b), lambda _, b: solve_transposed(b)
     )
@@ -148,7 +148,7 @@ def _row_scale(system: System, entries: Float[Numbers, "order entry batch"]) -> 
     """Return factors by which the largest entry of each row, somewhere along the motion, becomes one."""
     pattern = system.pattern
     sizes = jnp.max(jnp.abs(jax.lax.stop_gradient(entries[0])), axis=-1)
-    sizes = jnp.concatenate([sizes, jnp.zeros(1)])[pattern.places].max(axis=(1, 2))[:, None]
+    sizes = jnp.concatenate([sizes, jnp.zeros(1)])[pattern.entry_indices].max(axis=(1, 2))[:, None]
     return 1.0 / jnp.where((sizes > 0) & jnp.isfinite(sizes), sizes, 1.0)
 
 
@@ -182,9 +182,9 @@ def _in_order(product: Product, matrices: Any, solve: Callable[[Any], Any], righ
     """Return the series whose product with one of matrices is known, coefficient after coefficient, in one loop."""
     orders = np.arange(len(right))
 
-    def step(found: Any, k: Any) -> tuple[Any, None]:
+    def step(solved: Any, k: Any) -> tuple[Any, None]:
         # those not found yet are zero, also where an index runs round
-        known = jnp.sum(jax.vmap(product)(matrices, found[(k - orders) % len(orders)]), axis=0)
-        return found.at[k].set(solve(right[k] - known)), None
+        known = jnp.sum(jax.vmap(product)(matrices, solved[(k - orders) % len(orders)]), axis=0)
+        return solved.at[k].set(solve(right[k] - known)), None
 
     return jax.lax.scan(step, jnp.zeros_like(right), orders)[0]

@@ -93,8 +93,8 @@ def differentiable_motion(
         Solves a mechanism of plain numbers at the instants, strictly or not. What it raises where JAX knows the numbers
         is raised; elsewhere a motion that cannot be begun is NaN.
     """
-    made, held = template(mechanism), _builder(mechanism, with_output_drivers)
-    driven = _builder(mechanism, without_output_laws) if output_laws(mechanism) else held
+    made, driven = template(mechanism), _builder(mechanism, with_output_drivers)
+    shown = _builder(mechanism, without_output_laws) if output_laws(mechanism) else driven
     values = tuple(x if x.dtype == np.float64 else x.astype(float) for x in traced_values(mechanism))
     shapes = solved_shapes(mechanism, len(instants), levels)
 
@@ -123,15 +123,15 @@ def differentiable_motion(
         (values,), (changes,) = primals, tangents
         solved = solution(values)
         still = jax.tree.map(jnp.zeros_like, solved)
-        return solved, still._replace(coordinates=held.change(values, changes, solved, instants))
+        return solved, still._replace(coordinates=driven.change(values, changes, solved, instants))
 
     solved = solution(values)
     first = first_of(solved.coordinates)
-    model = held(values, solved.length, solved.angles, first)
-    if driven is held:
+    model = driven(values, solved.length, solved.angles, first)
+    if shown is driven:
         return solved, (model, model)
     angles = solved.angles._replace(angle=(solved.driven, *solved.angles.angle[1:]))
-    return solved, (model, driven(values, solved.length, angles, first))
+    return solved, (model, shown(values, solved.length, angles, first))
 
 
 def solved_shapes(mechanism: Mechanism, count: int, levels: int) -> Solved:
@@ -165,7 +165,7 @@ def failed(shapes: Solved, status: Float[Numbers, " time"]) -> Solved:
 
 
 def _solved(motion: Motion) -> Solved:
-    """Return what is kept of a motion, as arrays of NumPy."""
+    """Return the arrays of a motion that derivatives need, as those of NumPy."""
     coordinates = jax.tree.map(np.asarray, dict(motion.poses[1]))
     counted = motion.forces, motion.counted_outputs
     angles, driven = angles_of(motion.solved_model, counted), angles_of(motion.model, counted).angle[0]
@@ -182,8 +182,8 @@ def _one_by_one(solve: Callable[[Values], Solved], shapes: Solved, sizes: Sequen
     batch = np.shape(values[0])[: np.ndim(values[0]) - sizes[0]]
     if not batch:
         return solve(values)
-    found = [solve(tuple(np.asarray(value)[index] for value in values)) for index in np.ndindex(*batch)]
-    return jax.tree.map(lambda shape, *xs: np.stack(xs).reshape(*batch, *shape.shape), shapes, *found)
+    solutions = [solve(tuple(np.asarray(value)[index] for value in values)) for index in np.ndindex(*batch)]
+    return jax.tree.map(lambda shape, *xs: np.stack(xs).reshape(*batch, *shape.shape), shapes, *solutions)
 
 
 def first_of(coordinates: Mapping[str, Any]) -> dict[str, Any]:
@@ -234,8 +234,8 @@ class _Builder:
 
     def numbers(self, values: Values, length: Any, angles: Angles | None, first: Any) -> tuple[list[Any], Any]:
         """Return those numbers of a system that depend on what is traced, and which of its leaves they are."""
-        found = self._make(values, length, angles, first, counted=angles is not None)
-        return found, self._kept[angles is not None][2]
+        numbers = self._make(values, length, angles, first, counted=angles is not None)
+        return numbers, self._kept[angles is not None][2]
 
     def model(self, numbers: Sequence[Any], which: tuple[int, ...], counted: bool) -> Model:
         """Return the model that has these numbers."""
@@ -252,8 +252,8 @@ class _Builder:
         which = tuple(k for k, leaf in enumerate(leaves) if isinstance(leaf, Tracer))
         fixed = [None if k in which else leaf for k, leaf in enumerate(leaves)]
         bare = with_fields(model.system, groups=(), forces=(), outputs=(), column_scale=np.ones(1))  # nothing traced
-        kept = dataclasses.replace(model, system=bare, guess={}, reference={})
-        self._kept[counted] = kept, fixed, which, structure
+        plain = dataclasses.replace(model, system=bare, guess={}, reference={})
+        self._kept[counted] = plain, fixed, which, structure
         return [leaves[k] for k in which]
 
     def _change(self, values: Values, changes: Values, solved: Solved, instants: Any) -> dict[str, Any]:
@@ -269,8 +269,8 @@ class _Builder:
             moved = _moved(system, slope, which, start, instants[:1])
             moved = {name: moved[name][0] for name in first}
         system, slope, which = _linear(self, (solved.length, solved.angles), values, changes, first, moved)
-        found = _moved(system, slope, which, coordinates, instants)
-        return {name: _where(regular, change, jnp.zeros_like(change)) for name, change in found.items()}
+        change = _moved(system, slope, which, coordinates, instants)
+        return {name: _where(regular, c, jnp.zeros_like(c)) for name, c in change.items()}
 
 
 MOST_BUILDERS = 16
@@ -278,17 +278,17 @@ _builders: dict[Any, _Builder] = {}
 
 
 def _builder(mechanism: Mechanism, made_of: Callable[[Mechanism], Mechanism]) -> _Builder:
-    """Return what makes the model of a mechanism: the same for one that differs in the values of its parameters.
+    """Return the builder of the model of a mechanism, which is shared by mechanisms that differ in parameters only.
 
     One whose joints are made anew each time is not compiled: that would be done each time.
     """
     numbers = {name: value for name, value in mechanism.parameters.items() if not isinstance(value, Tracer)}
     plain = tuple((n, x if isinstance(x, str | Expression) else float(x)) for n, x in numbers.items())
     fields = [field.name for field in dataclasses.fields(mechanism) if field.name != "parameters"]
-    held = [getattr(mechanism, name) for name in fields]
-    if traced_values(held) or (own := _users_code(mechanism)) is None:
+    fields_of_mechanism = [getattr(mechanism, name) for name in fields]
+    if traced_values(fields_of_mechanism) or (own := _users_code(mechanism)) is None:
         return _Builder(mechanism, made_of, again=False)
-    key = (made_of, tuple(map(id, held)), tuple(mechanism.parameters), plain, own)
+    key = (made_of, tuple(map(id, fields_of_mechanism)), tuple(mechanism.parameters), plain, own)
     if key not in _builders:
         while len(_builders) >= MOST_BUILDERS:
             _builders.pop(next(iter(_builders)))
@@ -311,22 +311,22 @@ def _linear(
     built: _Builder, known: tuple[Any, Angles | None], values: Values, changes: Values, first: Any, moved: Any
 ) -> tuple[System, list[Any], tuple[int, ...]]:
     """Return the system of a model, how its numbers change, and which of them do."""
-    found: list[tuple[int, ...]] = []
+    indices: list[tuple[int, ...]] = []
 
     def numbers(values: Values, first: Any) -> list[Any]:
         made, which = built.numbers(values, *known, first)
-        found.append(which)
+        indices.append(which)
         return made
 
     here, slope = jax.jvp(numbers, (values, first), (changes, moved))
-    system = built.model(here, found[0], known[1] is not None).system
+    system = built.model(here, indices[0], known[1] is not None).system
     leaves, structure = jax.tree.flatten(system)
     numbered = jax.tree.unflatten(structure, range(len(leaves)))
-    places = jax.tree.leaves(with_fields(numbered, forces=(), outputs=()))  # of what residuals need among all leaves
-    changes_at = dict(zip(found[0], slope, strict=True))
-    moving = [(place, changes_at[k]) for place, k in enumerate(places) if k in changes_at]
+    numbers_used = jax.tree.leaves(with_fields(numbered, forces=(), outputs=()))  # leaves that residuals need
+    changes_at = dict(zip(indices[0], slope, strict=True))
+    moving = [(position, changes_at[k]) for position, k in enumerate(numbers_used) if k in changes_at]
     bare = with_fields(system, forces=(), outputs=())
-    return bare, [change for _, change in moving], tuple(place for place, _ in moving)
+    return bare, [change for _, change in moving], tuple(position for position, _ in moving)
 
 
 def _moved(
@@ -359,7 +359,7 @@ def _change_along(
         return stacked(jax.tree.unflatten(structure, own).residual(pose, time))
 
     _, missing = jax.jvp(residual, ([leaves[k] for k in which],), (list(slope),))
-    found = solved_series(system, jacobian_series(system, pose, time), -missing)
-    parts = [system.coordinates(level, pose.shifts) for level in found]
+    rates = solved_series(system, jacobian_series(system, pose, time), -missing)
+    parts = [system.coordinates(level, pose.shifts) for level in rates]
     shift, turn = (Jet(tuple(part)) for part in zip(*parts, strict=True))
     return {name: stacked(jet) for name, jet in pose.varied(shift, turn).coordinates().items()}

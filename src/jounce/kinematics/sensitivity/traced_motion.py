@@ -30,13 +30,13 @@ class TracedMotion(Motion):
 
     Outputs are arrays of JAX; labeled arrays hold such, and give them as ``.data``. `status` is an array too: within
     `jax.jit` and `jax.vmap` nothing can be raised for it, and an instant that failed is NaN and adds nothing to
-    derivatives. There is no dataset of it, and neither faults nor change points are told.
+    derivatives. It has no dataset, and neither faults nor change points.
     """
 
     traced = True
 
     def __init__(self, mechanism: Mechanism, models: tuple[Model, Model], time: np.ndarray, order: int, solved: Solved):
-        held, model = models
+        driven, model = models
         outputs = list(output_series(model.system.outputs, solved.coordinates, model.pose_type))
         wrapping = iter(solved.continued)
         for k, group in enumerate(model.system.outputs):
@@ -46,7 +46,7 @@ class TracedMotion(Motion):
         status: Any = solved.status.astype(int)
         values = tuple(map(plain_derivatives, outputs))
         super().__init__(mechanism, model, time, order, (solved.coordinates, values), status, {})
-        self.solved_model, self.solved = held, solved
+        self.solved_model, self.solved = driven, solved
 
     def __repr__(self) -> str:
         return f"<Motion of a design that JAX traces, {len(self.time)} instants, order {self.order}>"
@@ -113,8 +113,8 @@ class TracedMotion(Motion):
         return self._shown(plain_derivatives(coefficients[: self.order + 1]))
 
     def _shown(self, values: Float[Numbers, "order component time"]) -> Float[Numbers, "time derivative *component"]:
-        (found,) = self._each_shown(values[:, :, None])
-        return found
+        (shown,) = self._each_shown(values[:, :, None])
+        return shown
 
     def _each_shown(self, values: Float[Numbers, "order component instance time"]) -> Sequence[Any]:
         return _each_shown(values[: self.order + 1], self.status == Status.OK)

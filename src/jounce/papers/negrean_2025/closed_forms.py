@@ -56,7 +56,7 @@ def gravity_torques(
     motion : array_like of shape (..., rates + 1 or more)
         Angle and its derivatives, rad by s.
     rates : int, default 2
-        How many rates are wanted.
+        How many rates are requested.
 
     Returns
     -------

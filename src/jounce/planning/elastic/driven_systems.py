@@ -1,4 +1,4 @@
-"""What drives move, told alike for robots and for mechanisms: coordinates, and the forces that ask for them."""
+"""What drives move, in one form for robots and mechanisms: coordinates, and the forces that ask for them."""
 
 import abc
 import dataclasses

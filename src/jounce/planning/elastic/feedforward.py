@@ -1,4 +1,4 @@
-"""Motions and torques of motors behind springs that move links exactly as told: feedforward of elastic joints."""
+"""Motions and torques of motors behind springs that move links exactly as planned: feedforward of elastic joints."""
 
 from collections.abc import Mapping
 from typing import overload
@@ -62,7 +62,7 @@ def feedforward(
     losses: bool = True,
     tolerance: float = 1e-6,
 ) -> Feedforward | MotorMotion:
-    """Return motions and torques of motors that move links behind springs exactly as told.
+    """Return motions and torques of motors that move links behind springs exactly as planned.
 
     With q of the links, the torque tau that they need and theta of a motor, seen at the joint:
     ``K (theta - q) + D (theta' - q') = tau`` and ``B theta'' + tau = u``. Undamped, ``theta = q + tau / K``, so that

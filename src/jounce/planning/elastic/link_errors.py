@@ -11,7 +11,7 @@ from jounce.planning.elastic.driven_systems import DrivenMechanism, DrivenRobot
 from jounce.planning.elastic.motor_motion import Feedforward
 from jounce.planning.elastic.simulation import simulate_elastic
 
-MOST = 1001  # instants at which errors are told
+MOST = 1001  # instants at which errors are reported
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -91,7 +91,7 @@ def elastic_robot(robot: Robot, drives: Mapping[str, Drive], *, losses: bool = T
 
 
 class _ElasticForces(AbstractJointLaws):
-    """Forces of all joints of an elastic robot: of motors, as told, and of springs between them and the links."""
+    """Forces of all joints of an elastic robot: of motors, as commanded, and of springs between them and the links."""
 
     torque: Any
     laws: tuple[AbstractMotion, ...]

@@ -31,7 +31,7 @@ class Path:
     allowed : float, optional
         How far it may be, where that was bounded.
     words : str, optional
-        What it is, to be told.
+        What it is, for messages.
     instants : tuple of arrays, optional
         Values of s, and the instants of the samples there, s.
     points : Lines, optional

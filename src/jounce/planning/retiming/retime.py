@@ -124,7 +124,7 @@ def retime(
     ------
     TrajectoryError
         If the path has a kink or a repeated point, leaves the range of a joint, or needs more than a limit at rest: the
-        message says where, and which joint. If the duration is shorter than the least time, which is told.
+        message says where, and which joint. If the duration is shorter than the least time, which it names.
     RobotError
         If names or limits do not fit the robot.
     SolveError

@@ -1,1 +1,1 @@
-"""What is told of each kind of result, as plain data."""
+"""Facts of each kind of result, as plain data."""

@@ -1,4 +1,4 @@
-"""What is told of an optimized design: facts, words, and a table before and after."""
+"""Facts, words and a table before and after of an optimized design."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is told of a feedforward: drives, how far the expansion in the damping goes, and where links end up."""
+"""Facts of a feedforward: drives, how far the expansion in the damping goes, and where links end up."""
 
 from __future__ import annotations
 

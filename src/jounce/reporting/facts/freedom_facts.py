@@ -13,9 +13,9 @@ from jounce.errors import JounceError, MobilityError
 from jounce.kinematics.assembly.assemble import (
     check_assembled,
     check_mobility,
+    find_assembly,
     freely_moving,
     redundancy_of,
-    settled,
     warn_of_parts_turned_over,
 )
 from jounce.kinematics.assembly.gauss_newton import Displacements, assemble_from_guess
@@ -114,7 +114,7 @@ class StartingState:
         model = build(initial_as_drivers(self.mechanism)) if self.mechanism.initial else self.model
         if not model.rows:
             return model.guess, facts
-        model, trial = settled(model, self.instant, TOLERANCE)
+        model, trial = find_assembly(model, self.instant, TOLERANCE)
         facts["open"] = float(np.max(np.abs(trial.gaps))) if np.isfinite(trial.gaps).all() else None
         try:
             check_assembled(model, trial, self.instant)

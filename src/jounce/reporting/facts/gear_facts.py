@@ -53,7 +53,7 @@ def train_facts(state: StartingState) -> list[dict[str, Any]]:
     if not meshing or here is None or not state.ok or state.freedom["left"]:
         return []
     turning = {name: driver for name, driver in mechanism.drivers.items() if is_turning(driver)}
-    found = []
+    facts = []
     scale = np.asarray(model.system.column_scale)
     for body, axes in meshing.items():
         for name in turning:
@@ -66,29 +66,29 @@ def train_facts(state: StartingState) -> list[dict[str, Any]]:
             speeds = [float(turns[list(mechanism.bodies).index(body)] @ axis) / _unit(state, name) for axis in axes]
             ratio = max(speeds, key=abs)
             if abs(ratio) > STILL:
-                found.append({"body": body, "driver": name, "ratio": ratio, "fraction": _fraction(ratio)})
-    return found
+                facts.append({"body": body, "driver": name, "ratio": ratio, "fraction": _fraction(ratio)})
+    return facts
 
 
 def _meshing(state: StartingState) -> dict[str, list[Any]]:
     """Return the moving bodies that gears and belts turn, and that carry them, with axes of their own about which."""
     mechanism = state.mechanism
-    found: dict[str, list[Any]] = {}
+    meshing: dict[str, list[Any]] = {}
     for joint in mechanism.joints.values():
         if isinstance(joint, spatial.Gear):
             shafts = [
                 _unit_vector([resolve(entry, mechanism.parameter_values) for entry in np.asarray(axis).tolist()])
                 for axis in (joint.axis_i, joint.axis_j)
             ]
-            found |= {body: [axis] for body, axis in zip(joint.bodies, shafts, strict=False)}
-            found.setdefault(joint.bodies[2], [_seen_from(state, joint.bodies, k, x) for k, x in enumerate(shafts)])
+            meshing |= {body: [axis] for body, axis in zip(joint.bodies, shafts, strict=False)}
+            meshing.setdefault(joint.bodies[2], [_seen_from(state, joint.bodies, k, x) for k, x in enumerate(shafts)])
     if mechanism.space == "planar":
         symbols = {name: facts_of(type(joint)).symbol for name, joint in mechanism.joints.items()}
         for name, joint in mechanism.joints.items():
             if symbols[name] in ("gear", "belt") or (symbols[name] == "coordinate" and joint.coordinate == "angle"):
-                found |= {body: [np.ones(1)] for body in joint.bodies}
-        found |= {body: [np.ones(1)] for body in carriers(mechanism)}
-    return {body: found[body] for body in mechanism.bodies if body in found}
+                meshing |= {body: [np.ones(1)] for body in joint.bodies}
+        meshing |= {body: [np.ones(1)] for body in carriers(mechanism)}
+    return {body: meshing[body] for body in mechanism.bodies if body in meshing}
 
 
 def _seen_from(state: StartingState, bodies: Sequence[str], slot: int, axis: Any) -> Any:
@@ -112,9 +112,9 @@ def _unit(state: StartingState, driver: str) -> float:
 
 
 def _fraction(ratio: float) -> str | None:
-    found = Fraction(ratio).limit_denominator(LARGEST_TEETH)
+    fraction = Fraction(ratio).limit_denominator(LARGEST_TEETH)
     return (
-        str(found)
-        if abs(float(found) - ratio) <= WHOLE * abs(ratio) and abs(found.numerator) <= LARGEST_TEETH
+        str(fraction)
+        if abs(float(fraction) - ratio) <= WHOLE * abs(ratio) and abs(fraction.numerator) <= LARGEST_TEETH
         else None
     )

@@ -45,9 +45,9 @@ def line_facts(state: StartingState) -> list[dict[str, Any]]:
     >>> belt["carrier"], round(belt["length"], 6)
     ('arm', 0.850724)
     """
-    found: list[dict[str, Any]] = []
+    records: list[dict[str, Any]] = []
     if state.coordinates is None:
-        return found
+        return records
     coordinates = {name: np.asarray(value)[None] for name, value in state.coordinates.items()}
     names = [GROUND, *state.mechanism.bodies]
     for group, rows in zip(state.model.system.groups, group_rows(state.model), strict=True):
@@ -60,8 +60,8 @@ def line_facts(state: StartingState) -> list[dict[str, Any]]:
                 facts = _rope(group, k, state)
             else:
                 continue
-            found.append({"joint": name, "bodies": list(state.mechanism.joints[name].bodies), **facts})
-    return found
+            records.append({"joint": name, "bodies": list(state.mechanism.joints[name].bodies), **facts})
+    return records
 
 
 def _belt(group: Any, k: int, coordinates: Any) -> dict[str, Any]:
@@ -76,9 +76,9 @@ def _belt(group: Any, k: int, coordinates: Any) -> dict[str, Any]:
 def _rope(group: Any, k: int, state: StartingState) -> dict[str, Any]:
     rope, pose = group.element, pose_at(state.coordinates or {}, state.model.pose_type)
     slots = rope.slots or tuple(range(len(rope.points)))
-    places = [
+    points = [
         np.asarray(pose.take((group.bodies[slot][k],)).point(point[..., k : k + 1, :]).coefficients[0])[:, 0, 0]
         for slot, point in zip(slots, rope.points, strict=True)
     ]
-    spans = [float(np.linalg.norm(b - a)) for a, b in pairwise(places)]
+    spans = [float(np.linalg.norm(b - a)) for a, b in pairwise(points)]
     return {"length": float(np.asarray(rope.length)[k, 0]), "wraps": None, "carrier": None, "spans": spans}

@@ -162,7 +162,7 @@ def inspected(mechanism: Mechanism, path: str | PathLike[str] | None = None) -> 
     Parameters
     ----------
     mechanism : Mechanism
-        One that cannot be put together is told of too.
+        One that cannot be assembled is reported too.
     path : optional
         Its file, which says how parameters are written.
 

@@ -1,4 +1,4 @@
-"""What is told of an equilibrium and of the modes about it: facts, words, tables, and a file of shapes."""
+"""Facts, words, tables and a file of shapes of an equilibrium and of the modes about it."""
 
 from __future__ import annotations
 

@@ -165,7 +165,7 @@ def inspected_robot(robot: Robot, path: str | PathLike[str] | None = None) -> di
     Parameters
     ----------
     robot : Robot
-        One whose loops cannot be closed is told of too.
+        One whose loops cannot be closed is reported too.
     path : optional
         Its file.
 

@@ -1,4 +1,4 @@
-"""What is told of tolerances, as plain facts: how far each column spreads at most, and which parameter causes it."""
+"""Facts of a tolerance analysis: how far each column spreads at most, and which parameter causes it."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ Column = tuple[str, str, int]
 
 
 def columns_of(spread: xarray.Dataset, selection: Sequence[Column] | None) -> list[Column]:
-    """Return the columns that are meant, one for each component; all of the outputs unless some are wanted."""
+    """Return the columns that are meant, one for each component; all of the outputs unless some are requested."""
     outputs = [str(name) for name in spread.data_vars if f"{name}_peak" in spread.data_vars]
     levels = [int(order) for order in spread["derivative"].values]
-    asked = [(name, "", order) for name in outputs for order in levels] if selection is None else list(selection)
+    selected = [(name, "", order) for name in outputs for order in levels] if selection is None else list(selection)
     columns = []
-    for name, component, order in asked:
+    for name, component, order in selected:
         axes = [dim for dim in spread[name].dims if dim not in ("time", "derivative")]
         labels = ["".join(map(str, x)) for x in itertools.product(*(spread[axis].values for axis in axes))]
         columns += [(name, label, order) for label in labels if component in ("", label)]

@@ -51,7 +51,7 @@ class BetweenFacts(TypedDict):
 
 
 class TrajectoryResult(Result):
-    """What is told of a robot on a trajectory; between is null where its laws say what happens between points."""
+    """The check of a robot on a trajectory; between is null where its laws say what happens between points."""
 
     robot: str
     file: str

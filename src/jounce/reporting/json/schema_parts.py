@@ -38,7 +38,7 @@ class TorquePeak(Extremes):
 
 
 class Written(TypedDict):
-    """What a motion is told with."""
+    """What a result of a motion has in common with others."""
 
     file: str
     peaks: list[OutputPeak]

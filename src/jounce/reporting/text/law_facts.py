@@ -124,7 +124,7 @@ def law_words(laws: Sequence[Mapping[str, Any]], by: str = "s", shown: tuple[str
     by : str
         Unit of what they are laws of.
     shown : tuple of str and float, optional
-        Another unit in which places are told, and how many of it are one of the former.
+        Another unit in which positions are shown, and how many of it are one of the former.
 
     Examples
     --------

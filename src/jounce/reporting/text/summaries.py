@@ -128,8 +128,8 @@ def _mechanism_start(facts: Facts) -> list[str]:
         lines += [f"  {time['remark']}"] if "remark" in time else []
     else:
         lines.append("  no time grid is given")
-    told = (*law_words(facts["laws"]), *_train_words(facts["trains"]), *line_words(facts["lines"]), *facts["remarks"])
-    lines += [f"  {line}" for line in told]
+    words = (*law_words(facts["laws"]), *_train_words(facts["trains"]), *line_words(facts["lines"]), *facts["remarks"])
+    lines += [f"  {line}" for line in words]
     if freedom["message"] and facts["ok"] and freedom["left"]:
         lines.append("  it has degrees of freedom left: jounce simulate moves it by its forces")
     elif freedom["message"]:
@@ -244,9 +244,9 @@ def _train_words(facts: list[dict[str, Any]]) -> list[str]:
     """Word ratios, a line for each driver."""
     by_driver: dict[str, list[str]] = {}
     for each in facts:
-        told = f" = {each['fraction']}" if "/" in (each["fraction"] or "") else ""
-        by_driver.setdefault(each["driver"], []).append(f"{each['body']} {each['ratio']:.9g}{told}")
-    return [f"turns for a turn of {driver}: {', '.join(told)}" for driver, told in by_driver.items()]
+        fraction = f" = {each['fraction']}" if "/" in (each["fraction"] or "") else ""
+        by_driver.setdefault(each["driver"], []).append(f"{each['body']} {each['ratio']:.9g}{fraction}")
+    return [f"turns for a turn of {driver}: {', '.join(fraction)}" for driver, fraction in by_driver.items()]
 
 
 def line_words(facts: list[dict[str, Any]]) -> list[str]:
@@ -257,14 +257,16 @@ def line_words(facts: list[dict[str, Any]]) -> list[str]:
     >>> line_words([{"joint": "rope", "length": 1.2, "wraps": None, "spans": [0.5, 0.2, 0.5]}])
     ['rope: 1.2 m long, of spans of 0.5, 0.2, 0.5 m']
     """
-    found = []
+    lines_shown = []
     for each in facts:
         words = f"{each['joint']}: {each['length']:.6g} m long"
         if each["spans"] is not None:
-            found.append(f"{words}, of spans of {', '.join(f'{span:.6g}' for span in each['spans'])} m")
+            lines_shown.append(f"{words}, of spans of {', '.join(f'{span:.6g}' for span in each['spans'])} m")
             continue
         lies = zip(each["wraps"], each["bodies"], strict=True)
         words += f", on {' and '.join(f'{math.degrees(wrap):.4g} deg of {body}' for wrap, body in lies)}"
         parts = "what the belt needs changes where the centers part: a tensioner takes it up"
-        found.append(f"{words}; {parts}" if each["carrier"] is None else f"{words}, both carried by {each['carrier']}")
-    return found
+        lines_shown.append(
+            f"{words}; {parts}" if each["carrier"] is None else f"{words}, both carried by {each['carrier']}"
+        )
+    return lines_shown

@@ -1,4 +1,4 @@
-"""Tables of what is told of mechanisms, motions and robots: cells of text, whatever shows them."""
+"""Tables of facts of mechanisms, motions and robots: cells of text, whatever shows them."""
 
 from __future__ import annotations
 

@@ -191,7 +191,7 @@ def mass_matrix(
         `inverse_dynamics`, derivatives must not stand among them, since nothing tells them from positions; give
         ``q[..., 0, :]``. With `rates` of shape (..., order + 1, n): the coordinates and their derivatives.
     rates : bool, default False
-        Whether derivatives of the coordinates are given and those of the matrix are wanted.
+        Whether derivatives of the coordinates are given and those of the matrix are requested.
     drives : bool, default True
         Add the armature inertia of the joints, as in `inverse_dynamics`.
 
@@ -244,7 +244,7 @@ def bias_forces(
         Coordinates and velocities, in the order of `robot.joint_names`; derivatives beyond do not matter. With `rates`
         of shape (..., order + 1, n), order 1 or more.
     rates : bool, default False
-        Whether rates of the forces are wanted: each derivative beyond the velocities gives one.
+        Whether rates of the forces are requested: each derivative beyond the velocities gives one.
     parts : {"coriolis", "centrifugal", "gravity"} or a sequence of them, default all
         What to add up. Centrifugal forces go with the squares of the velocities of single coordinates, Coriolis forces
         with products of two; the split belongs to the choice of coordinates, and their sum is ``C(q, q') q'``.

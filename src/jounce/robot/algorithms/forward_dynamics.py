@@ -81,7 +81,7 @@ def forward_dynamics(
         ``q'', q''', ...``. With `base` also of shape (..., order + 1, 6 + n), as `inverse_dynamics` gives it: the force
         on the base and the moment about its origin, in its axes, come first.
     driven : sequence of str, optional
-        Joints that move as told, whatever it takes; `inverse_dynamics` of the result gives their torques.
+        Joints that follow their laws, whatever it takes; `inverse_dynamics` of the result gives their torques.
     wrenches : sequence of Wrench, optional
         Forces and torques from outside; arrays of them hold order + 1 levels.
     time : array_like of shape (...), optional

@@ -23,7 +23,7 @@ class BallDamper(AbstractForce, space="spatial"):
 
     def displacement(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:  # noqa: ARG002
         """Return nothing that changes."""
-        # no vector changes at the rate of an angular velocity: what the moment works on is told by the rates below
+        # no vector changes at the rate of an angular velocity: the rates below are those on which the moment works
         return Jet.constant(jnp.zeros_like(body_j.position.coefficients[0]), body_j.order)
 
     def velocity(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:  # noqa: ARG002
@@ -32,8 +32,8 @@ class BallDamper(AbstractForce, space="spatial"):
 
     def variation(self, bodies: tuple[SpatialPose, ...], changes: tuple[SpatialPose, ...], time: Jet) -> Jet:  # noqa: ARG002
         """Return the relative turn in axes of body j."""
-        carried = bodies[0].direction(bodies[0].turning(changes[0]))
-        return bodies[1].turning(changes[1]) - bodies[1].to_body(carried)
+        rotated = bodies[0].direction(bodies[0].turning(changes[0]))
+        return bodies[1].turning(changes[1]) - bodies[1].to_body(rotated)
 
     def force(self, displacement: Jet, velocity: Jet, time: Jet) -> Jet:  # noqa: ARG002
         """Return the moment on body j."""

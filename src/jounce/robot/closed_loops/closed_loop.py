@@ -42,7 +42,7 @@ def mechanism(
     is the ground. Joints and closures keep their names. The six joints of a base that floats, and the three turns of a
     ball, are one free body, and one spherical joint, unless a coordinate of theirs is driven. A closure holds in those
     directions only in which the joints do not hold already (`closure_wrenches`), so that reactions in the others are
-    the joints' alone; with `redundant_reactions` it holds in all, and what becomes of its reactions is told by that.
+    the joints' alone; with `redundant_reactions` it holds in all, and that choice determines its reactions.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def mechanism(
     forces : dict of str to AbstractForce, optional
         Applied forces; their bodies are moving links, or ``"ground"``.
     outputs : dict of str to AbstractOutput or str, optional
-        Quantities wanted; a word is the name of a joint whose coordinate is wanted. Unless given, the coordinates of
+        Quantities requested; a word is the name of a joint, for its coordinate. Unless given, the coordinates of
         all joints in `joint_names` under their names, with ``_`` behind those of columns of results, such as
         ``time``. An angle starts between half a turn either side of zero.
     parameters : dict of str to number or expression, optional

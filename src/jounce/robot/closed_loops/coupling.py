@@ -1,4 +1,4 @@
-"""The coordinate of a joint between two bodies, seen from their poses: driven, followed by another joint, or wanted."""
+"""The coordinate of a joint between two bodies, by their poses: driven, followed by another joint, or an output."""
 
 import dataclasses
 from fractions import Fraction

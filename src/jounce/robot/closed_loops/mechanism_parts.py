@@ -50,11 +50,11 @@ class RobotParts:
     robot : Robot
         The robot.
     needed : set of str
-        Joints whose coordinates are wanted, so that they are not merged into a free body or a ball.
+        Joints whose coordinates are requested, so that they are not merged into a free body or a ball.
     forces, outputs
         What may name links that are otherwise merged.
     drives : bool
-        Whether armature, damping, friction and springs of the joints are wanted.
+        Whether armature, damping, friction and springs of the joints are requested.
     """
 
     def __init__(self, robot: AbstractRobot, needed: set[str], forces: Any, outputs: Any, drives: bool):

@@ -165,8 +165,8 @@ def check_coupling(coupling: Any, joints: Mapping[str, Any], free: Collection[st
         return
     turns = [joints[name] for name in coupling.joints]
     chained = all(first.child == second.parent for first, second in itertools.pairwise(turns))
-    beside = any(np.any(turn.position) or np.any(turn.rotation != np.eye(3)) for turn in turns[1:])
+    displaced = any(np.any(turn.position) or np.any(turn.rotation != np.eye(3)) for turn in turns[1:])
     axes = np.array([turn.axis for turn in turns])
-    if not chained or beside or not all(turn.turning for turn in turns) or np.any(axes != np.eye(3)[::-1]):
+    if not chained or displaced or not all(turn.turning for turn in turns) or np.any(axes != np.eye(3)[::-1]):
         message = "must be three turns in a row about z, y and x at one point, as those of a ball"
         raise RobotError(message, name=f"{where}.joints", value=list(coupling.joints))

@@ -266,8 +266,8 @@ class TreeEquations(Module):
             parts.append(_energies(base.axes, own, spin0, velocity0, place0, tree.gravity))
         kinetic, potential = (total(part[k] for part in parts) for k in (0, 1))
         if tree.shape.lifted:
-            axes, places = (_with_base(a, b, base) for a, b in ((motion.axes, "axes"), (position, "position")))
-            first = places * jnp.asarray(tree.lift)[None, :, None]
+            axes, positions = (_with_base(a, b, base) for a, b in ((motion.axes, "axes"), (position, "position")))
+            first = positions * jnp.asarray(tree.lift)[None, :, None]
             first = first + _combined(axes, jnp.swapaxes(jnp.asarray(tree.lift_moment), 0, 1)[:, :, None])
             potential = potential + jnp.sum(jnp.asarray(tree.gravity)[:, None, None] * first, axis=(0, 1))
         if self.drives:

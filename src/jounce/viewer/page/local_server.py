@@ -28,7 +28,7 @@ HOSTS = ("127.0.0.1", "localhost", "[::1]")  # of any port, as a tunnel may have
 LONGEST_PATH = 1000  # characters; those of the page are far shorter
 REFUSED = "This page is opened by the whole address that jounce view prints, with its token.\n"
 HEADERS = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"}
-# The page of viser connects to its own address without what stands behind the question mark, unless told another one.
+# The page of viser connects to its own address without the query string, unless it is given another one.
 CONNECT = b"""<script>{
 const given = new URLSearchParams(location.search);
 if (!given.has("websocket")) {
@@ -167,7 +167,7 @@ def check_installed() -> None:
 
 
 def quiet_server(port: int = 0, label: str | None = None, access: AccessControl | None = None) -> Any:
-    """Return a viser server that listens on this machine only, answers whom it is told to, and prints nothing.
+    """Return a viser server that listens on this machine only, answers the given hosts only, and prints nothing.
 
     Raises
     ------

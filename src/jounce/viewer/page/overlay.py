@@ -97,7 +97,7 @@ class Overlay:
         Raises
         ------
         JounceError
-            If loads are wanted and the order of the motion is too low for them.
+            If loads are requested and the order of the motion is too low for them.
         """
         options = options.fitted(recording)
         arrows, scales = {}, {}

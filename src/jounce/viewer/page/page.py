@@ -22,7 +22,7 @@ SLOWLY = 6  # legend and plots follow every so many pictures
 
 
 class Observer:
-    """A panel, which is told what happens; does nothing unless it says otherwise."""
+    """A panel, which is notified of events; by default it does nothing."""
 
     def on_recording(self, recording: Recording) -> None:
         """There is a new motion."""
@@ -37,7 +37,7 @@ class Observer:
         """The player is at a time, s."""
 
     def on_frame(self, frame: int) -> None:
-        """Another instant is shown; not told of every picture of the player."""
+        """Another instant is shown; not called for every picture of the player."""
 
 
 class Page:

@@ -82,7 +82,7 @@ class ViserScene:
         handle = self._mesh(f"/connectors/{its.name}", mesh, its.color)
         points = zip(its.bodies, its.points, strict=True)
         ends = its.ends or tuple(recording.global_point(body, point) for body, point in points)
-        start, end = (place + 0.85 * in_front(recording) for place in ends)
+        start, end = (center + 0.85 * in_front(recording) for center in ends)
         return handle, start, end
 
     def show(self, overlay: Overlay, frame: int) -> None:

@@ -145,7 +145,7 @@ class Session:
                 self._guarded(lambda requested=requested: self._solve(*requested))
 
     def _guarded(self, job: Callable[[], object]) -> None:
-        """Do something; what goes wrong is told, and the worker lives on."""
+        """Do something; an error is shown, and the worker lives on."""
         try:
             job()
         except JounceError as error:

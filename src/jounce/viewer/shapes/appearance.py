@@ -29,7 +29,7 @@ Position = Sequence[float | int] | Float[np.ndarray, " components"]
 """Two or three components, m."""
 
 DARK, GRAY = (70, 74, 82), (150, 155, 163)  # of what belongs to no body
-# the light colors of Tol, told apart by the color-blind; arrows have the strong ones
+# the light colors of Tol, which the color-blind distinguish; arrows have the strong ones
 BODY_COLORS = (
     (119, 170, 221),
     (238, 136, 102),

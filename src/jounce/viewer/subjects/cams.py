@@ -12,7 +12,7 @@ from trimesh import Trimesh
 from jounce.constraints.drivers import CoordinateDriver
 from jounce.constraints.planar import Prismatic, Revolute
 from jounce.kinematics import OscillatingFollower, PlateCam, solve
-from jounce.kinematics.cams.plate_cam import SENSES
+from jounce.kinematics.cams.plate_cam import SIGNS
 from jounce.mechanism import AngleOutput, Body, Mechanism, PointOutput
 from jounce.mechanism.mechanism import GROUND
 from jounce.viewer.shapes.appearance import BODY_COLORS, Appearance, ColoredMesh
@@ -40,7 +40,7 @@ def cam_mechanism(cam: PlateCam) -> Mechanism:
     [25.923, 34.923]
     """
     follower, start = cam.follower, cam.follower.start(cam.base_radius)
-    turn = "t" if SENSES[cam.sense] > 0 else "-t"
+    turn = "t" if SIGNS[cam.sense] > 0 else "-t"
     if isinstance(follower, OscillatingFollower):
         pivot, angle = [follower.center_distance, 0.0], -start - float(cam.table.lift[0])
         guided = Revolute((GROUND, "follower"), pivot, [0, 0])

@@ -46,10 +46,10 @@ def reduction(operation: str) -> Rule:
         remaining = [axis for axis in range(array.ndim) if axis not in axes]
         together = int(np.prod([array.shape[axis] for axis in axes]))
         rows = array.transpose(*remaining, *axes).reshape(*(array.shape[axis] for axis in remaining), together)
-        found, kind = np.empty(rows.shape[:-1], object), kind_of(equation.outvars[0].aval.dtype)
-        for place in np.ndindex(found.shape):
-            found[place] = _combined(code, operation, flat(rows[place]), kind)
-        return [found]
+        result, kind = np.empty(rows.shape[:-1], object), kind_of(equation.outvars[0].aval.dtype)
+        for index in np.ndindex(result.shape):
+            result[index] = _combined(code, operation, flat(rows[index]), kind)
+        return [result]
 
     return rule
 
@@ -58,15 +58,15 @@ def extreme(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
     """Return where the largest or smallest number along an axis is, the first of equals; NaN before all."""
     (axis,) = equation.params["axes"]
     kind, rows = kind_of(equation.params["index_dtype"]), np.moveaxis(given[0], axis, -1)
-    found = np.empty(rows.shape[:-1], object)
-    for place in np.ndindex(found.shape):
-        best, at = rows[place][0], code.constant(0, kind)
-        for k, value in enumerate(flat(rows[place])[1:], 1):
+    result = np.empty(rows.shape[:-1], object)
+    for index in np.ndindex(result.shape):
+        best, at = rows[index][0], code.constant(0, kind)
+        for k, value in enumerate(flat(rows[index])[1:], 1):
             better = is_better(code, equation.primitive.name, value, best)
             best = code.select(better, value, best)
             at = code.select(better, code.constant(k, kind), at)
-        found[place] = at
-    return [found]
+        result[index] = at
+    return [result]
 
 
 def is_better(code: Code, operation: str, value: Value, best: Value) -> Value:
@@ -89,10 +89,10 @@ def cumulative(operation: str) -> Rule:
             (rows[k, ...] for k in range(len(rows))),
             lambda a, b: each(lambda p, q: code.arithmetic(operation, p, q), a, b),
         )
-        found = np.empty(rows.shape, object)
+        result = np.empty(rows.shape, object)
         for k, part in enumerate(parts):
-            found[k, ...] = part
-        return [np.moveaxis(found[::-1] if backward else found, 0, axis)]
+            result[k, ...] = part
+        return [np.moveaxis(result[::-1] if backward else result, 0, axis)]
 
     return rule
 
@@ -103,8 +103,8 @@ def sorting(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
     size = arrays[0].shape[-1]
     if equation.params["num_keys"] != 1 or size > MOST_SORTED:
         raise UnsupportedOperationError(f"sorting {size} numbers by {equation.params['num_keys']} keys")
-    for place in np.ndindex(arrays[0].shape[:-1]):
-        rows = [array[place] for array in arrays]
+    for index in np.ndindex(arrays[0].shape[:-1]):
+        rows = [array[index] for array in arrays]
         for turn in range(size):
             for k in range(turn % 2, size - 1, 2):
                 change = _beyond(code, *rows[0][k : k + 2].tolist())
@@ -134,8 +134,8 @@ def dot(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
         return array.transpose(*batch, *free, *summed).reshape(sizes)
 
     a, b = ordered(left, left_batch, left_sum), ordered(right, right_batch, right_sum)
-    found = np.empty((len(a), a.shape[1], b.shape[1]), object)
-    for k, i, j in np.ndindex(found.shape):
+    result = np.empty((len(a), a.shape[1], b.shape[1]), object)
+    for k, i, j in np.ndindex(result.shape):
         products = [code.arithmetic("mul", p, q) for p, q in zip(flat(a[k, i]), flat(b[k, j]), strict=True)]
-        found[k, i, j] = _combined(code, "add", products, kind)
-    return [found.reshape(equation.outvars[0].aval.shape)]
+        result[k, i, j] = _combined(code, "add", products, kind)
+    return [result.reshape(equation.outvars[0].aval.shape)]

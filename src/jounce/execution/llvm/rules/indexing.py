@@ -71,17 +71,17 @@ def reverse(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]
 def pad(_: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
     """Return an array with a number before, after and between its elements; some are cut off where less than none."""
     array, filler = given
-    found = np.full(equation.outvars[0].aval.shape, filler.item(), object)
-    places, taken = [], []
+    result = np.full(equation.outvars[0].aval.shape, filler.item(), object)
+    indices, taken = [], []
     for size, whole, (low, _high, between) in zip(
-        array.shape, found.shape, equation.params["padding_config"], strict=True
+        array.shape, result.shape, equation.params["padding_config"], strict=True
     ):
         at = low + np.arange(size) * (between + 1)
         inside = np.flatnonzero((at >= 0) & (at < whole))
-        places.append(at[inside])
+        indices.append(at[inside])
         taken.append(inside)
-    found[np.ix_(*places)] = array[np.ix_(*taken)]
-    return [found]
+    result[np.ix_(*indices)] = array[np.ix_(*taken)]
+    return [result]
 
 
 def iota(code: Code, equation: Any, _: Sequence[Values]) -> Sequence[Values]:
@@ -106,12 +106,12 @@ def _element(code: Code, values: Sequence[Value], index: Value) -> Value:
         return values[int(index.constant)]
     if len(values) > (MOST_CANDIDATES if index.lanes else 2):
         region, first = in_memory(code, values)
-        place = code.arithmetic("add", code.converted(index, "l"), code.constant(first, "l"))
-        return code.load(region, place)
-    found = values[-1]
+        position = code.arithmetic("add", code.converted(index, "l"), code.constant(first, "l"))
+        return code.load(region, position)
+    result = values[-1]
     for k in reversed(range(len(values) - 1)):
-        found = code.select(code.compare("eq", index, code.constant(k, index.kind)), values[k], found)
-    return found
+        result = code.select(code.compare("eq", index, code.constant(k, index.kind)), values[k], result)
+    return result
 
 
 def _row(code: Code, home: tuple[Region, int], index: Value, shape: Sequence[int], more: int = 0) -> Values:
@@ -145,17 +145,17 @@ def dynamic_slice(code: Code, equation: Any, given: Sequence[Values]) -> Sequenc
         rows = np.moveaxis(array, axis, 0)
         index, shape = within(code, start.item(), 0, len(rows) - size), (size, *rows.shape[1:])
         if index.constant is not None:
-            found = rows[int(index.constant) :][:size]
+            result = rows[int(index.constant) :][:size]
         elif not np.prod(shape):
-            found = np.empty(shape, object)
+            result = np.empty(shape, object)
         elif not index.lanes:
             home = in_memory(code, flat(rows))
-            found = np.stack([_row(code, home, index, shape[1:], k) for k in range(size)])
+            result = np.stack([_row(code, home, index, shape[1:], k) for k in range(size)])
         else:
             pick = _picked(code, index)
             windows = [rows[k : len(rows) - size + 1 + k] for k in range(size)]
-            found = np.stack([each(pick, *(window[k, ...] for k in range(len(window)))) for window in windows])
-        array = np.moveaxis(found, 0, axis)
+            result = np.stack([each(pick, *(window[k, ...] for k in range(len(window)))) for window in windows])
+        array = np.moveaxis(result, 0, axis)
     return [array]
 
 
@@ -166,30 +166,30 @@ def _picked(code: Code, index: Value) -> Callable[..., Value]:
 def dynamic_update_slice(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
     """Return an array with a part of it changed that starts at indices, moved so that all of it is in bounds."""
     array, new, *starts = given
-    rooms = [whole - size for whole, size in zip(array.shape, new.shape, strict=True)]
+    largest_starts = [whole - size for whole, size in zip(array.shape, new.shape, strict=True)]
     indices = kept_inside(code, array.shape, new.shape, starts)
     moving = [axis for axis, index in enumerate(indices) if index.constant is None]
     firsts = [
         range(most + 1) if index.constant is None else (int(index.constant),)
-        for index, most in zip(indices, rooms, strict=True)
+        for index, most in zip(indices, largest_starts, strict=True)
     ]
-    found = array.copy()
+    result = array.copy()
     for first in itertools.product(*firsts):
         here = code.constant(True)
         for axis in moving:
             number = code.constant(first[axis], indices[axis].kind)
             here = code.logic("and", here, code.compare("eq", indices[axis], number))
         for offset in np.ndindex(new.shape):
-            place = tuple(a + b for a, b in zip(first, offset, strict=True))
-            found[place] = code.select(here, new.item(offset), found.item(place))
-    return [found]
+            position = tuple(a + b for a, b in zip(first, offset, strict=True))
+            result[position] = code.select(here, new.item(offset), result.item(position))
+    return [result]
 
 
-def _places(
+def _positions(
     indices: np.ndarray,
     shape: Sequence[int],
     named: Sequence[Any],
-    beside: Mapping[Any, Any],
+    batching: Mapping[Any, Any],
     sizes: Sequence[int],
     *,
     drop: bool,
@@ -204,7 +204,7 @@ def _places(
         Of the array.
     named : sequence of int
         The axes of the array that the indices are of.
-    beside : mapping
+    batching : mapping
         Axes of the array along which there is a window of length one for each element, and the axes of the windows
         that count them.
     sizes : sequence of int
@@ -219,14 +219,14 @@ def _places(
     batch = indices.shape[:-1]
     starts = np.zeros((*batch, len(shape)), int)
     starts[..., list(named)] = indices
-    for axis, which in beside.items():
+    for axis, which in batching.items():
         starts[..., axis] = np.arange(shape[axis]).reshape([-1 if k == which else 1 for k in range(len(batch))])
     inside = starts.clip(0, np.subtract(shape, sizes))
     strides = np.array([int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))], int)
     offsets = np.tensordot(strides, np.indices(sizes), 1)
-    found = (inside @ strides)[(..., *[None] * len(sizes))] + offsets
+    result = (inside @ strides)[(..., *[None] * len(sizes))] + offsets
     fits = (inside == starts).all(axis=-1)[(..., *[None] * len(sizes))]
-    return np.where(fits, found, -1) if drop else found
+    return np.where(fits, result, -1) if drop else result
 
 
 def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Values]:
@@ -238,13 +238,13 @@ def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Value
     if len(moving) > 1:
         raise UnsupportedOperationError("indices of which more than one are not known")
     drop, batches = p["mode"] == GatherScatterMode.FILL_OR_DROP, indices.ndim - 1
-    beside = dict(zip(numbers.operand_batching_dims, numbers.start_indices_batching_dims, strict=True))
+    batching = dict(zip(numbers.operand_batching_dims, numbers.start_indices_batching_dims, strict=True))
     left_out = tuple(batches + axis for axis in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims))
 
     def at(table: np.ndarray) -> np.ndarray:
-        found = _places(table, array.shape, numbers.start_index_map, beside, p["slice_sizes"], drop=drop)
-        found = found.squeeze(left_out)
-        return np.moveaxis(found, range(batches, found.ndim), numbers.offset_dims)
+        result = _positions(table, array.shape, numbers.start_index_map, batching, p["slice_sizes"], drop=drop)
+        result = result.squeeze(left_out)
+        return np.moveaxis(result, range(batches, result.ndim), numbers.offset_dims)
 
     values = [*flat(array), code.constant(filler(p, dtype), kind_of(dtype))]
     if not moving:
@@ -258,17 +258,17 @@ def gather(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Value
     for k in range(least, most + 1):
         known[..., axis] = k
         tables.append(at(known))
-    found = np.empty(tables[0].shape, object)
-    which = [k for k in range(found.ndim) if k not in numbers.offset_dims]
-    for place in np.ndindex(found.shape):
-        index = within(code, indices[(*(place[k] for k in which), axis)], least, most)
+    result = np.empty(tables[0].shape, object)
+    which = [k for k in range(result.ndim) if k not in numbers.offset_dims]
+    for position in np.ndindex(result.shape):
+        index = within(code, indices[(*(position[k] for k in which), axis)], least, most)
         index = code.arithmetic("add", index, code.constant(-least, index.kind))
-        found[place] = _element(code, [values[table[place]] for table in tables], index)
-    return [found]
+        result[position] = _element(code, [values[table[position]] for table in tables], index)
+    return [result]
 
 
 def _taken(values: Sequence[Value], table: np.ndarray) -> Values:
-    return filled(table.shape, [values[place] for place in table.ravel()])
+    return filled(table.shape, [values[index] for index in table.ravel()])
 
 
 def filler(params: Mapping[str, Any], dtype: Any) -> Any:
@@ -291,17 +291,17 @@ def scatter(code: Code, equation: Any, given: Sequence[Values]) -> Sequence[Valu
         return [array]
     p, add = equation.params, equation.primitive.name == "scatter-add"
     numbers, windows, batches = p["dimension_numbers"], p["dimension_numbers"].update_window_dims, indices.ndim - 1
-    beside = dict(zip(numbers.operand_batching_dims, numbers.scatter_indices_batching_dims, strict=True))
+    batching = dict(zip(numbers.operand_batching_dims, numbers.scatter_indices_batching_dims, strict=True))
     left_out = (*numbers.inserted_window_dims, *numbers.operand_batching_dims)
     remaining = dict(zip((axis for axis in range(array.ndim) if axis not in left_out), windows, strict=True))
     sizes = [updates.shape[remaining[axis]] if axis in remaining else 1 for axis in range(array.ndim)]
     table = np.vectorize(lambda value: int(value.constant), otypes=[int])(indices)
     drop = p["mode"] == GatherScatterMode.FILL_OR_DROP
-    places = _places(table, array.shape, numbers.scatter_dims_to_operand_dims, beside, sizes, drop=drop)
-    places = places.squeeze(tuple(batches + axis for axis in left_out))
-    places = np.moveaxis(places, range(batches, places.ndim), windows)
-    found = flat(array)
-    for place, value in zip(places.ravel().tolist(), flat(updates), strict=True):
-        if place >= 0:
-            found[place] = code.arithmetic("add", found[place], value) if add else value
-    return [filled(array.shape, found)]
+    positions = _positions(table, array.shape, numbers.scatter_dims_to_operand_dims, batching, sizes, drop=drop)
+    positions = positions.squeeze(tuple(batches + axis for axis in left_out))
+    positions = np.moveaxis(positions, range(batches, positions.ndim), windows)
+    result = flat(array)
+    for index, value in zip(positions.ravel().tolist(), flat(updates), strict=True):
+        if index >= 0:
+            result[index] = code.arithmetic("add", result[index], value) if add else value
+    return [filled(array.shape, result)]

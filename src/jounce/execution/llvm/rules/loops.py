@@ -15,15 +15,15 @@ from jounce.execution.llvm.text.arrays import filled
 from jounce.execution.llvm.text.code import Code
 from jounce.execution.llvm.text.stored import (
     any_lanes,
-    bytes_needed,
     copied,
     counted,
-    empty_state,
     fill,
     is_own,
     nest,
+    new_storage,
     put,
     reshaped,
+    result_storage,
     row,
     stored,
     values_of,
@@ -57,10 +57,10 @@ def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
         longest = max(range(len(operands)), key=lambda k: len(operands[k].given))
         operands[longest] = as_read(stored(code, operands[longest]))
     read: list[Stored] = []
-    places = [[_place_among(read, part, aval.shape) for part in operand.given] for operand in operands]
+    indices = [[_place_among(read, part, aval.shape) for part in operand.given] for operand in operands]
 
     def body(values: Sequence[Value]) -> Value:
-        numbers = [x.body([values[k] for k in its]) for x, its in zip(operands, places, strict=True)]
+        numbers = [x.body([values[k] for k in its]) for x, its in zip(operands, indices, strict=True)]
         return rule(code, equation, [filled((), [number]) for number in numbers])[0].item()
 
     return [Deferred(tuple(read), kind_of(aval.dtype), body, any(operand.parts for operand in operands))]
@@ -69,9 +69,9 @@ def _each(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
 def _place_among(arrays: list[Stored], array: Stored, shape: Sequence[int]) -> int:
     """Return the place of an array, in a shape, among some, to which it is added if it is none of them."""
     array = spread(array, shape, range(array.ndim) if array.ndim else ())
-    for place, other in enumerate(arrays):
+    for index, other in enumerate(arrays):
         if other.is_same(array):
-            return place
+            return index
     arrays.append(array)
     return len(arrays) - 1
 
@@ -101,8 +101,8 @@ def _broadcast(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Ar
 
 def _reshape(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     array, shape = given[0], equation.outvars[0].aval.shape
-    if isinstance(array, Deferred) and (found := array.in_shape(shape)) is not None:
-        return [found]
+    if isinstance(array, Deferred) and (result := array.in_shape(shape)) is not None:
+        return [result]
     return [reshaped(code, stored(code, array), shape)]
 
 
@@ -139,9 +139,9 @@ def _dynamic_slice(code: Code, equation: Any, given: Sequence[Array]) -> Sequenc
 
 def _window(code: Code, array: Stored, sizes: Sequence[int], starts: Sequence[Array]) -> Stored:
     """Return a part of an array, moved so that all of it is in bounds."""
-    places = kept_inside(code, array.shape, sizes, [values_of(code, start) for start in starts])
-    for axis, (place, size) in enumerate(zip(places, sizes, strict=True)):
-        array = between(code, array, axis, place if place.constant is None else int(place.constant), size)
+    indices = kept_inside(code, array.shape, sizes, [values_of(code, start) for start in starts])
+    for axis, (index, size) in enumerate(zip(indices, sizes, strict=True)):
+        array = between(code, array, axis, index if index.constant is None else int(index.constant), size)
     return array
 
 
@@ -149,20 +149,20 @@ def _window(code: Code, array: Stored, sizes: Sequence[int], starts: Sequence[Ar
 
 
 def _concatenate(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    found, axis, start = bytes_needed(code, equation, given), int(equation.params["dimension"]), 0
+    result, axis, start = result_storage(code, equation, given), int(equation.params["dimension"]), 0
     for array in given:
-        put(code, between(code, found, axis, start, array.shape[axis]), array)
+        put(code, between(code, result, axis, start, array.shape[axis]), array)
         start += array.shape[axis]
-    return [found]
+    return [result]
 
 
 def _stack(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    found, axis = bytes_needed(code, equation, given), int(equation.params["axis"])
-    rows = transposed(found, [axis, *(k for k in range(found.ndim) if k != axis)])
+    result, axis = result_storage(code, equation, given), int(equation.params["axis"])
+    rows = transposed(result, [axis, *(k for k in range(result.ndim) if k != axis)])
     for k, array in enumerate(given):
         target = between(code, rows, 0, k, 1)
         put(code, replace(target, shape=target.shape[1:], strides=target.strides[1:]), array)
-    return [found]
+    return [result]
 
 
 def _tile(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
@@ -173,27 +173,27 @@ def _tile(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
 
 
 def _pad(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
-    array, found = stored(code, given[0]), bytes_needed(code, equation, given)
-    fill(code, found, values_of(code, given[1]).item())
-    target = found
+    array, result = stored(code, given[0]), result_storage(code, equation, given)
+    fill(code, result, values_of(code, given[1]).item())
+    target = result
     for axis, (low, _, between_) in enumerate(tuple(map(int, sizes)) for sizes in equation.params["padding_config"]):
         step = between_ + 1
         before = max(0, -(low // step)) if low < 0 else 0  # of the array, beyond the beginning
         start = low + before * step
-        size = max(0, min(array.shape[axis] - before, -(-(found.shape[axis] - start) // step)))
+        size = max(0, min(array.shape[axis] - before, -(-(result.shape[axis] - start) // step)))
         array = between(code, array, axis, before, size)
         target = between(code, target, axis, start, size, step)
     put(code, target, array)
-    return [found]
+    return [result]
 
 
 def _dynamic_update_slice(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Change a part of an array."""
     _, part, *starts = given
-    found = _to_change(code, equation, given)
-    target = _window(code, found, part.shape, starts)
-    put(code, target, _apart(code, part, found) if isinstance(part, InMemory) else part)
-    return [found]
+    result = _to_change(code, equation, given)
+    target = _window(code, result, part.shape, starts)
+    put(code, target, _disjoint(code, part, result) if isinstance(part, InMemory) else part)
+    return [result]
 
 
 def _to_change(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
@@ -201,12 +201,12 @@ def _to_change(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
     array, *others = given
     if isinstance(array, Stored) and is_own(code, array) and (array.lanes or not any_lanes(others)):
         return array
-    found = bytes_needed(code, equation, given)
-    put(code, found, array)
-    return found
+    result = result_storage(code, equation, given)
+    put(code, result, array)
+    return result
 
 
-def _apart(code: Code, array: InMemory, changed: Stored) -> InMemory:
+def _disjoint(code: Code, array: InMemory, changed: Stored) -> InMemory:
     """Return an array that stays as it is while another one is changed: copied if it may be a part of that."""
     read = array.given if isinstance(array, Deferred) else [array]
     return copied(code, array) if any(x.region is changed.region for x in read) else array
@@ -237,16 +237,16 @@ def _placed(
     batch : sequence
         Which window it is.
     """
-    place, inside = array.first, code.constant(True)
+    position, inside = array.first, code.constant(True)
     for axis, size in enumerate(array.shape):
         if axis not in numbers:
             continue
         where = _at(code, rows, range(rows.ndim), (*batch, numbers[axis]), rows.first)
         index = code.converted(without_home(code.load(rows.region, where)), "l")
-        kept = within(code, index, 0, size - sizes[axis])
-        inside = code.logic("and", inside, code.compare("eq", kept, index))
-        place = further(code, place, kept, array.strides[axis])
-    return place, inside if p["mode"] == GatherScatterMode.FILL_OR_DROP else code.constant(True)
+        remaining = within(code, index, 0, size - sizes[axis])
+        inside = code.logic("and", inside, code.compare("eq", remaining, index))
+        position = further(code, position, remaining, array.strides[axis])
+    return position, inside if p["mode"] == GatherScatterMode.FILL_OR_DROP else code.constant(True)
 
 
 def _at(
@@ -272,24 +272,24 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
     """Return parts of an array at indices."""
     p, array, indices = equation.params, stored(code, given[0]), stored(code, given[1])
     numbers, aval = p["dimension_numbers"], equation.outvars[0].aval
-    found = empty_state(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
+    result = new_storage(code, aval.shape, kind_of(aval.dtype), lanes=array.lanes or indices.lanes)
     offsets = list(numbers.offset_dims)
-    batch = [axis for axis in range(found.ndim) if axis not in offsets]
+    batch = [axis for axis in range(result.ndim) if axis not in offsets]
     taken = [
         axis
         for axis in range(array.ndim)
         if axis not in (*numbers.collapsed_slice_dims, *numbers.operand_batching_dims)
     ]
     sizes, named = p["slice_sizes"], {int(axis): k for k, axis in enumerate(numbers.start_index_map)}
-    beyond = stored(code, filled((), [code.constant(filler(p, aval.dtype), found.kind)]))
+    beyond = stored(code, filled((), [code.constant(filler(p, aval.dtype), result.kind)]))
 
     def window(which: list[int | Value]) -> None:
         first, inside = _placed(code, p, array, indices, named, sizes, which)
-        beside = [which[k] for k in numbers.start_indices_batching_dims]
-        first = _at(code, array, numbers.operand_batching_dims, beside, first)
+        batching = [which[k] for k in numbers.start_indices_batching_dims]
+        first = _at(code, array, numbers.operand_batching_dims, batching, first)
         source = Stored(array.region, tuple(sizes[a] for a in taken), tuple(array.strides[a] for a in taken), first)
-        start = _at(code, found, batch, which, found.first)
-        target = Stored(found.region, source.shape, tuple(found.strides[a] for a in offsets), start)
+        start = _at(code, result, batch, which, result.first)
+        target = Stored(result.region, source.shape, tuple(result.strides[a] for a in offsets), start)
         if inside.constant is not None:
             put(code, target, source)
             return
@@ -297,37 +297,39 @@ def _gather(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array
         nest(code, [source, other], [target], lambda values: [code.select(inside, *values)])
 
     if array.size:
-        _windows(code, [found.shape[axis] for axis in batch], window)
+        _windows(code, [result.shape[axis] for axis in batch], window)
     else:
-        put(code, found, spread(beyond, found.shape, ()))
-    return [found]
+        put(code, result, spread(beyond, result.shape, ()))
+    return [result]
 
 
 def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Put numbers at indices, or add them to what is there."""
-    found = _to_change(code, equation, given)
-    indices, updates = (stored(code, _apart(code, stored(code, array), found)) for array in given[1:])
+    result = _to_change(code, equation, given)
+    indices, updates = (stored(code, _disjoint(code, stored(code, array), result)) for array in given[1:])
     p, add = equation.params, equation.primitive.name == "scatter-add"
     numbers = p["dimension_numbers"]
-    if not updates.size or not found.size:
-        return [found]
+    if not updates.size or not result.size:
+        return [result]
     windows = list(numbers.update_window_dims)
     batch = [axis for axis in range(updates.ndim) if axis not in windows]
-    kept = [
+    remaining = [
         axis
-        for axis in range(found.ndim)
+        for axis in range(result.ndim)
         if axis not in (*numbers.inserted_window_dims, *numbers.operand_batching_dims)
     ]
-    sizes = [1] * found.ndim
-    for axis, of in zip(kept, windows, strict=True):
+    sizes = [1] * result.ndim
+    for axis, of in zip(remaining, windows, strict=True):
         sizes[axis] = updates.shape[of]
     named = {int(axis): k for k, axis in enumerate(numbers.scatter_dims_to_operand_dims)}
 
     def window(which: list[int | Value]) -> None:
-        first, inside = _placed(code, p, found, indices, named, sizes, which)
-        beside = [which[k] for k in numbers.scatter_indices_batching_dims]
-        first = _at(code, found, numbers.operand_batching_dims, beside, first)
-        target = Stored(found.region, tuple(sizes[a] for a in kept), tuple(found.strides[a] for a in kept), first)
+        first, inside = _placed(code, p, result, indices, named, sizes, which)
+        batching = [which[k] for k in numbers.scatter_indices_batching_dims]
+        first = _at(code, result, numbers.operand_batching_dims, batching, first)
+        target = Stored(
+            result.region, tuple(sizes[a] for a in remaining), tuple(result.strides[a] for a in remaining), first
+        )
         start = _at(code, updates, batch, which, updates.first)
         source = Stored(updates.region, target.shape, tuple(updates.strides[a] for a in windows), start)
 
@@ -339,7 +341,7 @@ def _scatter(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Arra
         nest(code, [target, source], [target], body, adds=True)
 
     _windows(code, [updates.shape[axis] for axis in batch], window)
-    return [found]
+    return [result]
 
 
 STORED: Mapping[str, StoredRule] = {

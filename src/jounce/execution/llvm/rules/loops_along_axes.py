@@ -6,7 +6,7 @@ from typing import Any
 
 from jounce.execution.llvm.rules.axes import combination, is_better, nothing
 from jounce.execution.llvm.text.code import Code
-from jounce.execution.llvm.text.stored import bytes_needed, counted, empty_state, fill, nest, put, stored
+from jounce.execution.llvm.text.stored import counted, fill, nest, new_storage, put, result_storage, stored
 from jounce.execution.llvm.text.values import Value
 from jounce.execution.llvm.text.views import Array, Deferred, Stored, as_read, between, spread, transposed
 
@@ -22,14 +22,14 @@ def reduction(operation: str) -> StoredRule:
         if not isinstance(array, Deferred):
             array = as_read(stored(code, array))
         remaining = [axis for axis in range(array.ndim) if axis not in axes]
-        found = bytes_needed(code, equation, [array])
-        fill(code, found, code.constant(nothing(operation, found.kind), found.kind))
-        if code.alone and operation in ORDERLESS and found.size == 1:
+        result = result_storage(code, equation, [array])
+        fill(code, result, code.constant(nothing(operation, result.kind), result.kind))
+        if code.single and operation in ORDERLESS and result.size == 1:
             for part in _in_vectors(code, operation, array):
-                _gathered(code, operation, spread(replace(found, shape=(), strides=()), part.shape, ()), part)
-            return [found]
-        _gathered(code, operation, spread(found, array.shape, remaining), array)
-        return [found]
+                _gathered(code, operation, spread(replace(result, shape=(), strides=()), part.shape, ()), part)
+            return [result]
+        _gathered(code, operation, spread(result, array.shape, remaining), array)
+        return [result]
 
     return rule
 
@@ -58,7 +58,7 @@ def _in_vectors(code: Code, operation: str, array: Deferred) -> list[Deferred]:
     rest = row.viewed(lambda x: between(code, x, 0, row.size - left, left))
     if rows is None:
         return [array]
-    most = empty_state(code, (code.width,), row.kind, lanes=False)
+    most = new_storage(code, (code.width,), row.kind, lanes=False)
     fill(code, most, code.constant(nothing(operation, row.kind), row.kind))
     _gathered(code, operation, spread(most, whole, (1,)), rows)
     return [as_read(most), rest]
@@ -76,35 +76,35 @@ REDUCTIONS = {
 
 def extreme(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Return where the largest or smallest number along an axis is, the first of equals; NaN before all."""
-    array, found, word = stored(code, given[0]), bytes_needed(code, equation, given), equation.primitive.name
+    array, result, word = stored(code, given[0]), result_storage(code, equation, given), equation.primitive.name
     (axis,) = map(int, equation.params["axes"])
     rows = transposed(array, [k for k in range(array.ndim) if k != axis] + [axis])
-    best = empty_state(code, found.shape, array.kind, lanes=array.lanes)
+    best = new_storage(code, result.shape, array.kind, lanes=array.lanes)
     first = between(code, rows, rows.ndim - 1, 0, 1)
     put(code, best, replace(first, shape=first.shape[:-1], strides=first.strides[:-1]))
-    fill(code, found, code.constant(0, found.kind))
+    fill(code, result, code.constant(0, result.kind))
 
     def look(k: int | Value) -> None:
-        index = code.converted(k, found.kind) if isinstance(k, Value) else code.constant(k, found.kind)
+        index = code.converted(k, result.kind) if isinstance(k, Value) else code.constant(k, result.kind)
         part = between(code, rows, rows.ndim - 1, k, 1)
         part = replace(part, shape=part.shape[:-1], strides=part.strides[:-1])
 
         def body(values: Sequence[Value]) -> Sequence[Value]:
-            value, largest, place = values
+            value, largest, position = values
             better = is_better(code, word, value, largest)
-            return code.select(better, value, largest), code.select(better, index, place)
+            return code.select(better, value, largest), code.select(better, index, position)
 
-        nest(code, [part, best, found], [best, found], body, adds=True)
+        nest(code, [part, best, result], [best, result], body, adds=True)
 
     counted(code, rows.shape[-1], look)
-    return [found]
+    return [result]
 
 
 def dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
     """Return products of matrices: sums of products over some axes, for each place along those that are joined."""
     (left_sum, right_sum), (left_batch, right_batch) = equation.params["dimension_numbers"]
-    found = bytes_needed(code, equation, given)
-    fill(code, found, code.constant(0, found.kind))
+    result = result_storage(code, equation, given)
+    fill(code, result, code.constant(0, result.kind))
     left, right = (stored(code, array) for array in given)
     left_free, right_free = (
         [axis for axis in range(x.ndim) if axis not in (*batch, *summed)]
@@ -115,15 +115,15 @@ def dot(code: Code, equation: Any, given: Sequence[Array]) -> Sequence[Array]:
         transposed(right, (*right_batch, *right_free, *right_sum)),
     )
     batch, summed = len(left_batch), len(left_sum)
-    shape = (*found.shape, *left.shape[left.ndim - summed :])
+    shape = (*result.shape, *left.shape[left.ndim - summed :])
     after, end = batch + len(left_free), len(shape) - summed
     a = spread(left, shape, [*range(after), *range(end, len(shape))])
     b = spread(right, shape, [*range(batch), *range(after, len(shape))])
-    total = spread(found, shape, range(end))
+    total = spread(result, shape, range(end))
 
     def body(values: Sequence[Value]) -> Sequence[Value]:
-        known, p, q = (code.converted(value, found.kind) for value in values)
+        known, p, q = (code.converted(value, result.kind) for value in values)
         return [code.arithmetic("add", known, code.arithmetic("mul", p, q))]
 
     nest(code, [total, a, b], [total], body, adds=True)
-    return [found]
+    return [result]

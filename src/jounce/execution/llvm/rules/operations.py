@@ -64,8 +64,8 @@ def _integer_power(code: Code, equation: Any, given: Sequence[Values]) -> Sequen
 
     def power(a: Value) -> Value:
         squared, result = a, code.constant(1, a.kind)
-        for place, digit in enumerate(reversed(f"{abs(exponent):b}")):
-            squared = squared if place == 0 else _square(code, squared)
+        for index, digit in enumerate(reversed(f"{abs(exponent):b}")):
+            squared = squared if index == 0 else _square(code, squared)
             result = code.arithmetic("mul", result, squared) if digit == "1" else result
         return result if exponent >= 0 else code.arithmetic("div", code.constant(1, a.kind), result)
 
@@ -95,10 +95,10 @@ def _select(code: Code, _: Any, given: Sequence[Values]) -> Sequence[Values]:
     def choose(which: Value, *cases: Value) -> Value:
         if which.kind == "b":
             return code.select(which, cases[-1], cases[0])
-        found = cases[-1]
+        result = cases[-1]
         for k in reversed(range(len(cases) - 1)):
-            found = code.select(code.compare("le", which, code.constant(k, which.kind)), cases[k], found)
-        return found
+            result = code.select(code.compare("le", which, code.constant(k, which.kind)), cases[k], result)
+        return result
 
     return [each(choose, *given)]
 

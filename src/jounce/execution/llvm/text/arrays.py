@@ -15,9 +15,9 @@ Rule = Callable[[Code, Any, Sequence[Values]], Sequence[Values]]  # of an equati
 
 def filled(shape: Sequence[int], values: Sequence[Value]) -> Values:
     """Return an array of values, the last axis fastest."""
-    found = np.empty(shape, object)
-    found.ravel()[:] = values
-    return found
+    result = np.empty(shape, object)
+    result.ravel()[:] = values
+    return result
 
 
 def constants(code: Code, array: Any) -> Values:
@@ -47,8 +47,8 @@ def in_memory(code: Code, values: Sequence[Value]) -> tuple[Region, int]:
     """Return where some numbers are one after another in memory, and the first place: put there if they are not yet."""
     if values[0].home is not None:
         region, first = values[0].home
-        places = range(first, first + len(values))
-        if all(v.home is not None and v.home == (region, k) for k, v in zip(places, values, strict=True)):
+        indices = range(first, first + len(values))
+        if all(v.home is not None and v.home == (region, k) for k, v in zip(indices, values, strict=True)):
             return region, first
     region = code.taken_room(len(values), values[0].kind, lanes=any(value.lanes for value in values))
     for k, value in enumerate(values):

@@ -25,7 +25,7 @@ class Code(Scalars):
         Bytes that are taken there, of the stack and elsewhere.
     large : int or None
         Arrays of more numbers stay in memory, and operations on them are loops; None for none.
-    alone : bool
+    single : bool
         Whether there is one instant only, so that vectors are numbers of an array that lie one after another.
     constants : list of str
         Text of arrays of constants in memory.
@@ -43,7 +43,7 @@ class Code(Scalars):
     memory: int = 0
     heap: int = 0
     large: int | None = None
-    alone: bool = False
+    single: bool = False
     constants: list[str] = field(default_factory=list)
     changeable: set[Region] = field(default_factory=set)
     held: list[Region] = field(default_factory=list)
@@ -109,10 +109,10 @@ class Code(Scalars):
 
     def load_along(self, region: Region, index: int | Value) -> Value:
         """Return a vector of numbers that lie one after another from a place of memory on."""
-        one, place = IN_MEMORY[region.kind], self._address(region, index)
+        one, position = IN_MEMORY[region.kind], self._address(region, index)
         name, of = self.fresh(), f"<{self.width} x {one}>"
         hint = ", !invariant.load !0" if region.given else ""
-        self.lines.append(f"{name} = load {of}, ptr {place}, align {DTYPES[region.kind].itemsize}{hint}")
+        self.lines.append(f"{name} = load {of}, ptr {position}, align {DTYPES[region.kind].itemsize}{hint}")
         if region.kind == "b":
             byte, name = name, self.fresh()
             self.lines.append(f"{name} = trunc {of} {byte} to {self.type_of('b', lanes=True)}")
@@ -120,33 +120,33 @@ class Code(Scalars):
 
     def store_along(self, region: Region, index: int | Value, value: Value) -> None:
         """Put a vector of numbers one after another from a place of memory on."""
-        one, place, operand = IN_MEMORY[region.kind], self._address(region, index), self.operand(value, lanes=True)
+        one, position, operand = IN_MEMORY[region.kind], self._address(region, index), self.operand(value, lanes=True)
         of = f"<{self.width} x {one}>"
         if region.kind == "b":
             truth = self.type_of("b", lanes=True)
-            operand = self._found(f"zext {truth} {operand} to {of}", "b", lanes=True).name
-        self.lines.append(f"store {of} {operand}, ptr {place}, align {DTYPES[region.kind].itemsize}")
+            operand = self._emitted(f"zext {truth} {operand} to {of}", "b", lanes=True).name
+        self.lines.append(f"store {of} {operand}, ptr {position}, align {DTYPES[region.kind].itemsize}")
 
     def _address(self, region: Region, index: int | Value) -> str:
-        place = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
-        address = f"getelementptr {IN_MEMORY[region.kind]}, ptr {region.pointer}, i64 {place}"
-        return self._found(address, "l", lanes=False).name
+        position = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
+        address = f"getelementptr {IN_MEMORY[region.kind]}, ptr {region.pointer}, i64 {position}"
+        return self._emitted(address, "l", lanes=False).name
 
     def load(self, region: Region, index: int | Value) -> Value:
         """Return the number at a place of memory, which must be one of its own."""
         if isinstance(index, Value) and index.lanes:
             return self._gathered(region, index)
-        place = self._place(region, index)
+        position = self._place(region, index)
         hint = ", !invariant.load !0" if region.given else ""
         name, home = self.fresh(), (region, index) if isinstance(index, int) else None
         if region.kind == "b":
             byte, of = self.fresh(), f"<{self.width} x i8>" if region.lanes else "i8"
             self.lines += [
-                f"{byte} = load {place}{hint}",
+                f"{byte} = load {position}{hint}",
                 f"{name} = trunc {of} {byte} to {self.type_of('b', lanes=region.lanes)}",
             ]
         else:
-            self.lines.append(f"{name} = load {place}{hint}")
+            self.lines.append(f"{name} = load {position}{hint}")
         return Value(name, region.kind, region.lanes, home=home)
 
     def store(self, region: Region, index: int | Value, value: Value) -> None:
@@ -157,7 +157,7 @@ class Code(Scalars):
         operand = self.operand(value, lanes=region.lanes)
         if region.kind == "b":
             of = f"<{self.width} x i8>" if region.lanes else "i8"
-            operand = self._found(
+            operand = self._emitted(
                 f"zext {self.type_of('b', lanes=region.lanes)} {operand} to {of}", "b", lanes=True
             ).name
         of, rest = self._place(region, index).split(", ", 1)
@@ -165,12 +165,12 @@ class Code(Scalars):
 
     def _gathered(self, region: Region, index: Value) -> Value:
         """Return numbers at a place of memory that differs from lane to lane."""
-        places, of, kinds = self._places(region, index)
+        indices, of, kinds = self._addresses(region, index)
         name, every = self.fresh(), self.operand(self.constant(True), lanes=True)
         function = f"@llvm.masked.gather.{kinds}.v{self.width}p0"
         self.intrinsics.add(f"declare {of} {function}(<{self.width} x ptr>, i32, <{self.width} x i1>, {of})")
         align = DTYPES[region.kind].itemsize
-        given = f"<{self.width} x ptr> {places}, i32 {align}, <{self.width} x i1> {every}, {of} poison"
+        given = f"<{self.width} x ptr> {indices}, i32 {align}, <{self.width} x i1> {every}, {of} poison"
         self.lines.append(f"{name} = call {of} {function}({given})")
         if region.kind == "b":
             byte, name = name, self.fresh()
@@ -179,64 +179,64 @@ class Code(Scalars):
 
     def _scatter(self, region: Region, index: Value, value: Value) -> None:
         """Put numbers at a place of memory that differs from lane to lane: each lane has places of its own."""
-        places, of, kinds = self._places(region, index)
+        indices, of, kinds = self._addresses(region, index)
         operand, every = self.operand(value, lanes=True), self.operand(self.constant(True), lanes=True)
         if region.kind == "b":
             truth = self.type_of("b", lanes=True)
-            operand = self._found(f"zext {truth} {operand} to {of}", "b", lanes=True).name
+            operand = self._emitted(f"zext {truth} {operand} to {of}", "b", lanes=True).name
         function = f"@llvm.masked.scatter.{kinds}.v{self.width}p0"
         self.intrinsics.add(f"declare void {function}({of}, <{self.width} x ptr>, i32, <{self.width} x i1>)")
         align = DTYPES[region.kind].itemsize
-        given = f"{of} {operand}, <{self.width} x ptr> {places}, i32 {align}, <{self.width} x i1> {every}"
+        given = f"{of} {operand}, <{self.width} x ptr> {indices}, i32 {align}, <{self.width} x i1> {every}"
         self.lines.append(f"call void {function}({given})")
 
-    def _places(self, region: Region, index: Value) -> tuple[str, str, str]:
+    def _addresses(self, region: Region, index: Value) -> tuple[str, str, str]:
         """Return the addresses of numbers at places that differ from lane to lane, their type, and its short name."""
         one = IN_MEMORY[region.kind]
         if region.lanes:
-            apart = Value("%total", "l", False) if region.given else self.constant(self.width, "l")
+            read_first = Value("%total", "l", False) if region.given else self.constant(self.width, "l")
             counts = ", ".join(f"i64 {k}" for k in range(self.width))
             lane = Value(f"<{counts}>", "l", True)
-            index = self.arithmetic("add", self.arithmetic("mul", index, apart), lane)
+            index = self.arithmetic("add", self.arithmetic("mul", index, read_first), lane)
             if region.given:
                 index = self.arithmetic("add", index, Value("%lane", "l", False))
         vector = self.operand(index, lanes=True)
         address = f"getelementptr {one}, ptr {region.pointer}, <{self.width} x i64> {vector}"
         short = f"v{self.width}{'f64' if region.kind == 'f' else one}"
-        return self._found(address, "l", lanes=True).name, f"<{self.width} x {one}>", short
+        return self._emitted(address, "l", lanes=True).name, f"<{self.width} x {one}>", short
 
     def _place(self, region: Region, index: int | Value) -> str:
         """Return the type of a number in memory, its address, and of what this is a multiple."""
         one = IN_MEMORY[region.kind]
         of = f"<{self.width} x {one}>" if region.lanes else one
-        place = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
+        position = str(index) if isinstance(index, int) else self.operand(index, lanes=False)
         if region.given and region.lanes:
-            first = self._found(f"mul i64 {place}, %total", "l", lanes=False).name
-            place = self._found(f"add i64 {first}, %lane", "l", lanes=False).name
-        address = f"getelementptr {one if region.given else of}, ptr {region.pointer}, i64 {place}"
-        name = self._found(address, "l", lanes=False).name
+            first = self._emitted(f"mul i64 {position}, %total", "l", lanes=False).name
+            position = self._emitted(f"add i64 {first}, %lane", "l", lanes=False).name
+        address = f"getelementptr {one if region.given else of}, ptr {region.pointer}, i64 {position}"
+        name = self._emitted(address, "l", lanes=False).name
         return f"{of}, ptr {name}, align {DTYPES[region.kind].itemsize}"
 
     # -- attempts -----------------------------------------------------------------------------------------------------
 
     def mark(self) -> tuple[Any, ...]:
         """Return how far the text has come, for `back_to`."""
-        rooms = {key: list(regions) for key, regions in self._rooms.items()}
+        free_regions = {key: list(regions) for key, regions in self._rooms.items()}
         return (
             len(self.lines),
             len(self.entry),
             len(self._known[-1]),
             self.memory,
             self.heap,
-            rooms,
+            free_regions,
             dict(self._taken),
             len(self.taken),
         )
 
     def back_to(self, mark: tuple[Any, ...]) -> None:
         """Take back what was written since a mark in the same scope."""
-        lines, entry, known, self.memory, self.heap, rooms, taken, count = mark
-        self._rooms, self._taken = {key: list(regions) for key, regions in rooms.items()}, dict(taken)
+        lines, entry, known, self.memory, self.heap, free_regions, taken, count = mark
+        self._rooms, self._taken = {key: list(regions) for key, regions in free_regions.items()}, dict(taken)
         del self.lines[lines:], self.entry[entry:], self.taken[count:]
         while len(self._known[-1]) > known:
             self._known[-1].popitem()

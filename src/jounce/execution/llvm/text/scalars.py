@@ -99,16 +99,16 @@ class Scalars:
         if not lanes or value.lanes:
             return value.name
         vector, one = self.type_of(value.kind, lanes=True), SCALARS[value.kind]
-        first = self._found(f"insertelement {vector} poison, {one} {value.name}, i64 0", value.kind, lanes=True).name
-        places = f"<{self.width} x i32> zeroinitializer"
-        return self._found(f"shufflevector {vector} {first}, {vector} poison, {places}", value.kind, lanes=True).name
+        first = self._emitted(f"insertelement {vector} poison, {one} {value.name}, i64 0", value.kind, lanes=True).name
+        indices = f"<{self.width} x i32> zeroinitializer"
+        return self._emitted(f"shufflevector {vector} {first}, {vector} poison, {indices}", value.kind, lanes=True).name
 
     def _repeated(self, kind: str, text: str) -> str:
         if (vector := self._vectors.get((kind, text))) is None:
             vector = self._vectors[kind, text] = f"<{', '.join([f'{SCALARS[kind]} {text}'] * self.width)}>"
         return vector
 
-    def _found(self, instruction: str, kind: str, *, lanes: bool) -> Value:
+    def _emitted(self, instruction: str, kind: str, *, lanes: bool) -> Value:
         """Return what an instruction without effects gives, written only if it has not been before."""
         for known in reversed(self._known):
             if (value := known.get(instruction)) is not None:
@@ -123,10 +123,10 @@ class Scalars:
     def _called(self, name: str, result: str, kinds: str, given: Sequence[str], *, lanes: bool) -> Value:
         """Return what a function of LLVM gives, whose name ends in the types of `kinds`."""
         sizes = "".join(f".{f'v{self.width}' if lanes else ''}{'f64' if k == 'f' else SCALARS[k]}" for k in kinds)
-        of, found = self.type_of(kinds[-1], lanes=lanes), self.type_of(result, lanes=lanes)
-        self.intrinsics.add(f"declare {found} @llvm.{name}{sizes}({', '.join([of] * len(given))})")
+        of, written = self.type_of(kinds[-1], lanes=lanes), self.type_of(result, lanes=lanes)
+        self.intrinsics.add(f"declare {written} @llvm.{name}{sizes}({', '.join([of] * len(given))})")
         listed = ", ".join(f"{of} {operand}" for operand in given)
-        return self._found(f"call {found} @llvm.{name}{sizes}({listed})", result, lanes=lanes)
+        return self._emitted(f"call {written} @llvm.{name}{sizes}({listed})", result, lanes=lanes)
 
     @contextmanager
     def scope(self, here: Value | None = None) -> Iterator[None]:
@@ -182,18 +182,18 @@ class Scalars:
         left, right = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes)
         if word in ("maximum", "minimum", "smax", "smin"):
             return self._called(word, a.kind, a.kind, (left, right), lanes=lanes)
-        return self._found(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", a.kind, lanes=lanes)
+        return self._emitted(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", a.kind, lanes=lanes)
 
     def _division(self, operation: str, word: str, a: Value, b: Value) -> Value:
         """Return a quotient or remainder of whole numbers as XLA has it, by divisors that do not end the process."""
         one, least = self.constant(1, a.kind), self.constant(np.iinfo(DTYPES[a.kind]).min, a.kind)
         if b.constant is None:  # of a lane that has not come here, it may be what LLVM takes for another one each time
             frozen = f"freeze {self.type_of(b.kind, lanes=b.lanes)} {b.name}"
-            b = self._found(frozen, b.kind, lanes=b.lanes)
+            b = self._emitted(frozen, b.kind, lanes=b.lanes)
         beyond = self.logic("and", self.compare("eq", a, least), self.compare("eq", b, self.constant(-1, a.kind)))
         nothing = self.compare("eq", b, self.constant(0, a.kind))
-        found = self._pair(word, a, self.select(self.logic("or", nothing, beyond), one, b))
-        return self.select(nothing, self.constant(-1, a.kind) if operation == "div" else a, found)
+        result = self._pair(word, a, self.select(self.logic("or", nothing, beyond), one, b))
+        return self.select(nothing, self.constant(-1, a.kind) if operation == "div" else a, result)
 
     def compare(self, operation: str, a: Value, b: Value) -> Value:
         """Return whether a comparison of two numbers holds."""
@@ -203,7 +203,7 @@ class Scalars:
         word = {"f": f"fcmp {of_doubles}", "b": f"icmp {of_booleans}"}.get(a.kind, f"icmp {of_integers}")
         lanes = a.lanes or b.lanes
         left, right = self.operand(a, lanes=lanes), self.operand(b, lanes=lanes)
-        return self._found(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", "b", lanes=lanes)
+        return self._emitted(f"{word} {self.type_of(a.kind, lanes=lanes)} {left}, {right}", "b", lanes=lanes)
 
     def logic(self, operation: str, a: Value, b: Value) -> Value:
         """Return `and`, `or` or `xor` of two truth values, or of the digits of two whole numbers."""
@@ -224,7 +224,7 @@ class Scalars:
             return self.arithmetic("sub", self.constant(0, a.kind), a)
         if a.constant is not None:
             return self.constant(-a.constant)
-        return self._found(f"fneg {self.type_of('f', lanes=a.lanes)} {a.name}", "f", lanes=a.lanes)
+        return self._emitted(f"fneg {self.type_of('f', lanes=a.lanes)} {a.name}", "f", lanes=a.lanes)
 
     def inverted(self, a: Value) -> Value:
         """Return the opposite of a truth value, or of each digit of a whole number."""
@@ -245,7 +245,7 @@ class Scalars:
             self.operand(b, lanes=lanes),
             self.type_of(a.kind, lanes=lanes),
         )
-        return self._found(f"select {on} {which}, {kind} {left}, {kind} {right}", a.kind, lanes=lanes)
+        return self._emitted(f"select {on} {which}, {kind} {left}, {kind} {right}", a.kind, lanes=lanes)
 
     def intrinsic(self, operation: str, a: Value) -> Value:
         """Return a function of one double that LLVM knows to have an instruction for."""
@@ -258,7 +258,7 @@ class Scalars:
         self.functions.add((function, len(given)))
         called = f"@{function}_of_lanes" if lanes else f"@{function}"
         listed = ", ".join(f"{kind} {operand}" for operand in operands)
-        return self._found(f"call {kind} {called}({listed})", "f", lanes=lanes)
+        return self._emitted(f"call {kind} {called}({listed})", "f", lanes=lanes)
 
     def converted(self, a: Value, to: str) -> Value:
         """Return a number as one of another kind, the nearest whole number where a double is beyond all."""
@@ -271,8 +271,8 @@ class Scalars:
             return self.compare("ne", a, self.constant(0, a.kind))
         if a.kind == "f":  # `fptosi` gives poison where a number does not fit
             return self._called("fptosi.sat", to, to + "f", (a.name,), lanes=a.lanes)
-        kind, wanted = self.type_of(a.kind, lanes=a.lanes), self.type_of(to, lanes=a.lanes)
-        return self._found(f"{CONVERSIONS[a.kind + to]} {kind} {a.name} to {wanted}", to, lanes=a.lanes)
+        kind, expected = self.type_of(a.kind, lanes=a.lanes), self.type_of(to, lanes=a.lanes)
+        return self._emitted(f"{CONVERSIONS[a.kind + to]} {kind} {a.name} to {expected}", to, lanes=a.lanes)
 
     def anywhere(self, a: Value) -> str:
         """Return the name of a truth value that holds where one holds in some lane."""
@@ -280,7 +280,7 @@ class Scalars:
             return self.operand(a, lanes=False)
         of, called = self.type_of("b", lanes=True), f"@llvm.vector.reduce.or.v{self.width}i1"
         self.intrinsics.add(f"declare i1 {called}({of})")
-        return self._found(f"call i1 {called}({of} {a.name})", "b", lanes=False).name
+        return self._emitted(f"call i1 {called}({of} {a.name})", "b", lanes=False).name
 
     # -- order --------------------------------------------------------------------------------------------------------
 

@@ -28,7 +28,7 @@ from jounce.execution.llvm.text.views import (
 )
 
 
-def empty_state(code: Code, shape: Sequence[int], kind: str, *, lanes: bool) -> Stored:
+def new_storage(code: Code, shape: Sequence[int], kind: str, *, lanes: bool) -> Stored:
     """Return an array of which nothing is known yet."""
     return contiguous(code.taken_room(math.prod(shape), kind, lanes=lanes), shape)
 
@@ -57,10 +57,10 @@ def kind_in(array: Array) -> str:
     return array.kind if isinstance(array, InMemory) else flat(array)[0].kind
 
 
-def bytes_needed(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
+def result_storage(code: Code, equation: Any, given: Sequence[Array]) -> Stored:
     """Return room for the result of an operation."""
     aval = equation.outvars[0].aval
-    return empty_state(code, aval.shape, kind_of(aval.dtype), lanes=any_lanes(given))
+    return new_storage(code, aval.shape, kind_of(aval.dtype), lanes=any_lanes(given))
 
 
 # -- views ------------------------------------------------------------------------------------------------------------
@@ -77,8 +77,8 @@ def row(code: Code, array: Array, index: int | Value) -> Array:
 
 def reshaped(code: Code, array: Stored, shape: Sequence[int]) -> Stored:
     """Return the same numbers in another shape, copied where no strides tell it."""
-    found = in_shape(array, shape)
-    return contiguous(copied(code, array).region, shape) if found is None else found
+    result = in_shape(array, shape)
+    return contiguous(copied(code, array).region, shape) if result is None else result
 
 
 # -- numbers and memory -----------------------------------------------------------------------------------------------
@@ -91,11 +91,11 @@ def values_of(code: Code, array: Array) -> Values:
         return filled(array.shape, [array.body(numbers) for numbers in zip(*parts, strict=True)])
     if not isinstance(array, Stored):
         return array
-    places = [
+    indices = [
         further(code, array.first, int(np.dot(index, array.strides)), 1) if array.ndim else array.first
         for index in np.ndindex(*array.shape)
     ]
-    return filled(array.shape, [without_home(code.load(array.region, place)) for place in places])
+    return filled(array.shape, [without_home(code.load(array.region, position)) for position in indices])
 
 
 def without_home(value: Value) -> Value:
@@ -133,9 +133,9 @@ def settled(code: Code, array: Array) -> Array:
 
 def copied(code: Code, array: Array) -> Stored:
     """Return an array with a place of its own, its numbers one after another."""
-    found = empty_state(code, array.shape, kind_in(array), lanes=any_lanes([array]))
-    put(code, found, array)
-    return found
+    result = new_storage(code, array.shape, kind_in(array), lanes=any_lanes([array]))
+    put(code, result, array)
+    return result
 
 
 def put(code: Code, target: Stored, array: Array) -> None:
@@ -150,8 +150,8 @@ def put(code: Code, target: Stored, array: Array) -> None:
         nest(code, read.given, [target], lambda values: [read.body(values)], adds=in_place)
         return
     for index, value in zip(np.ndindex(*target.shape), flat(array), strict=True):
-        place = further(code, target.first, int(np.dot(index, target.strides)), 1) if target.ndim else target.first
-        code.store(target.region, place, value)
+        position = further(code, target.first, int(np.dot(index, target.strides)), 1) if target.ndim else target.first
+        code.store(target.region, position, value)
 
 
 def fill(code: Code, target: Stored, number: Value) -> None:
@@ -189,40 +189,40 @@ def counted(code: Code, count: int, body: Callable[[int | Value], None]) -> None
     code.begin(end)
 
 
-def nest(code: Code, given: Sequence[Stored], found: Sequence[Stored], body: Body, *, adds: bool = False) -> None:
+def nest(code: Code, given: Sequence[Stored], result: Sequence[Stored], body: Body, *, adds: bool = False) -> None:
     """Write loops over arrays of one shape.
 
     Parameters
     ----------
     code : Code
-    given, found : sequence of Stored
+    given, result : sequence of Stored
         What is read and written.
     body : callable
         Maps numbers of the arrays read to those written.
     adds : bool, default False
         Whether what is written depends on what was there, so that no place may be visited twice.
     """
-    arrays = [*given, *found]
+    arrays = [*given, *result]
     shape, strides = merged(arrays[0].shape, [array.strides for array in arrays])
     if 0 in shape:
         return
 
-    def run(axes: Sequence[int], places: Sequence[int | Value]) -> None:
+    def run(axes: Sequence[int], indices: Sequence[int | Value]) -> None:
         if not axes:
-            _visit(code, given, found, body, places)
+            _visit(code, given, result, body, indices)
             return
         axis, *rest = axes
         size, steps = shape[axis], [s[axis] for s in strides]
 
         def moved(k: int | Value) -> list[int | Value]:
-            return [further(code, place, k, step) for place, step in zip(places, steps, strict=True)]
+            return [further(code, index, k, step) for index, step in zip(indices, steps, strict=True)]
 
-        if rest or not code.alone or size < code.width or not _is_along(steps, len(given)):
+        if rest or not code.single or size < code.width or not _is_along(steps, len(given)):
             counted(code, size, lambda k: run(rest, moved(k)))
             return
         along = [step == 1 for step in steps]
-        single = (lambda k: _visit(code, given, found, body, moved(k))) if adds else None
-        _in_vectors(code, size, lambda k: _visit(code, given, found, body, moved(k), along), single)
+        single = (lambda k: _visit(code, given, result, body, moved(k))) if adds else None
+        _in_vectors(code, size, lambda k: _visit(code, given, result, body, moved(k), along), single)
 
     run(_order(shape, strides, len(given)), [array.first for array in arrays])
 
@@ -230,20 +230,20 @@ def nest(code: Code, given: Sequence[Stored], found: Sequence[Stored], body: Bod
 def _visit(
     code: Code,
     given: Sequence[Stored],
-    found: Sequence[Stored],
+    result: Sequence[Stored],
     body: Body,
-    places: Sequence[int | Value],
+    indices: Sequence[int | Value],
     along: Sequence[bool] | None = None,
 ) -> None:
     """Write what is done at one place of each array, or for a vector of numbers from there on of some."""
-    along = [False] * len(places) if along is None else along
+    along = [False] * len(indices) if along is None else along
     read = [
-        code.load_along(array.region, place) if vector else without_home(code.load(array.region, place))
-        for array, place, vector in zip(given, places, along, strict=False)
+        code.load_along(array.region, index) if vector else without_home(code.load(array.region, index))
+        for array, index, vector in zip(given, indices, along, strict=False)
     ]
     first = len(given)
-    for array, place, vector, value in zip(found, places[first:], along[first:], body(read), strict=True):
-        (code.store_along if vector else code.store)(array.region, place, value)
+    for array, index, vector, value in zip(result, indices[first:], along[first:], body(read), strict=True):
+        (code.store_along if vector else code.store)(array.region, index, value)
 
 
 def _in_vectors(code: Code, size: int, vector: Visit, single: Visit | None) -> None:

@@ -112,9 +112,9 @@ class Deferred:
 
     def in_shape(self, shape: Sequence[int]) -> "Deferred | None":
         """Return the same numbers in another shape, None where no strides tell it of some array."""
-        found = [in_shape(array, shape) for array in self.given]
-        whole = tuple(array for array in found if array is not None)
-        return replace(self, given=whole) if len(whole) == len(found) else None
+        result = [in_shape(array, shape) for array in self.given]
+        whole = tuple(array for array in result if array is not None)
+        return replace(self, given=whole) if len(whole) == len(result) else None
 
 
 def as_read(array: Stored) -> Deferred:
@@ -190,18 +190,18 @@ def merged(shape: Sequence[int], strides: Sequence[Sequence[int]]) -> tuple[list
 
 def divided(sizes: Sequence[int], strides: Sequence[Sequence[int]], shape: Sequence[int]) -> tuple[int, ...] | None:
     """Return the strides of axes of other lengths, None where there are none: of axes as `merged` returns them."""
-    found, waiting, left, stride = [], list(zip(sizes, strides[0], strict=True)), 1, 0
+    result, waiting, left, stride = [], list(zip(sizes, strides[0], strict=True)), 1, 0
     for size in reversed(shape):
         if size == 1:
-            found.append(0)
+            result.append(0)
             continue
         if left == 1:
             left, stride = waiting.pop()
         if left % size:
             return None
-        found.append(stride)
+        result.append(stride)
         left, stride = left // size, stride * size
-    return tuple(reversed(found))
+    return tuple(reversed(result))
 
 
 def in_shape(array: Stored, shape: Sequence[int]) -> Stored | None:

@@ -278,5 +278,5 @@ def _following(mechanism: Mechanism, laws: Mapping[str, AbstractMotion], progres
         for name, driver in mechanism.drivers.items()
     }
     for driver in drivers.values():
-        settle(driver)  # their units were told where the mechanism was solved
+        settle(driver)  # solving the mechanism warned of their units
     return dataclasses.replace(mechanism, drivers=drivers)

@@ -77,7 +77,7 @@ def check_motion(
 def _ends(
     source: RobotQuantities, trajectory: JointTrajectory, ends: tuple[TrajectoryEnd, ...], *, drives: bool
 ) -> tuple[TrajectoryEnd, ...]:
-    """Return what is met at both ends, with the limits that are told here among those that are broken."""
+    """Return what is met at both ends, with the limits of this check among those that are broken."""
     robot, limits, points = source.robot, source.limits, source.limits.points
     followed = FollowedTrajectory(robot, trajectory, given=False)
     jumps = end_jumps(followed, followed.coordinates(np.linspace(trajectory.start, trajectory.stop, 2001), 4))
