@@ -29,7 +29,7 @@ class Activity:
 
 
 class Count:
-    """A count that goes on while something is computed; of nested ones, the outermost is told to who asks.
+    """A count that goes on while something is computed; of nested ones, the outermost is reported to whoever asks.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Count:
         What is done, such as ``solving``.
     unit : str, optional
         What is counted, where counts and a rate are of interest.
-    told : callable, optional
+    report : callable, optional
         Is called with each count too, as `progress` of `jounce.solve`.
 
     Examples
@@ -50,9 +50,9 @@ class Count:
     True
     """
 
-    def __init__(self, words: str, unit: str = "", told: Callable[..., object] | None = None):
+    def __init__(self, words: str, unit: str = "", report: Callable[..., object] | None = None):
         self.activity = Activity(words, unit=unit)
-        self._told = told
+        self._report = report
 
     def __enter__(self) -> Count:
         global _count
@@ -68,8 +68,8 @@ class Count:
     def __call__(self, done: int, total: int, *more: Any) -> None:
         """Say how much is done."""
         self.activity = Activity(self.activity.words, done, total, self.activity.unit)
-        if self._told is not None:
-            self._told(done, total, *more)
+        if self._report is not None:
+            self._report(done, total, *more)
 
 
 @contextmanager

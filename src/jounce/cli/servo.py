@@ -99,7 +99,7 @@ def frequency_of(text: str) -> float:
     return positive_quantity("--rate", text, (PER_TIME,), "a frequency, such as 1kHz")
 
 
-def _at_rate(mechanism: Mechanism, frequency: float, order: int, bar: Bar) -> Motion:
+def _at_rate(mechanism: Mechanism, frequency: float, order: int, count: Count) -> Motion:
     """Solve a mechanism at every period of the drive, from the first instant of its file to the last."""
     from jounce.kinematics import solve
     from jounce.mechanism import TimeGrid
@@ -108,7 +108,7 @@ def _at_rate(mechanism: Mechanism, frequency: float, order: int, bar: Bar) -> Mo
     known = instants_of(mechanism.time, mechanism.parameter_values)
     first, last = float(known[0]), float(known[-1])
     grid = TimeGrid(first, last, 1 / frequency)
-    return solve(mechanism, grid, order, strict=False, progress=bar, keep=True)
+    return solve(mechanism, grid, order, strict=False, progress=count, keep=True)
 
 
 def _values_at_breaks(mechanism: Mechanism, motion: Motion, names: list[str]) -> Any:

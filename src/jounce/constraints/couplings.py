@@ -78,11 +78,11 @@ class Oldham(AbstractConstraint, type="oldham", space="spatial"):
     symbol = "universal"
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
-        apart = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
+        offset = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
         first, _ = _frame_of(self.axis_i, self.vector_i)
         second, _ = _frame_of(self.axis_j, self.vector_j)
         turned = body_i.direction(first).dot(body_j.direction(second))
-        return rows(apart, *parallel_rows(body_i, body_j, self.axis_i, self.axis_j), turned)
+        return rows(offset, *parallel_rows(body_i, body_j, self.axis_i, self.axis_j), turned)
 
 
 def _frame_of(axis: Vectors, normal: Vectors) -> tuple[Any, Any]:

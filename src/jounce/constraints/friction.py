@@ -95,10 +95,10 @@ def _tanh(x: Jet) -> Jet:
 
 def _terms() -> list[float]:
     """Return the coefficients of ``tanh(x) / x`` by powers of the square of x, as ``tanh' = 1 - tanh^2`` has them."""
-    found = [1.0]
+    coefficients = [1.0]
     for k in range(1, TERMS):
-        found.append(-sum(map(operator.mul, found, found[::-1])) / (2 * k + 1))
-    return found
+        coefficients.append(-sum(map(operator.mul, coefficients, coefficients[::-1])) / (2 * k + 1))
+    return coefficients
 
 
 def _where(condition: Any, jet: Jet, other: Any) -> Jet:
@@ -136,16 +136,16 @@ def velocities(bodies: Sequence[Pose]) -> Velocities:
 
 def displacements(bodies: Sequence[Pose], changes: Sequence[Any]) -> Velocities:
     """Return by how much bodies are displaced and turned by changes that `varied` gave; None is no change."""
-    found = []
+    velocities = []
     for body, change in zip(bodies, changes, strict=True):
         if change is None:
             still = Jet.constant(jnp.zeros_like(body.position.coefficients[0]), body.order)
-            found.append((still, still[0] if isinstance(body, PlanarPose) else still))
+            velocities.append((still, still[0] if isinstance(body, PlanarPose) else still))
         elif isinstance(body, PlanarPose):
-            found.append((change.position, change.angle))
+            velocities.append((change.position, change.angle))
         else:
-            found.append((change.position, body.direction(body.turning(change))))
-    return found
+            velocities.append((change.position, body.direction(body.turning(change))))
+    return velocities
 
 
 def slip_velocity(joint: Any, bodies: Sequence[Pose]) -> Float[Jet, "direction *batch"]:

@@ -36,7 +36,7 @@ def slide(body_i: Pose, body_j: Pose, point_i: Vectors, point_j: Vectors, vector
     return body_i.direction(vector_i).dot(d) / length_of(vector_i)
 
 
-def sliding(bodies: tuple[Any, ...], moving: Velocities, point_j: Vectors, vector_i: Vectors) -> Jet:
+def _sliding(bodies: tuple[Any, ...], moving: Velocities, point_j: Vectors, vector_i: Vectors) -> Jet:
     """Return the velocity, in m/s, of a point of body j relative to body i, along a direction fixed in that."""
     velocity = relative_velocity(bodies, moving, point_j)
     return bodies[0].direction(vector_i).dot(velocity) / length_of(vector_i)
@@ -116,7 +116,7 @@ class Parallel2(AbstractConstraint, type="parallel2", space="planar"):
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
         """Return how fast the point slides along the slot, m/s; that the pin turns in it does not count."""
-        return rows(sliding(bodies, moving, self.point_j, self.vector_i))
+        return rows(_sliding(bodies, moving, self.point_j, self.vector_i))
 
 
 class Prismatic(AbstractConstraint, type="prismatic", space="planar"):
@@ -142,7 +142,7 @@ class Prismatic(AbstractConstraint, type="prismatic", space="planar"):
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
         """Return how fast body j slides in its guide, m/s."""
-        return rows(sliding(bodies, moving, self.point_j, self.vector_i))
+        return rows(_sliding(bodies, moving, self.point_j, self.vector_i))
 
 
 class Fixed(AbstractConstraint, type="fixed", space="planar"):

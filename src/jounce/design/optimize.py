@@ -124,7 +124,7 @@ def optimize(
     asked = Asked(minimize, tuple(subject_to), bounds, targets, instants)
     best, first_error = None, None
     chosen = _assemblies(mechanism, assemblies)
-    with Count("optimizing", told=progress) as tell:
+    with Count("optimizing", report=progress) as tell:
         for number, variant in chosen:
             study = Study(variant, asked, clearance, iterations, seed, tell)
             try:

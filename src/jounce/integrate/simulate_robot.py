@@ -77,7 +77,7 @@ def simulate_robot(
         raise RobotError("robots are simulated by jn.Taylor", name="method", value=type(method).__name__)
     terms = (method or Taylor()).expansion_order(tolerance)
     run = _Run(problem, tolerance, longest_step, terms - 1, detectors)
-    with Count("simulating", told=progress) as tell:
+    with Count("simulating", report=progress) as tell:
         run.go(start, instants, tell)
     pushed = tuple(wrenches)
     outcome = run.ending, run.events.happened, pushed, run.backends

@@ -76,17 +76,17 @@ def draw_columns(motion: Motion, columns: Mapping[str, Column]) -> Figure:
     """Draw outputs of a motion, each as a column of its derivatives, in as many columns as leave few places empty."""
     rows = {name: motion.order + 1 - output.lost_orders for name, (output, _) in columns.items()}
     heights = {name: max(count, 1) for name, count in rows.items()}
-    places = stacked(heights)
-    wide = 1 + max(column for column, _ in places.values())
-    tall = max(places[name][1] + heights[name] for name in columns)
+    columns_and_rows = stacked(heights)
+    wide = 1 + max(column for column, _ in columns_and_rows.values())
+    tall = max(columns_and_rows[name][1] + heights[name] for name in columns)
     with style():
         width, height = PANEL if len(columns) > 1 else SINGLE_PANEL
-        levels = len({row for _, row in places.values()})
+        levels = len({row for _, row in columns_and_rows.values()})
         figure = blank_figure(width * wide + 0.3, height * tall + 0.9 + 0.45 * (levels - 1), motion.mechanism.title)
         grid = figure.subplots(tall, wide, sharex=True, squeeze=False)
         for axes in grid.flat:
             axes.set_axis_off()
-        for name, (column, row) in places.items():
+        for name, (column, row) in columns_and_rows.items():
             panels = grid[row : row + heights[name], column]
             for axes in panels:
                 axes.set_axis_on()
@@ -105,16 +105,16 @@ def stacked(heights: Mapping[str, int]) -> dict[str, tuple[int, int]]:
     >>> stacked({"psi": 4, "force": 2, "yank": 2})
     {'psi': (0, 0), 'force': (1, 0), 'yank': (1, 2)}
     """
-    ordered, total, found = sorted(heights, key=lambda name: -heights[name]), sum(heights.values()), []
+    ordered, total, arrangements = sorted(heights, key=lambda name: -heights[name]), sum(heights.values()), []
     for count in range(1, min(COLUMNS, len(heights)) + 1):
-        filled, places = [0] * count, {}
+        filled, arrangement = [0] * count, {}
         for name in ordered:
             column = filled.index(min(filled))
-            places[name] = (column, filled[column])
+            arrangement[name] = (column, filled[column])
             filled[column] += heights[name]
         empty = (count * max(filled) - total) / total
-        found.append((empty + COST_OF_ROW * max(filled), places))
-    return min(found, key=lambda each: each[0])[1]
+        arrangements.append((empty + COST_OF_ROW * max(filled), arrangement))
+    return min(arrangements, key=lambda each: each[0])[1]
 
 
 def _draw_column(motion: Motion, name: str, column: Column, panels: Any) -> None:

@@ -133,14 +133,14 @@ def _offsets(
 def _drawn(
     scene: Scene, instant: int, to_pixels: Callable[[np.ndarray], np.ndarray]
 ) -> tuple[Points, Float[np.ndarray, " points"]]:
-    """Return places along all lines that are drawn, pixels, and what covering each one costs."""
+    """Return covered along all lines that are drawn, pixels, and what covering each one costs."""
     points, costs = [np.zeros((0, 2))], [np.zeros(0)]
     for shape in scene.shapes:
         corners = outline(shape, instant)
         if shape.layer > WHEELS and len(corners) and np.isfinite(corners).all():
-            places = _along(to_pixels(corners))
-            points.append(places)
-            costs.append(np.full(len(places), COST_OF_SYMBOL if shape.layer >= SYMBOLS else COST_OF_BAR))
+            covered = _along(to_pixels(corners))
+            points.append(covered)
+            costs.append(np.full(len(covered), COST_OF_SYMBOL if shape.layer >= SYMBOLS else COST_OF_BAR))
     return np.concatenate(points), np.concatenate(costs)
 
 
@@ -170,8 +170,8 @@ def _costs(
 
 def _strange(low: np.ndarray, high: np.ndarray, own: Pixels, anchors: Points) -> Bool[np.ndarray, " places"]:
     """Tell which boxes are nearer to another anchor than to their own, so that a name could be read as another's."""
-    apart = anchors[np.linalg.norm(anchors - own, axis=1) > 2.0]  # a joint and its body may have one anchor
-    return (_gap(low, high, apart) <= _gap(low, high, own[None]) + 1.0).any(axis=1)
+    strangers = anchors[np.linalg.norm(anchors - own, axis=1) > 2.0]  # a joint and its body may have one anchor
+    return np.any(_gap(low, high, strangers) <= _gap(low, high, own[None]) + 1.0, axis=1)
 
 
 def _gap(low: np.ndarray, high: np.ndarray, points: Points) -> Float[np.ndarray, "places points"]:

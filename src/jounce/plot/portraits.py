@@ -122,7 +122,7 @@ def phase_portrait(motion: Motion, output: str, orders: tuple[int, int] = (0, 1)
     unit, _ = motion.mechanism.shown_units.of(its_output.unit, output)
     with style():
         figure = blank_figure(SIDE * count + 0.5 * (count == 1), SIDE, _title(motion, output, pair))
-        for k, axes in enumerate(np.atleast_1d(figure.subplots(1, count))):
+        for k, axes in enumerate(figure.subplots(1, count, squeeze=False)[0]):
             component, scaled, dense = its_output.labels[k] if count > 1 else "", [], []
             named = ((axes.set_xlabel, axes.set_xlim), (axes.set_ylabel, axes.set_ylim))
             for (label, limits), order, values, curve in zip(named, pair, (first, second), curves, strict=True):
@@ -177,8 +177,8 @@ def _curve(time: Line, jets: Float[np.ndarray, "time levels"], order: int) -> Li
     )
     straight = values[:-1, None] + share * np.diff(values)[:, None]
     slack = LEAVING * np.ptp(known)
-    kept = ((smooth >= known.min() - slack) & (smooth <= known.max() + slack)).all(axis=1, keepdims=True)
-    return np.append(np.where(kept, smooth, straight), values[-1])
+    stays_near = ((smooth >= known.min() - slack) & (smooth <= known.max() + slack)).all(axis=1, keepdims=True)
+    return np.append(np.where(stays_near, smooth, straight), values[-1])
 
 
 def _title(motion: Motion, output: str, orders: tuple[int, ...]) -> str:

@@ -249,7 +249,7 @@ def _scene(
     step = max(limits[1] - limits[0], limits[3] - limits[2]) / STEPS
     bar = bar_length(max(right - left, upper - lower))
     labels = [label for label in scene.labels if label.owner != f"bodies.{GROUND}"]
-    places = [_name_places(labels, scene, limits, width) for width in WIDTHS]
+    placements = [_name_places(labels, scene, limits, width) for width in WIDTHS]
 
     def pixels(points: np.ndarray) -> list[int | None]:
         return [round(v) if math.isfinite(v) else None for v in (points / step).reshape(-1).tolist()]
@@ -275,7 +275,7 @@ def _scene(
                 "kind": label.owner.partition(".")[0],
                 "color": label.color,
                 "points": moved(label.anchor[:, None]),
-                "places": [chosen[number] for chosen in places],
+                "places": [chosen[number] for chosen in placements],
             }
             for number, label in enumerate(labels)
         ],
@@ -301,7 +301,7 @@ def _name_places(
     halves = [np.array([LETTER * len(label.text) / 2 + 2.0, LINE / 2]) for label in labels]
     corner = np.array([[0.0, 0.0, 0.25 * width, 24.0]])  # the scale
     frame = np.array([0.0, 0.0, width, height])
-    found = place_names(labels, halves, scene, to_pixels, frame, corner)
+    names = place_names(labels, halves, scene, to_pixels, frame, corner)
     return [
-        place and [*(round(number, 4) for number in (*place.direction, place.distance)), place.led] for place in found
+        place and [*(round(number, 4) for number in (*place.direction, place.distance)), place.led] for place in names
     ]

@@ -186,8 +186,8 @@ class SketchFigure:
         to_pixels = axes.transData
         unit = float(np.diff(to_pixels.transform([[0.0, 0.0], [self.scene.unit, 0.0]]), axis=0)[0, 0])
         frame = _box(axes, renderer)
-        places = place_names(selected, halves, self.scene, to_pixels.transform, frame, boxes)
-        for label, text, half, place in zip(selected, texts, halves, places, strict=True):
+        placements = place_names(selected, halves, self.scene, to_pixels.transform, frame, boxes)
+        for label, text, half, place in zip(selected, texts, halves, placements, strict=True):
             if place is None:
                 text.remove()
                 continue

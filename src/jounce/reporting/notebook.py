@@ -217,7 +217,7 @@ def _trajectory(trajectory: JointTrajectory) -> list[str]:
     return [*_title("Joint trajectory", line), *_tables([Table("Ranges", headings, rows)])]
 
 
-def _assemblies(found: Assemblies) -> list[str]:
+def _assemblies(assemblies: Assemblies) -> list[str]:
     headings = ("assembly", "circuit", "branch", "found from", "distance", "least singular value")
     rows = [
         [
@@ -227,9 +227,9 @@ def _assemblies(found: Assemblies) -> list[str]:
             number(each.distance),
             number(each.smallest_singular_value),
         ]
-        for each in found
+        for each in assemblies
     ]
-    return [*_title(repr(found).strip("<>")), *_tables([Table("", headings, rows, range(4, 6))])]
+    return [*_title(repr(assemblies).strip("<>")), *_tables([Table("", headings, rows, range(4, 6))])]
 
 
 def _tool_path_motion(moved: ToolPathMotion) -> list[str]:

@@ -106,7 +106,7 @@ class _TerminalLine:
             TextColumn("{task.fields[counts]}"),
             TimeElapsedColumn(),
         )
-        quiet = {"auto_refresh": False, "transient": True, "redirect_stdout": False, "redirect_stderr": False}
+        quiet: Any = {"auto_refresh": False, "transient": True, "redirect_stdout": False, "redirect_stderr": False}
         self._bar = Progress(*columns, console=Console(stderr=True), **quiet)
         self._shown = ExitStack()
         self._shown.enter_context(undoing(lambda: os.write(2, SHOW_CURSOR)))

@@ -87,7 +87,7 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
         sum(labeled_terms[name] for name in names)
         for names in (("drivers", "forces", "friction"), ("kinetic", "potential"))
     )
-    residual = put_in - gained
+    residual: Any = put_in - gained
     labeled_terms["residual"] = residual.assign_attrs(units="W")
     labeled_terms["scale"] = labeled(motion, (size + sizes.sum(axis=1))[: motion.order + 1], "W")
     return xarray.Dataset(labeled_terms)

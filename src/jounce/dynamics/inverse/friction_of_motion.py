@@ -92,14 +92,14 @@ def with_friction(
     resisted = [_felt(its.friction, its.group) for its in rubbing]
     joints = [its.group.instances for its in rubbing]
 
-    def on_bodies(level: Callable[[Any], Any], parts: Sequence[Any], forces: Any) -> Any:
+    def on_bodies(level: Callable[[Slope, Any], Any], parts: Sequence[Any], forces: Any) -> Any:
         """Return what forces of all rows do to bodies, by what a level of slopes makes of them."""
         done, first = 0.0, 0
         for by_slot in parts:
+            _, _, count, instances, lanes = by_slot[0][0].shape
+            its = forces[..., first : first + count * instances, :]
+            its = its.reshape(*its.shape[:-2], count, instances, lanes)
             for slope, bodies in by_slot:
-                _, _, count, instances, lanes = slope.shape
-                its = forces[..., first : first + count * instances, :]
-                its = its.reshape(*its.shape[:-2], count, instances, lanes)
                 done = done + onto_bodies(level(slope, its), bodies, system.body_count)
             first += count * instances
         return done
@@ -117,19 +117,19 @@ def with_friction(
         return jnp.concatenate([multipliers, forces])[None]
     below = np.arange(1, levels)
 
-    def level(found: Any, order_and_load: Any) -> tuple[Any, None]:
+    def level(coefficients: Any, order_and_load: Any) -> tuple[Any, None]:
         k, missing = order_and_load
-        earlier = found[(k - below) % levels]  # those not found yet are zero, also where the index runs round
+        earlier = coefficients[(k - below) % levels]  # those not computed yet are zero, also where the index runs round
 
         def lower(slope: Slope, forces: Any) -> Any:
             needed = jnp.where((below <= k).reshape(-1, 1, 1, 1, 1), slope[1:], 0.0)  # others may not be finite
             return jnp.sum(needed * forces[:, None], axis=(0, 2))
 
         missing = missing - on_bodies(lower, felt, earlier[:, :rows]) - on_bodies(lower, resisted, earlier[:, rows:])
-        trial = found.at[k, :rows].set(solve(missing))
+        trial = coefficients.at[k, :rows].set(solve(missing))
         pressing = jnp.concatenate([its.normal_forces(list(trial[:, :rows])) for its in rubbing], axis=1)
         newest = coupling.solved(trial[k, :rows], pressing[k])
-        return found.at[k].set(jnp.concatenate(newest)), None
+        return coefficients.at[k].set(jnp.concatenate(newest)), None
 
     start = jnp.zeros((levels, rows + sum(joints), load.shape[-1])).at[0].set(jnp.concatenate([multipliers, forces]))
     return jax.lax.scan(level, start, (np.arange(1, levels), load[1:]))[0]

@@ -4,7 +4,7 @@ import dataclasses
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import jax
 import numpy as np
@@ -46,7 +46,15 @@ LANES = 64  # runs marched together: more fall out of the cache
 STEPS = 16  # tried before runs that have ended make room for others
 
 
-@dataclasses.dataclass(frozen=True)
+class JointCoordinate(NamedTuple):
+    """The coordinate of a robot joint, as a column of results."""
+
+    unit: str
+    labels: tuple[str, ...] = ()
+    axes: tuple[tuple[str, tuple[str, ...]], ...] = ()
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Batch(Displayed):
     """The results of many simulations.
 
@@ -64,7 +72,7 @@ class Batch(Displayed):
         See `Status`.
     steps : numpy.ndarray of int, shape (runs,)
         Steps taken.
-    mechanism : Mechanism
+    mechanism : Mechanism or Robot
         As it was given.
     order : int
         Highest derivative of the outputs.
@@ -75,7 +83,7 @@ class Batch(Displayed):
     outputs: dict[str, Float[np.ndarray, "run time derivative *component"]]
     status: Int[np.ndarray, "run time"]
     steps: Int[np.ndarray, " run"]
-    mechanism: Mechanism
+    mechanism: Mechanism | Robot
     order: int
 
     @property
@@ -85,8 +93,14 @@ class Batch(Displayed):
         Variables are the outputs, with their units, the ``status``, and the ``steps`` of each run; parameters are
         coordinates.
         """
+        if isinstance(self.mechanism, Robot):
+            joints = self.mechanism.joints
+            title = self.mechanism.name
+            described = {name: JointCoordinate("rad" if joints[name].turning else "m") for name in self.outputs}
+        else:
+            title, described = self.mechanism.title, self.mechanism.outputs
         return labeled_family(
-            "run", self.mechanism, self.time, self.order, self.parameters, self.outputs, self.status
+            "run", title, described, self.time, self.order, self.parameters, self.outputs, self.status
         ).assign(steps=("run", self.steps, {"long_name": "steps taken"}))
 
     def __repr__(self) -> str:
@@ -153,9 +167,8 @@ def simulate_batch(
         order, method = checked_options(order, method, tolerance, longest_step)
         options: dict[str, Any] = {"method": method, "tolerance": float(tolerance), **robot}
         instants = instants_of(time, {})
-        return _of_robot(
-            *simulate_robots(mechanism, parameters, instants, order, longest_step=float(longest_step), **options)
-        )
+        options["longest_step"] = float(longest_step)
+        return _of_robot(mechanism, *simulate_robots(mechanism, parameters, instants, order, **options))
     for name in robot:
         message = "belongs to simulations of robots in joint coordinates; a mechanism has forces and `initial`"
         raise MechanismError(message, name=name)
@@ -195,12 +208,13 @@ def simulate_batch(
     return Batch(instants, values, runs.outputs, status, runs.steps, mechanism, order)
 
 
-def _of_robot(values: dict[str, np.ndarray], runs: list[RobotSimulation]) -> Batch:
+def _of_robot(robot: Robot, values: dict[str, np.ndarray], runs: list[RobotSimulation]) -> Batch:
     """Return the runs of a robot, its joints as outputs."""
     q = np.stack([run.q for run in runs])
     outputs = {name: q[..., k] for k, name in enumerate(runs[0].robot.joint_names)}
     steps = np.array([len(run.steps.start) for run in runs])
-    return Batch(runs[0].time, values, outputs, np.stack([run.status for run in runs]), steps)
+    status, order = np.stack([run.status for run in runs]), runs[0].order
+    return Batch(runs[0].time, values, outputs, status, steps, robot, order)
 
 
 class _Runs:

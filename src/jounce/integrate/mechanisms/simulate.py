@@ -201,7 +201,7 @@ def simulate(
     detectors = [_detector_of(event, mechanism, start) for event in watched]
     prepare(start.model)
     run = _Run(start, method, limits, detectors)
-    with Count("simulating", told=progress) as tell:
+    with Count("simulating", report=progress) as tell:
         run.go(instants, tell)
     run.note_ends(len(events))
     outcome = run.ending, run.events.happened[: len(events)], joined(run.backends)

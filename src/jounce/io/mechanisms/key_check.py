@@ -114,8 +114,8 @@ def _problems(source: Source, space: str, schema: dict[str, Any]) -> Iterator[Jo
 def _types(space: str, role: str) -> list[str]:
     """Return the types of this package."""
     start, end = f"{space}_", f"_{role}"
-    found = [name[len(start) : -len(end)] for name in _schema() if name.startswith(start) and name.endswith(end)]
-    return [name for name in found if not name.endswith("_of_a")]  # those are outputs
+    types = [name[len(start) : -len(end)] for name in _schema() if name.startswith(start) and name.endswith(end)]
+    return [name for name in types if not name.endswith("_of_a")]  # those are outputs
 
 
 def _unknown(

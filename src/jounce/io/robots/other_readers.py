@@ -138,11 +138,11 @@ def _depth_first(elements: Mapping[str, Element], by_name: bool) -> list[str]:
         below.setdefault(ends[name][0], []).append(name)
     children = {child for _, child in ends.values()}
     waiting = [name for name in reversed(names) if ends[name][0] not in children]
-    found = []
+    ordered = []
     while waiting:
-        found.append(waiting.pop())
-        waiting += reversed(below.get(ends[found[-1]][1], []))
-    return found
+        ordered.append(waiting.pop())
+        waiting += reversed(below.get(ends[ordered[-1]][1], []))
+    return ordered
 
 
 def _first(elements: Mapping[str, Element]) -> str:

@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jounce.kinematics.status import Status
-from jounce.mechanism import Mechanism
 from jounce.units.shown_units import derivatives_of, time_axes
 
 __all__ = ["labeled_family"]
@@ -17,7 +16,8 @@ __all__ = ["labeled_family"]
 
 def labeled_family(
     lane: str,
-    mechanism: Mechanism,
+    title: str,
+    described: Mapping[str, Any],
     instants: Float[np.ndarray, " time"],
     order: int,
     values: Mapping[str, np.ndarray],
@@ -30,8 +30,10 @@ def labeled_family(
     ----------
     lane : str
         Name of their dimension: design or run.
-    mechanism : Mechanism
-        Whose outputs they are.
+    title : str
+        Of the dataset; if empty, ``designs`` or ``runs`` is its title.
+    described : mapping of str to AbstractOutput or JointCoordinate
+        The unit, the labels and the axes of each output.
     instants : numpy.ndarray of shape (time,)
         s.
     order : int
@@ -47,22 +49,22 @@ def labeled_family(
 
     coordinates: dict[str, Any] = {lane: np.arange(len(status)), **time_axes(instants, order + 1)}
     variables = {}
-    for name, output in mechanism.outputs.items():
-        found = outputs.get(name)
-        if found is None:
+    for name, output in described.items():
+        series = outputs.get(name)
+        if series is None:
             continue
         dims = [lane, "time", "derivative"]
-        if found.ndim == 4:
-            axes = output.axes or (("component", output.labels[: found.shape[3]]),)
+        if series.ndim == 4:
+            axes = output.axes or (("component", output.labels[: series.shape[3]]),)
             coordinates |= {axis: list(labels) for axis, labels in axes}
-            found = found.reshape(*found.shape[:3], *(len(labels) for _, labels in axes))
+            series = series.reshape(*series.shape[:3], *(len(labels) for _, labels in axes))
             dims += [axis for axis, _ in axes]
-        variables[name] = (dims, found, {"units": output.unit, "long_name": derivatives_of(name)})
+        variables[name] = (dims, series, {"units": output.unit, "long_name": derivatives_of(name)})
     meanings = " ".join(each.name.lower() for each in Status)
     words = {"long_name": "outcome", "flag_values": list(map(int, Status)), "flag_meanings": meanings}
     variables["status"] = ((lane, "time"), status, words)
     taken = {*variables, *coordinates}
     named = {name: name if name not in taken else f"parameter_{name}" for name in values}
     coordinates |= {named[name]: (lane, value, {"long_name": name}) for name, value in values.items()}
-    attributes = {"title": mechanism.title or f"{lane}s of a mechanism", "source": "jounce"}
+    attributes = {"title": title or f"{lane}s of a mechanism", "source": "jounce"}
     return xarray.Dataset(variables, coordinates, attributes)

@@ -254,8 +254,9 @@ class _Family:
         """Return the results, labeled."""
         count = len(self.instants)
         outputs = {name: found[:, :count] for name, found in self.outputs.items()}
+        its = self.mechanism
         return labeled_family(
-            "design", self.mechanism, self.instants, self.order, values, outputs, self.status[:, :count]
+            "design", its.title, its.outputs, self.instants, self.order, values, outputs, self.status[:, :count]
         )
 
     def _of_whole_motions(self) -> bool:

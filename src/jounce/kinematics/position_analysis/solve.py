@@ -150,7 +150,7 @@ def solve(
     order = checked_settings(mechanism, order, tolerance)
     count = thread_count(threads)
     instants = time_grid(mechanism.time if time is None else time, mechanism.parameter_values)
-    with Count("solving", told=progress) as tell:
+    with Count("solving", report=progress) as tell:
         solver, path = _followed(mechanism, instants, order, tolerance, refine=refine)
         found = solve_grid(solver, path, instants, tell, count, keep=keep)
     state, outcome = (found.coordinates, found.outputs), (found.status, found.faults, path.change_points)

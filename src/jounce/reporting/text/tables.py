@@ -119,7 +119,7 @@ def other_reader_table(facts: Facts) -> Table:
     rows = []
     for joint in facts["joints"]:
         single = joint["positions"] == ["value"]
-        places = [
+        ranges = [
             span(joint[first], joint[several])
             for first, several in (("position", "positions"), ("velocity", "velocities"))
         ]
@@ -129,7 +129,7 @@ def other_reader_table(facts: Facts) -> Table:
             ours = "; ".join(sums).replace("+ -", "- ")
             ours += f" + {joint['offset']:g}" if joint["offset"] else ""
         forms = "" if single else f"{' '.join(joint['positions'])} | {' '.join(joint['velocities'])}"
-        rows.append([joint["joint"], *places, ours, forms, joint["note"]])
+        rows.append([joint["joint"], *ranges, ours, forms, joint["note"]])
     headings = ("joint", "position", "velocity", "in ours", "holds", "note")
     return table(f"As {facts['name']} {facts['version']} has it", headings, rows, (1, 2))
 

@@ -63,12 +63,12 @@ class RobotQuantities:
         """Return the quantities at values of s."""
         q = self.coordinates(s)
         first, bounds = self._first(q)
-        second, bounds_of_second = self._second(q, s == self.path.stop)
+        of_second = self._second(q, s == self.path.stop)
         vectors, vector_bounds = self._vectors(q)
         chosen = self.with_jounce
         fourth = np.moveaxis(q[:, 1:, chosen], 1, 2)
         fourth_bounds = self._bounds("jounce", chosen, q)
-        return PathQuantities(first, bounds, second, *bounds_of_second, vectors, vector_bounds, fourth, fourth_bounds)
+        return PathQuantities(first, bounds, *of_second, vectors, vector_bounds, fourth, fourth_bounds)
 
     def coordinates(self, s: _Points) -> Float[np.ndarray, "point 5 joint"]:
         """Return the positions of all joints and their derivatives by s."""
@@ -93,7 +93,7 @@ class RobotQuantities:
                 bounds.append(np.full((len(q), 1), point.speed))
         return np.concatenate(values, axis=1), np.concatenate(bounds, axis=1)
 
-    def _second(self, q: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, tuple[_Table, ...]]:
+    def _second(self, q: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, _Table, _Table, _Table, _Table]:
         """Return the coefficients of accelerations and torques; lowest and highest of them, and of their rates."""
         chosen = self.with_acceleration
         motion = q[:, :, chosen]
@@ -113,7 +113,8 @@ class RobotQuantities:
             rate, rate_back = self._both("effort_rate", self.with_effort, q)
             tables.append((self._torques(q)[:, self.with_effort], -effort_back, effort, -rate_back, rate))
         second, *bounds = (np.concatenate(x, axis=1) for x in zip(*tables, strict=True))
-        return second, tuple(bounds)
+        lower, upper, rate_lower, rate_upper = bounds
+        return second, lower, upper, rate_lower, rate_upper
 
     def _torques(self, q: np.ndarray) -> Float[np.ndarray, "point joint 8"]:
         """Return the coefficients of the torques: exact values for a few rates of s, and the polynomials they are."""
