@@ -47,7 +47,8 @@ def test_masses_and_springs_swing_in_closed_form():
     np.testing.assert_allclose(batch.outputs["x"][..., 0], np.cos(phase), rtol=0, atol=1e-13)
     np.testing.assert_allclose(batch.outputs["x"][..., 2], -4.0 / masses[:, None] * np.cos(phase), rtol=0, atol=1e-12)
     data = batch.dataset
-    assert data["x"].dims == ("run", "time", "derivative") and data["x"].attrs["units"] == "m"
+    assert data["x"].dims == ("run", "time", "derivative")
+    assert data["x"].attrs["units"] == "m"
     np.testing.assert_array_equal(data["a.mass"], masses)
 
 
