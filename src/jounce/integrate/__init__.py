@@ -1,9 +1,10 @@
 """Integration of the equations of motion: Taylor series of any order, Obreshkov, step control, events, dense output."""
 
 from jounce.integrate.marching.joint_events import JointEvent as JointEvent
-from jounce.integrate.mechanisms.batch import Batch as Batch, simulate_batch as simulate_batch
+from jounce.integrate.mechanisms.batch import simulate_batch as simulate_batch
 from jounce.integrate.mechanisms.diffrax_term import OrdinaryEquation as OrdinaryEquation, ode_term as ode_term
 from jounce.integrate.mechanisms.simulate import simulate as simulate
+from jounce.integrate.results.batch import Batch as Batch
 from jounce.integrate.results.robot_simulation import RobotSimulation as RobotSimulation
 from jounce.integrate.results.simulation import Simulation as Simulation
 from jounce.integrate.steps.events import Event as Event

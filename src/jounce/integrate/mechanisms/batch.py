@@ -1,16 +1,13 @@
 """Many simulations of one mechanism side by side: initial conditions, masses, forces and lengths by parameters."""
 
-import dataclasses
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple, Unpack
+from typing import Any, Unpack
 
 import jax
 import numpy as np
-from jaxtyping import Float, Int
 
-from jounce.display import Displayed
 from jounce.dynamics.forward.accelerations import Equations, State
 from jounce.dynamics.forward.initial_state import consistent_start, initial_as_drivers
 from jounce.errors import MechanismError
@@ -18,6 +15,7 @@ from jounce.execution.threads import in_callers_context
 from jounce.integrate.marching.marching import DenseOutput, IntegratorState, Outcome, begin_march, march
 from jounce.integrate.marching.user_methods import integrator
 from jounce.integrate.mechanisms.batch_equations import BatchStart, ParametricMechanism, Turns
+from jounce.integrate.results.batch import Batch
 from jounce.integrate.results.robot_simulation import RobotSimulation
 from jounce.integrate.results.simulation import expanded
 from jounce.integrate.robot_batch import simulate_robots
@@ -29,7 +27,6 @@ from jounce.integrate.steps.revolution_counts import POINTS_IN_STEP, attitudes_a
 from jounce.jet.derivatives import plain_derivatives
 from jounce.jet.turns import brought_near, whole_periods
 from jounce.kinematics import Status
-from jounce.kinematics.families.labels import labeled_family
 from jounce.kinematics.families.solve_batch import checked_values
 from jounce.kinematics.results.pose_outputs import output_series
 from jounce.mechanism import Mechanism, TimeGrid, build, check_mechanism
@@ -44,68 +41,6 @@ from jounce.shapes import ArrayLike
 
 LANES = 64  # runs marched together: more fall out of the cache
 STEPS = 16  # tried before runs that have ended make room for others
-
-
-class JointCoordinate(NamedTuple):
-    """The coordinate of a robot joint, as a column of results."""
-
-    unit: str
-    labels: tuple[str, ...] = ()
-    axes: tuple[tuple[str, tuple[str, ...]], ...] = ()
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Batch(Displayed):
-    """The results of many simulations.
-
-    Attributes
-    ----------
-    time : numpy.ndarray of shape (time,)
-        s.
-    parameters : dict of str to numpy.ndarray of shape (runs,)
-        What the runs differ in.
-    outputs : dict of str to numpy.ndarray
-        Outputs of the mechanism, or coordinates of the robot by joint, with derivatives, (runs, time, order + 1) or
-        (runs, time, order + 1, component), SI; NaN where a run did not get so far. Forces and energies, which follow
-        from a whole motion, are left out.
-    status : numpy.ndarray of int, shape (runs, time)
-        See `Status`.
-    steps : numpy.ndarray of int, shape (runs,)
-        Steps taken.
-    mechanism : Mechanism or Robot
-        As it was given.
-    order : int
-        Highest derivative of the outputs.
-    """
-
-    time: Float[np.ndarray, " time"]
-    parameters: dict[str, Float[np.ndarray, " run"]]
-    outputs: dict[str, Float[np.ndarray, "run time derivative *component"]]
-    status: Int[np.ndarray, "run time"]
-    steps: Int[np.ndarray, " run"]
-    mechanism: Mechanism | Robot
-    order: int
-
-    @property
-    def dataset(self) -> Any:
-        """The results as an `xarray.Dataset` of the form that `jounce.solve_batch` returns, of the dimension ``run``.
-
-        Variables are the outputs, with their units, the ``status``, and the ``steps`` of each run; parameters are
-        coordinates.
-        """
-        if isinstance(self.mechanism, Robot):
-            joints = self.mechanism.joints
-            title = self.mechanism.name
-            described = {name: JointCoordinate("rad" if joints[name].turning else "m") for name in self.outputs}
-        else:
-            title, described = self.mechanism.title, self.mechanism.outputs
-        return labeled_family(
-            "run", title, described, self.time, self.order, self.parameters, self.outputs, self.status
-        ).assign(steps=("run", self.steps, {"long_name": "steps taken"}))
-
-    def __repr__(self) -> str:
-        complete = int((self.status == Status.OK).all(axis=1).sum())
-        return f"<Batch {complete} of {len(self.status)} runs complete, {len(self.time)} instants>"
 
 
 @concrete

@@ -1,0 +1,75 @@
+"""The results of many simulations side by side."""
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from jounce.display import Displayed
+from jounce.kinematics import Status
+from jounce.kinematics.families.labels import labeled_family
+from jounce.mechanism import Mechanism
+from jounce.robot.robot import Robot
+
+
+class JointCoordinate(NamedTuple):
+    """The coordinate of a robot joint, as a column of results."""
+
+    unit: str
+    labels: tuple[str, ...] = ()
+    axes: tuple[tuple[str, tuple[str, ...]], ...] = ()
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Batch(Displayed):
+    """The results of many simulations.
+
+    Attributes
+    ----------
+    time : numpy.ndarray of shape (time,)
+        s.
+    parameters : dict of str to numpy.ndarray of shape (runs,)
+        What the runs differ in.
+    outputs : dict of str to numpy.ndarray
+        Outputs of the mechanism, or coordinates of the robot by joint, with derivatives, (runs, time, order + 1) or
+        (runs, time, order + 1, component), SI; NaN where a run did not get so far. Forces and energies, which follow
+        from a whole motion, are left out.
+    status : numpy.ndarray of int, shape (runs, time)
+        See `Status`.
+    steps : numpy.ndarray of int, shape (runs,)
+        Steps taken.
+    mechanism : Mechanism or Robot
+        As it was given.
+    order : int
+        Highest derivative of the outputs.
+    """
+
+    time: Float[np.ndarray, " time"]
+    parameters: dict[str, Float[np.ndarray, " run"]]
+    outputs: dict[str, Float[np.ndarray, "run time derivative *component"]]
+    status: Int[np.ndarray, "run time"]
+    steps: Int[np.ndarray, " run"]
+    mechanism: Mechanism | Robot
+    order: int
+
+    @property
+    def dataset(self) -> Any:
+        """The results as an `xarray.Dataset` of the form that `jounce.solve_batch` returns, of the dimension ``run``.
+
+        Variables are the outputs, with their units, the ``status``, and the ``steps`` of each run; parameters are
+        coordinates.
+        """
+        if isinstance(self.mechanism, Robot):
+            joints = self.mechanism.joints
+            title = self.mechanism.name
+            described = {name: JointCoordinate("rad" if joints[name].turning else "m") for name in self.outputs}
+        else:
+            title, described = self.mechanism.title, self.mechanism.outputs
+        return labeled_family(
+            "run", title, described, self.time, self.order, self.parameters, self.outputs, self.status
+        ).assign(steps=("run", self.steps, {"long_name": "steps taken"}))
+
+    def __repr__(self) -> str:
+        complete = int((self.status == Status.OK).all(axis=1).sum())
+        return f"<Batch {complete} of {len(self.status)} runs complete, {len(self.time)} instants>"
