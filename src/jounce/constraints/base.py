@@ -133,6 +133,9 @@ class AbstractConstraint(Module):
     nonholonomic: ClassVar[bool] = False  # whether rows of it hold velocities, which no positions fulfill
     parts: ClassVar[Mapping[str, Mapping[str, str]]] = MappingProxyType({})  # keys of files within a key, with fields
     law_apart: ClassVar[bool] = False  # of the class that defines `residual`: a function of bodies less one of the law
+    has_friction_radius: ClassVar[bool] = (
+        False  # whether its surfaces turn on one another, so that friction has a radius
+    )
     dimensions: ClassVar[Mapping[str, str]] = USUAL_DIMENSIONS
     signs: ClassVar[Mapping[str, str]] = USUAL_SIGNS
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = MappingProxyType({})

@@ -108,7 +108,7 @@ def _where(condition: Any, jet: Jet, other: Any) -> Jet:
     return Jet(tuple(jnp.where(condition, a, b) for a, b in pairs))
 
 
-def check_friction(joint: Any, *, turns: bool) -> None:
+def check_friction(joint: Any) -> None:
     """Raise MechanismError unless what a joint has as friction is one, with a radius where surfaces turn."""
     friction = joint.friction
     if friction is None:
@@ -116,9 +116,9 @@ def check_friction(joint: Any, *, turns: bool) -> None:
     if not isinstance(friction, Friction):
         message = "must be a jn.joints.Friction, in a file {coefficient: 0.1, radius: 12 mm, speed: 1 mm/s}"
         raise MechanismError(message, name="friction", value=friction)
-    if turns and friction.radius is None:
+    if joint.has_friction_radius and friction.radius is None:
         raise MechanismError("is missing: the bodies turn, on a surface of some radius", name="friction.radius")
-    if not turns and friction.radius is not None:
+    if not joint.has_friction_radius and friction.radius is not None:
         message = "is none of a guide, whose surfaces slide and do not turn: leave it out"
         raise MechanismError(message, name="friction.radius", value=friction.radius)
 

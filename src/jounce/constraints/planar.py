@@ -54,11 +54,12 @@ class Revolute(AbstractConstraint, type="revolute", space="planar"):
     point_j: Vector
     friction: Nested = None
 
+    has_friction_radius = True
     symbol = "revolute"
     pair = "revolute"
 
     def __check_init__(self):
-        check_friction(self, turns=True)
+        check_friction(self)
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         return body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -108,7 +109,7 @@ class Parallel2(AbstractConstraint, type="parallel2", space="planar"):
     symbol = "slot"
 
     def __check_init__(self):
-        check_friction(self, turns=False)
+        check_friction(self)
 
     def residual(self, body_i: PlanarPose, body_j: PlanarPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -138,7 +139,7 @@ class Prismatic(AbstractConstraint, type="prismatic", space="planar"):
         return rows(cross(along, body_j.direction(self.vector_j)), cross(along, d))
 
     def __check_init__(self):
-        check_friction(self, turns=False)
+        check_friction(self)
 
     def slip(self, bodies: tuple[Any, ...], moving: Velocities) -> Jet:
         """Return how fast body j slides in its guide, m/s."""

@@ -30,10 +30,11 @@ class Spherical(AbstractConstraint, type="spherical", space="spatial"):
     point_j: Vector
     friction: Nested = None
 
+    has_friction_radius = True
     symbol = "spherical"
 
     def __check_init__(self):
-        check_friction(self, turns=True)
+        check_friction(self)
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -108,11 +109,13 @@ class Revolute(AbstractConstraint, type="revolute", space="spatial"):
     axis_j: Vector
     friction: Nested = None
 
+    has_friction_radius = True
+
     held_parallel = (("axis_i", "axis_j"),)
     symbol = "revolute"
 
     def __check_init__(self):
-        check_friction(self, turns=True)
+        check_friction(self)
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         d = body_j.point(self.point_j) - body_i.point(self.point_i)
@@ -132,11 +135,13 @@ class Cylindrical(AbstractConstraint, type="cylindrical", space="spatial"):
     axis_j: Vector
     friction: Nested = None
 
+    has_friction_radius = True
+
     held_parallel = (("axis_i", "axis_j"),)
     symbol = "cylindrical"
 
     def __check_init__(self):
-        check_friction(self, turns=True)
+        check_friction(self)
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         return rows(*_collinear(self, body_i, body_j))
@@ -163,7 +168,7 @@ class Prismatic(AbstractConstraint, type="prismatic", space="spatial"):
     symbol = "prismatic"
 
     def __check_init__(self):
-        check_friction(self, turns=False)
+        check_friction(self)
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         side = body_i.direction(cross(self.axis_i, self.normal_i) / length_of(self.axis_i)[None])
@@ -187,7 +192,7 @@ class PlaneOnPlane(AbstractConstraint, type="planar", space="spatial"):
     symbol = "plane"
 
     def __check_init__(self):
-        check_friction(self, turns=False)
+        check_friction(self)
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         apart = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)
@@ -278,12 +283,14 @@ class Screw(AbstractConstraint, type="screw", space="spatial"):
     offset: Scalar = None  # m
     friction: Nested = None
 
+    has_friction_radius = True
+
     dimensions = {"offset": "length"}
     held_parallel = (("axis_i", "axis_j"),)
     symbol = "screw"
 
     def __check_init__(self):
-        check_friction(self, turns=True)
+        check_friction(self)
 
     def residual(self, body_i: SpatialPose, body_j: SpatialPose, time: Jet) -> Jet:
         advance = slide(body_i, body_j, self.point_i, self.point_j, self.axis_i)

@@ -10,8 +10,6 @@ from jounce.dynamics.energy.energies import (
     acceleration_energy as acceleration_energy,
     body_energy as body_energy,
     kinetic_energy as kinetic_energy,
-    potential_energy as potential_energy,
-    stored_energy as stored_energy,
 )
 from jounce.dynamics.energy.energy_outputs import (
     AccelerationEnergyOutput as AccelerationEnergyOutput,
@@ -31,6 +29,7 @@ from jounce.dynamics.energy.equations import (
     mangeron_nielsen as mangeron_nielsen,
     printed_coefficient as printed_coefficient,
 )
+from jounce.dynamics.energy.potential import potential_energy as potential_energy, stored_energy as stored_energy
 from jounce.dynamics.energy.power import power_balance as power_balance
 from jounce.dynamics.inverse.cam_outputs import CamForceOutput as CamForceOutput, CamTorqueOutput as CamTorqueOutput
 from jounce.dynamics.inverse.cam_springs import ContactSpring as ContactSpring, contact_spring as contact_spring

@@ -72,7 +72,7 @@ def acting(
     motion = Motion(mechanism, model, np.array([INSTANT]), rates + 2, (coordinates, ()), np.zeros(1, int), {})
     found = MotionForces(motion)
     rows = len(model.rows)
-    balancing = random.normal(size=(1, rates + 1, rows + len(found.with_friction), 1))
+    balancing = random.normal(size=(1, rates + 1, rows + len(found.friction.names), 1))
     found.__dict__ |= {"_balancing": balancing, "multipliers": balancing[0, :, :rows]}
     return pose, found
 
@@ -124,9 +124,9 @@ def worked(found: MotionForces, name: str, element: Any, pose: Any) -> np.ndarra
     rate = found.model.system.groups[place.group].residual(pose, frozen).differentiate()
     rates = np.stack(rate.dense().coefficients)[:, :, place.instance]
     power = -convolved(scalar, found.multipliers[:, list(place.own_rows)], rates)
-    if name in found.with_friction:
-        taken = np.asarray(found.resisted(place.group, np.zeros(1, int)))[:, place.instance]
-        power = power - convolved(scalar, found.normal_force(name), taken[:, None])
+    if name in found.friction.names:
+        taken = np.asarray(found.friction.resisted(place.group, np.zeros(1, int)))[:, place.instance]
+        power = power - convolved(scalar, found.friction.normal_force(name), taken[:, None])
     return power
 
 

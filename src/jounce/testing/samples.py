@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jounce.constraints.facts import facts_of, field_kinds, value_fields
+from jounce.constraints.friction import Friction
 from jounce.errors import MechanismError
 from jounce.jet import Jet, sqrt, stack
 from jounce.mechanism.carriages import carriage_of
@@ -89,6 +90,9 @@ class Samples:
             return True
         if kind == "scalar":
             return float(random.uniform(0.5, 1.5))
+        if name == "friction":
+            radius = random.uniform(0.01, 0.02) if self.kind.has_friction_radius else None
+            return Friction(random.uniform(0.1, 0.3), random.uniform(0.01, 0.02), radius)
         if name in facts.choices:
             return facts.choices[name][0]
         message = f"no value of this field of {self.kind.__qualname__} is known that makes sense; give one in `values`"

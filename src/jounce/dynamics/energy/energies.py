@@ -7,22 +7,21 @@ for any motion. On jets the same two products give the rates.
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.masses import Gravity, Masses, gravity_of, required_masses, second_moments
-from jounce.dynamics.motion_values import Coordinates, check_motion, concrete_values, cut, labeled, pose_of
+from jounce.dynamics.masses import Masses, required_masses, second_moments
+from jounce.dynamics.motion_values import Coordinates, labeled, pose_of
 from jounce.errors import JounceError, MechanismError, RobotError, flag, whole_number
 from jounce.execution.compilation import compiled
 from jounce.jet import Jet, dot
 from jounce.jet.algebra import stacked, total
 from jounce.kinematics import Motion
 from jounce.kinematics.position_analysis.solve import HIGHEST_ORDER
-from jounce.mechanism.system import Group
 from jounce.rigid import PlanarPose
 from jounce.rigid.frames import Frames
 from jounce.rigid.pose import Pose
@@ -38,7 +37,7 @@ from jounce.shapes import ArrayLike, Numbers
 from jounce.units.shown_units import derivative_unit
 
 if TYPE_CHECKING:
-    import xarray
+    pass
 
 Energies = Float[Numbers, "order body time"]
 """Taylor coefficients of energies of bodies along a motion."""
@@ -330,97 +329,3 @@ def _of_bodies(
     coordinates: Coordinates, masses: Masses, pose_type: type[Pose], order: int, function: EnergyFunction
 ) -> tuple[Energies, ...]:
     return tuple(stacked(part) for part in function(pose_of(coordinates, pose_type), *masses, order))
-
-
-def potential_energy(motion: Motion) -> "xarray.DataArray":
-    """Return the potential energy of all bodies of a mechanism in its gravity, and its rates; zero at the origin.
-
-    Parameters
-    ----------
-    motion : Motion
-        Of a mechanism whose bodies have masses.
-
-    Returns
-    -------
-    xarray.DataArray
-        Dimensions time and derivative, J by s; NaN at instants that were not solved.
-
-    Raises
-    ------
-    MechanismError
-        If no body has a mass.
-
-    Examples
-    --------
-    >>> import jounce as jn
-    >>> lift = jn.Mechanism(
-    ...     space="planar",
-    ...     gravity=[0, -10.0],
-    ...     bodies={"cage": jn.Body([0, 0], mass=3.0)},
-    ...     joints={"rail": jn.planar.Prismatic(("ground", "cage"), [0, 0], [0, 0], [0, 1], [0, 1])},
-    ...     drivers={"height": jn.drivers.SlideDriver(("ground", "cage"), [0, 0], [0, 0], [0, 1], "2*t")},
-    ... )
-    >>> energy = jn.dynamics.potential_energy(jn.solve(lift, [0.0, 1.0], order=1))
-    >>> energy.values[1].round(9).tolist()  # energy and power
-    [60.0, 60.0]
-    """
-    check_motion(motion)
-    return labeled(motion, potential_coefficients(motion)[: motion.order + 1].sum(axis=1), "J")
-
-
-def potential_coefficients(motion: Motion) -> Energies:
-    """Return the potential energies of bodies as Taylor coefficients, the ground first."""
-    masses, (pose_type, coordinates) = required_masses(motion.mechanism), motion.poses
-    heights = concrete_values(motion, _heights(coordinates, masses.center, gravity_of(motion.mechanism), pose_type))
-    return 0.0 - heights * masses.mass[None]  # no -0
-
-
-@compiled("pose_type", brief=True)
-def _heights(
-    coordinates: Coordinates, center: Float[Numbers, "component body 1"], gravity: Gravity, pose_type: type[Pose]
-) -> Energies:
-    return stacked(dot(pose_of(coordinates, pose_type).point(center), gravity))
-
-
-def stored_energy(motion: Motion) -> Any:
-    """Return the energy that springs, and other forces that give back what they take, have stored.
-
-    Parameters
-    ----------
-    motion : Motion
-        Of any mechanism; without such forces it is zero.
-
-    Returns
-    -------
-    xarray.DataArray
-        Dimension time, J; NaN at instants that were not solved.
-
-    Examples
-    --------
-    >>> import jounce as jn
-    >>> sled = jn.Mechanism(
-    ...     space="planar",
-    ...     bodies={"sled": jn.Body([1, 0])},
-    ...     joints={"rail": jn.planar.Prismatic(("ground", "sled"), [0, 0], [0, 0], [1, 0], [1, 0])},
-    ...     drivers={"push": jn.drivers.SlideDriver(("ground", "sled"), [0, 0], [0, 0], [1, 0], "1 + t**2")},
-    ...     forces={"spring": jn.forces.Spring(("ground", "sled"), [0, 0], [0, 0], stiffness=5.0, length=1.0)},
-    ... )
-    >>> jn.dynamics.stored_energy(jn.solve(sled, [0.0, 2.0], order=1)).values.round(12).tolist()  # 5/2 t^4
-    [0.0, 40.0]
-    """
-    check_motion(motion)
-    pose_type, coordinates = motion.poses
-    stored = _stored(motion.forces, cut(coordinates, 1), motion.time[None], pose_type)
-    return labeled(motion, concrete_values(motion, stored)[None], "J")[:, 0].drop_vars("derivative")
-
-
-@compiled("pose_type", brief=True)
-def _stored(groups: tuple[Group, ...], coordinates: Coordinates, time: Any, pose_type: type[Pose]) -> Any:
-    return energy_of_forces(groups, pose_of(coordinates, pose_type), Jet.variable(time, 1))
-
-
-def energy_of_forces(groups: Sequence[Group], pose: Pose, time: Jet) -> Float[Numbers, " batch"]:
-    """Return the energy that forces have stored, J, in a pose with velocities."""
-    lanes = time.shape[-1]
-    parts = [jnp.broadcast_to(g.energy(pose, time).coefficients[0], (g.instances, lanes)) for g in groups]
-    return jnp.sum(jnp.concatenate([*parts, jnp.zeros((1, lanes))]), axis=0)

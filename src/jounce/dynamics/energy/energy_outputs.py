@@ -6,7 +6,8 @@ from typing import ClassVar
 import equinox as eqx
 
 from jounce.constraints.base import Whole
-from jounce.dynamics.energy.energies import energy_coefficients, energy_unit, potential_coefficients
+from jounce.dynamics.energy.energies import energy_coefficients, energy_unit
+from jounce.dynamics.energy.potential import potential_coefficients
 from jounce.dynamics.motion_values import concrete_values
 from jounce.errors import MechanismError, check_name, whole_number
 from jounce.kinematics import Motion

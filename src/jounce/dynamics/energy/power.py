@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jounce.dynamics.forward.accelerations import Lanes
+from jounce.dynamics.inverse.finite_forces import check_finite_values
 from jounce.dynamics.inverse.motion_forces import MotionForces
 from jounce.dynamics.masses import Gravity, Masses
 from jounce.dynamics.motion_values import Coordinates, check_motion, labeled, pose_of
@@ -76,7 +77,7 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
     driven = [(nothing, nothing), *(_driver_power(forces, name) for name in motion.mechanism.drivers)]
     rest = forces.in_chunks(lambda lanes: _powers(*_of_chunk(forces, lanes), forces.pose_type, forces.levels))
     applied, kinetic, potential, sizes = (np.asarray(part) for part in rest)
-    forces.check_finite(applied)
+    check_finite_values(forces, applied)
     power, size = np.sum(driven, axis=0)
     taken, rubbed = np.sum([(nothing, nothing), *_friction_powers(forces)], axis=0)
     size = size + rubbed
@@ -95,10 +96,10 @@ def power_balance(motion: Motion) -> "xarray.Dataset":
 
 def _friction_powers(forces: MotionForces) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Give the power of each joint with friction and the size of its products, (levels, time)."""
-    for name in forces.with_friction:
+    for name in forces.friction.names:
         place = forces.indices[name]
-        resisted = forces.in_chunks(lambda lanes, place=place: forces.resisted(place.group, lanes))[:, place.instance]
-        factor, normal = Jet(tuple(resisted)), Jet(tuple(forces.normal_force(name)[:, 0]))
+        of_group = forces.in_chunks(lambda lanes, group=place.group: forces.friction.resisted(group, lanes))
+        factor, normal = Jet(tuple(of_group[:, place.instance])), Jet(tuple(forces.friction.normal_force(name)[:, 0]))
         size = factor.map(np.abs) * normal.map(np.abs)
         yield np.stack((factor * normal).dense().coefficients) * -1.0, np.stack(size.dense().coefficients)
 

@@ -6,7 +6,6 @@ their coefficient k is affine in the unknowns ``(q''[k], lambda[k])``, with the 
 """
 
 import dataclasses
-import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
@@ -14,9 +13,9 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jounce.dynamics.forward.ground import turns_with_ground, with_ground
 from jounce.dynamics.forward.loads import inertia_forces, mass_matrices
 from jounce.dynamics.forward.saddle_fronts import SaddleFactor, SaddleFronts, SaddleInverse
 from jounce.dynamics.forward.saddle_point import (
@@ -312,21 +311,6 @@ def _balance(
     equations: Equations, state: State, acceleration: ByBody, multipliers: Rows, time: Instants
 ) -> tuple[ByBody, Rows, Attitudes]:
     return equations.balance(state, acceleration, multipliers, time)
-
-
-def with_ground(
-    moving: Float[Numbers, "*components body batch"], of_ground: float | np.ndarray = 0.0
-) -> Float[Numbers, "*components body+1 batch"]:
-    """Put the ground, which has none of most quantities, before the moving bodies; in NumPy what is there."""
-    array: Any = np if isinstance(moving, np.ndarray) else jnp
-    ground = array.broadcast_to(of_ground, (*moving.shape[:-2], 1, moving.shape[-1]))
-    return array.concatenate([ground, moving], axis=-2)
-
-
-def turns_with_ground(moving: Float[Numbers, "*orders 4 body batch"]) -> Float[Numbers, "*orders 4 body+1 batch"]:
-    """Put the ground, which does not turn, before the moving bodies: Euler parameters, or their series."""
-    components = moving.shape[:-2]
-    return with_ground(moving, np.eye(1, math.prod(components)).reshape(*components, 1, 1))
 
 
 def conjugate(variation: Callable[[Pose], Any], pose: Pose, weights: Any) -> ByBody:

@@ -48,7 +48,7 @@ def without_open_rates(forces: Any, found: Float[Numbers, "case order row time"]
     found : array of shape (1, levels, rows, time)
         Multipliers, and below them normal forces.
     """
-    names = [] if forces.motion.traced else forces.with_friction
+    names = [] if forces.motion.traced else forces.friction.names
     if not names or found.shape[1] == 1:
         return found
     normal = np.asarray(found)[0, 0, -len(names) :]
@@ -58,7 +58,9 @@ def without_open_rates(forces: Any, found: Float[Numbers, "case order row time"]
         return found
     open_ = np.zeros(found.shape[-1], bool)
     for name in names:
-        held = forces.pressing_force(name, found[0, :, : len(forces.model.rows), lanes].transpose(1, 2, 0), lanes)
+        held = forces.friction.pressing_force(
+            name, found[0, :, : len(forces.model.rows), lanes].transpose(1, 2, 0), lanes
+        )
         sizes = np.abs(held).max(axis=1) / forces.rates[lanes] ** np.arange(len(held))[:, None]
         passed = (sizes[0] <= NONE * size) & (sizes[1:].max(axis=0, initial=0.0) > NONE * size)
         open_[lanes[passed]] = True

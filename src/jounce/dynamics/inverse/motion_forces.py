@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.friction.coupling import check_unique_pressing, rubs
+from jounce.dynamics.friction.coupling import check_unique_pressing
 from jounce.dynamics.inverse import force_programs as programs, idle_torques, tooth_flanks as teeth
-from jounce.dynamics.inverse.locked_friction import (
-    check_not_locked,
-    friction_left_out,
-    without_open_rates,
-)
+from jounce.dynamics.inverse.finite_forces import check_finite_forces, check_finite_values
+from jounce.dynamics.inverse.joint_friction import JointFriction
+from jounce.dynamics.inverse.locked_friction import check_not_locked, friction_left_out, without_open_rates
 from jounce.dynamics.inverse.redundant_forces import OPEN, OpenMultipliers
 from jounce.dynamics.masses import check_loads, gravity_of, masses_of
 from jounce.dynamics.motion_values import along_motion, part_of
@@ -24,7 +22,7 @@ from jounce.jet.algebra import total
 from jounce.kinematics import Motion, Status
 from jounce.kinematics.continuation.change_points import spoiled
 from jounce.mechanism.axis_angles import at_lanes, measures_angle
-from jounce.mechanism.element_indices import ElementIndex, element_indices, force_names
+from jounce.mechanism.element_indices import ElementIndex, element_indices
 from jounce.mechanism.redundant_reactions import resolved_reactions
 from jounce.mechanism.system import Group, holding, law_left_out
 from jounce.shapes import Numbers
@@ -129,21 +127,21 @@ class MotionForces:
         def chunk(lanes: np.ndarray) -> Any:
             if code is not None:
                 found, finite = code(self._lanes(lanes))
-                self._check_finite(finite, lanes)
+                check_finite_forces(self, finite, lanes)
                 return found
             blocks, (bodies, *_, instants) = self._blocks(lanes), self._lanes(lanes)
             forces = programs.without_constraints(self._joined, at_lanes(self.forces, lanes))
             load, finite = programs.body_loads(forces, bodies, instants, self.masses, self.gravity, self.pose_type)
-            self._check_finite(finite, lanes)
+            check_finite_forces(self, finite, lanes)
             if choice is not None:
                 return programs.least_multipliers(self._joined, blocks, load, *choice)
             still = None if self._joined.shape[0] == self._joined.shape[1] else self.coordinates_at(None, lanes, 1)
-            rubbed = [self._rubbed(k, lanes) for k in self._rubbing]
+            rubbed = [self.friction.slopes(k, lanes) for k in self.friction.first_rows]
             return programs.multipliers(self._joined, blocks, load, still, self.masses, self.pose_type, rubbed)[None]
 
         found = self.in_chunks(chunk)
         check_not_locked(self.motion, self._joined, found[0])
-        self.check_finite(found[0])
+        check_finite_values(self, found[0])
         return without_open_rates(self, found)
 
     def _balancing_code(self, choice: tuple[Numbers, Numbers, Numbers] | None) -> Any:
@@ -226,51 +224,14 @@ class MotionForces:
         return OpenMultipliers(model, np.asarray(scaled)[..., 0], selection)
 
     @property
-    def _rubbing(self) -> dict[int, int]:
-        """Where the normal forces of groups with friction begin, below the multipliers, by the index of the group."""
-        rubbing = [k for k, group in enumerate(self._joined.groups) if rubs(group)]
-        counts = [self._joined.groups[k].instances for k in rubbing]
-        return {k: len(self.model.rows) + sum(counts[:n]) for n, k in enumerate(rubbing)}
-
-    def _rubbed(self, index: int, lanes: np.ndarray) -> programs.Rubbed:
-        """Return what is to be known of the friction of a group at some instants."""
-        group = self._joined.groups[index]
-        moving = [self.coordinates_at(slot, lanes, self.levels + 1) for slot in group.bodies]
-        slots = group.moving_slots
-        slopes = [programs.friction_slopes(group.element, moving, self.pose_type, s, self.levels) for s in slots]
-        return slopes, self._poses(index, lanes)
+    def friction(self) -> JointFriction:
+        """The joints with friction."""
+        return JointFriction(self)
 
     @cached_property
     def rates(self) -> Float[np.ndarray, " time"]:
         """How fast the motion changes, 1/s."""
         return teeth.rate_of(self.motion)
-
-    @property
-    def with_friction(self) -> list[str]:
-        """The names of the joints with friction."""
-        return [name for name, place in self.indices.items() if place.group in self._rubbing]
-
-    def resisted(self, index: int, lanes: np.ndarray) -> Float[Numbers, "order instance time"]:
-        """Return the power that friction takes for a normal force of one, of a group at some instants."""
-        group = self._joined.groups[index]
-        moving = [self.coordinates_at(slot, lanes, self.levels + 1) for slot in group.bodies]
-        return programs.resisted(group.element, moving, self.pose_type, self.levels)
-
-    def pressing_force(
-        self, name: str, multipliers: Numbers, lanes: np.ndarray
-    ) -> Float[Numbers, "order component time"]:
-        """Return what multipliers of all rows exert in a joint on one of its bodies, as Taylor coefficients."""
-        place = self.indices[name]
-        group = self._joined.groups[place.group]
-        own = multipliers[:, place.rows].reshape(len(multipliers), -1, group.instances, len(lanes))
-        works = programs.wrenches(self._slopes(place.group, group.moving_slots[-1], lanes), own)
-        return np.asarray(works)[:, : self.pose_type.shifts, place.instance]
-
-    def normal_force(self, name: str) -> Float[Numbers, "order 1 time"]:
-        """Return what presses the surfaces of a joint with friction together, N, as Taylor coefficients."""
-        place = self.indices[name]
-        row = self._rubbing[place.group] + place.instance
-        return self._balancing[0][:, row : row + 1]
 
     def _blocks(self, lanes: np.ndarray) -> list[list[Any]]:
         """Return the slopes of all groups by the bodies of their moving slots."""
@@ -355,13 +316,13 @@ class MotionForces:
         Force, global, and moment about the origin of the body, in its axes.
         """
         if place := self.indices.get(name):
-            first, group = self._rubbing.get(place.group), self._joined.groups[place.group]
+            first, group = self.friction.first_rows.get(place.group), self._joined.groups[place.group]
 
             def of_constraint(lanes: np.ndarray) -> Any:
                 held = programs.wrenches(self._slopes(place.group, slot, lanes), self._of_group(place)[..., lanes])
                 if first is None:
                     return held
-                slopes, _ = self._rubbed(place.group, lanes)
+                slopes, _ = self.friction.slopes(place.group, lanes)
                 pressing = self._balancing[0][:, None, first : first + group.instances, lanes]
                 return held + programs.wrenches(slopes[group.moving_slots.index(slot)], pressing)
 
@@ -378,40 +339,12 @@ class MotionForces:
 
     def applied_force(self, name: str) -> Numbers:
         """Return an applied force, as Taylor coefficients, (levels, components, time)."""
-        coefficients = self._applied_force(name)
-        self.check_finite(coefficients, f"forces.{name}")
+        coefficients = self.applied_coefficients(name)
+        check_finite_values(self, coefficients, f"forces.{name}")
         return coefficients
 
-    def check_finite(self, values: Numbers, name: str | None = None) -> None:
-        """Raise MechanismError for the first instant that was solved and at which Taylor coefficients are not finite.
-
-        Parameters
-        ----------
-        values : array of shape (levels, ..., time)
-            Taylor coefficients.
-        name : str, optional
-            Of the force; the applied force that is not finite there is looked for unless given.
-        """
-        if self.motion.traced:
-            return
-        bad = ~np.isfinite(values).all(axis=tuple(range(1, values.ndim - 1))) & (self.motion.status == Status.OK)
-        if not bad.any():
-            return
-        lane = int(np.argmax(bad.any(axis=0)))
-        level = int(np.argmax(bad[:, lane]))
-        if name is None:
-            unfit = [
-                n
-                for n in force_names(self.model)
-                if not np.isfinite(self._applied_force(n)[: level + 1, :, lane]).all()
-            ]
-            name = f"forces.{unfit[0]}" if unfit else "joints"
-        at, advice = f"no finite value at t = {self.motion.time[lane]:g} s", "check its law there"
-        if level:
-            raise MechanismError(f"its derivative {level} has {at}; {advice}, or ask for fewer derivatives", name=name)
-        raise MechanismError(f"has {at}; {advice}", name=name)
-
-    def _applied_force(self, name: str) -> Float[Numbers, "order component time"]:
+    def applied_coefficients(self, name: str) -> Float[Numbers, "order component time"]:
+        """Return an applied force, finite or not, as Taylor coefficients."""
         index, instance = self._force_index(name)
         return self._sizes(index)[:, :, instance]
 
@@ -467,16 +400,6 @@ class MotionForces:
         """Return coordinates at some instants, of bodies and to a number of coefficients as `part_of` has them."""
         coordinates = part_of(self.coordinates, bodies, levels)
         return {name: values[..., lanes] for name, values in coordinates.items()}
-
-    def _check_finite(self, finite: Any, lanes: np.ndarray) -> None:
-        """Raise MechanismError for the first instant that was solved and at which an applied force is not finite."""
-        if self.motion.traced:
-            return
-        bad = np.argwhere((~np.asarray(finite) & (self.motion.status[lanes] == Status.OK)).T)
-        if len(bad):
-            lane, force = bad[0]
-            name, instant = force_names(self.model)[force], self.motion.time[lanes[lane]]
-            raise MechanismError(f"has no finite value at t = {instant:g} s; check its law", name=f"forces.{name}")
 
     def _poses(self, index: int, lanes: np.ndarray) -> tuple[dict[str, Any], ...]:
         return tuple(self.coordinates_at(slot, lanes, self.levels) for slot in self.model.system.groups[index].bodies)

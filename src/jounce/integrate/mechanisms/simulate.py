@@ -10,7 +10,8 @@ from jaxtyping import Bool
 
 from jounce.activity import Count
 from jounce.constraints import AbstractConstraint
-from jounce.dynamics.forward.accelerations import Equations, Instants, State, with_ground
+from jounce.dynamics.forward.accelerations import Equations, Instants, State
+from jounce.dynamics.forward.ground import with_ground
 from jounce.dynamics.forward.initial_state import ConsistentStart, consistent_start
 from jounce.dynamics.friction.coupling import joints_with_friction
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of

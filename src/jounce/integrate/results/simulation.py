@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.energy.energies import body_energy, energy_of_forces
+from jounce.dynamics.energy.energies import body_energy
+from jounce.dynamics.energy.potential import energy_of_forces
 from jounce.dynamics.forward.accelerations import Equations, Instants, Lanes, State, expand
 from jounce.dynamics.forward.initial_state import ConsistentStart
 from jounce.dynamics.motion_values import Coordinates, cut, pose_of

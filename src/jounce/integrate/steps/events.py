@@ -10,7 +10,8 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from jounce.dynamics.forward.accelerations import State, turns_with_ground, with_ground
+from jounce.dynamics.forward.accelerations import State
+from jounce.dynamics.forward.ground import turns_with_ground, with_ground
 from jounce.dynamics.motion_values import Coordinates
 from jounce.errors import MechanismError
 from jounce.execution.chunks import in_chunks

@@ -22,8 +22,8 @@ from jounce.dynamics.forward.accelerations import (
     Inverse,
     Lanes,
     State,
-    with_ground,
 )
+from jounce.dynamics.forward.ground import with_ground
 from jounce.integrate.steps.events import INTERPOLATION, NODES
 from jounce.integrate.steps.exact_programs import is_plain
 from jounce.integrate.steps.methods import MARGIN, evaluated

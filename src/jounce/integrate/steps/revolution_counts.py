@@ -11,7 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from jounce.dynamics.forward.accelerations import Equations, Lanes, State, turns_with_ground
+from jounce.dynamics.forward.accelerations import Equations, Lanes, State
+from jounce.dynamics.forward.ground import turns_with_ground
 from jounce.integrate.steps.methods import evaluated
 from jounce.jet import Jet
 from jounce.mechanism.axis_angles import measures_angle

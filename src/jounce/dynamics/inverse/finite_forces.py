@@ -1,0 +1,55 @@
+"""Checks that forces of a motion are finite, which name the force and the instant at which one is not."""
+
+from typing import Any
+
+import numpy as np
+
+from jounce.errors import MechanismError
+from jounce.kinematics import Status
+from jounce.mechanism.element_indices import force_names
+from jounce.shapes import Numbers
+
+__all__ = ["check_finite_forces", "check_finite_values"]
+
+
+def check_finite_values(forces: Any, values: Numbers, name: str | None = None) -> None:
+    """Raise MechanismError for the first instant that was solved and at which Taylor coefficients are not finite.
+
+    Parameters
+    ----------
+    forces : MotionForces
+        Of which they are.
+    values : array of shape (levels, ..., time)
+        Taylor coefficients.
+    name : str, optional
+        Of the force; the applied force that is not finite there is looked for unless given.
+    """
+    if forces.motion.traced:
+        return
+    bad = ~np.isfinite(values).all(axis=tuple(range(1, values.ndim - 1))) & (forces.motion.status == Status.OK)
+    if not bad.any():
+        return
+    lane = int(np.argmax(bad.any(axis=0)))
+    level = int(np.argmax(bad[:, lane]))
+    if name is None:
+        unfit = [
+            n
+            for n in force_names(forces.model)
+            if not np.isfinite(forces.applied_coefficients(n)[: level + 1, :, lane]).all()
+        ]
+        name = f"forces.{unfit[0]}" if unfit else "joints"
+    at, advice = f"no finite value at t = {forces.motion.time[lane]:g} s", "check its law there"
+    if level:
+        raise MechanismError(f"its derivative {level} has {at}; {advice}, or ask for fewer derivatives", name=name)
+    raise MechanismError(f"has {at}; {advice}", name=name)
+
+
+def check_finite_forces(forces: Any, finite: Any, lanes: np.ndarray) -> None:
+    """Raise MechanismError for the first instant that was solved and at which an applied force is not finite."""
+    if forces.motion.traced:
+        return
+    bad = np.argwhere((~np.asarray(finite) & (forces.motion.status[lanes] == Status.OK)).T)
+    if len(bad):
+        lane, force = bad[0]
+        name, instant = force_names(forces.model)[force], forces.motion.time[lanes[lane]]
+        raise MechanismError(f"has no finite value at t = {instant:g} s; check its law", name=f"forces.{name}")
