@@ -23,6 +23,7 @@ from jounce.robot.recursions.tree_equations import TreeEquations, TreeState, Unk
 from jounce.shapes import Numbers
 
 STUCK = 64  # steps that hardly move on, one after the other: a force that switches without end
+STUCK_STEP = 10 * SHORTEST  # of the run: joints that stick switch after steps that are little longer than the shortest
 AGAIN = 10  # such steps over a jump that end where there is no number: others are tried
 SHORT = 1e-5  # of the step that the series alone would allow
 STEEP = 1e-3  # of that step: a force that cuts it shorter may jump
@@ -345,7 +346,7 @@ def march_robot(
         onwards = jnp.where(last, stop, time[0] + since)
         rest = jnp.where(last, 0.0, since - (onwards - time[0]))
         short = (step < SHORT * wished) & ~last
-        stuck = steps_counted(current.stuck, step, duration)
+        stuck = steps_counted(current.stuck, step, duration, longest=STUCK_STEP)
         moves = known & (low > 0) & (stuck < STUCK)
         again = (
             known & (low == 0.0) & (stuck < STUCK) & (current.crossing < AGAIN)

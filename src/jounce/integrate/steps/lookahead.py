@@ -188,9 +188,14 @@ def finest(duration: Numbers, time: Numbers, crossing: Numbers) -> Numbers:
     return longer * jnp.maximum(duration, jnp.abs(time))
 
 
-def steps_counted(before: Numbers, step: Numbers, duration: Numbers, count: Numbers | bool = True) -> Numbers:
-    """Return how many short steps follow one another, with one more where `counts` says so."""
-    short = jnp.abs(step) <= SHORTEST * duration
+def steps_counted(
+    before: Numbers, step: Numbers, duration: Numbers, count: Numbers | bool = True, longest: float = SHORTEST
+) -> Numbers:
+    """Return how many short steps follow one another, with one more where `count` says so.
+
+    Short are steps of at most a part of the run, `longest`.
+    """
+    short = jnp.abs(step) <= longest * duration
     return jnp.where(short & count, before + 1, jnp.where(jnp.abs(step) > AWAY * duration, 0, before))
 
 
