@@ -102,7 +102,7 @@ def test_a_minus_before_an_expression_needs_no_equals_sign(file, capsys):
     status, _, err = shown(capsys, file, "--minimize", "-span(nothing)", *VARY)
     assert status == 2
     assert "unknown name 'nothing' in '-span(nothing)'" in err  # it was read as an expression
-    assert "a minus before it" in " ".join(_help(capsys).split())
+    assert "a minus sign maximizes" in " ".join(_help(capsys).split())
 
 
 def _help(capsys):

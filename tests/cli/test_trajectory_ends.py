@@ -90,7 +90,7 @@ def test_a_path_of_samples_keeps_its_deviation_and_what_is_told_as_kept_is_kept(
     told = result("retime", text)
     assert (status, told["kept"]) == (0, True)
     assert told["deviation"] <= told["deviation_allowed"] == pytest.approx(np.radians(0.02))
-    assert told["path"].startswith("within 0.000349 rad or m of the straight lines between 201 samples")
+    assert told["path"].startswith("within 0.000349 rad or m of each of 201 samples")
     q = np.loadtxt(out, delimiter=",", skiprows=1)[:, 1]
     assert (q[0], q[-1]) == (pytest.approx(0.0, abs=1e-12), pytest.approx(0.9, abs=1e-12))
     assert (np.diff(q) >= -1e-12).all()

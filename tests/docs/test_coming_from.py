@@ -234,7 +234,10 @@ def _(motion):
     assert callable(jn.simulate_batch)
 
 
-@row(ADAMS, "contact, flexible bodies, friction that depends on reactions", slow=True)
+row(ADAMS, "contact, flexible bodies")(lambda: None)  # what is not supported has no check
+
+
+@row(ADAMS, "friction that depends on reactions", slow=True)
 def _(fall):
     """Friction of a constant size takes its work from the energy, on the way up and on the way back."""
     (turn,) = (instant for instant, _ in fall.kinks)
@@ -380,7 +383,7 @@ def _(panda, frame):
     near(frame.angular_velocity[1], there.angular)
 
 
-@row(PINOCCHIO, "`getFrameAcceleration`: spatial, and in `LOCAL` axes unless told")
+@row(PINOCCHIO, "`getFrameAcceleration`: spatial, and in `LOCAL` axes by default")
 def _(panda, frame):
     there = pin.getFrameAcceleration(panda.model, panda.data, frame_of(panda))
     spatial = frame.position[2] - np.cross(frame.angular_velocity[0], frame.position[1])

@@ -114,5 +114,5 @@ def test_what_is_given_much_is_compiled_well_however_seldom_it_is_called(count, 
         translated, "object_file", lambda *given, **how: asked.append(how["brief"]) or made(*given, **how)
     )
     x = np.linspace(0, 1, count)
-    np.testing.assert_array_equal(Compiled(lambda x: 2.0 * x, (), brief=True, alone=True)(x), 2 * x)
+    np.testing.assert_array_equal(Compiled(lambda x: 2.0 * x, (), brief=True, single=True)(x), 2 * x)
     assert asked == [count == 10]

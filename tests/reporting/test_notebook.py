@@ -54,7 +54,7 @@ def test_a_mechanism(four_bar):
         ["D", "revolute", "ground, rocker"],
         ["BC", "double_revolute", "crank, rocker"],
     ]
-    assert ["BC", "0.1423"] in found["Parameters (SI)"]
+    assert ["BC", "0.1423", "m"] in found["Parameters (SI)"]
     assert found["Drivers"][1][-1] == "30*deg + 60*deg*sin(2*pi*t/tau)"
     assert found["Outputs"][1:] == [["psi", "angle", "rocker", "rad"], ["C", "point", "rocker", "m"]]
     assert found["Bodies, as guessed"][2] == ["rocker", "[AD, 0]", "1.74533"]

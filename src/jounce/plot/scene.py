@@ -78,7 +78,7 @@ def scene_of(moving: Motion | Mechanism, *, view: View = VIEW, instants: Instant
     >>> from jounce.plot.scene import scene_of
     >>> scene = scene_of(jn.load("examples/four_bar.yaml"))
     >>> [label.text for label in scene.labels]
-    ['crank', 'rocker', 'A', 'D', 'BC']
+    ['crank', 'rocker', 'A', 'D', 'BC', 'C']
     """
     return Scene.of(drawing_of(moving, view=view, instants=instants))
 

@@ -255,7 +255,7 @@ def sketch(
     >>> from jounce.plot import sketch
     >>> figure = sketch(jn.load("examples/four_bar.yaml"))
     >>> sorted(text.get_text() for text in figure.axes[0].texts)
-    ['20 mm', 'A', 'BC', 'C', 'D', 'crank', 'rocker']
+    ['25 mm', 'A', 'BC', 'C', 'D', 'crank', 'rocker']
     """
     mechanism = getattr(moving, "mechanism", moving)
     check_mechanism(mechanism)

@@ -295,7 +295,7 @@ def _followed(
     knots, jumps, less = _jumps(law, float(values.min()), float(values.max()), order, seen)
     if not jumps.any():
         return *none, unknown or less
-    peaks = [np.max(np.abs(c)) for c in seen.coefficients(leader, looks, order)]
+    peaks = [np.abs(c).max(where=np.isfinite(c), initial=0.0) for c in seen.coefficients(leader, looks, order)]
     step = (last - first) / INTERVALS
     # a knot at which the leader begins or ends is passed on the way there, or from there
     looks = np.concatenate([[first - step], looks, [last + step]])

@@ -61,6 +61,8 @@ def values_of(kind, size):
             one = WORDS.get(key.key)
         if key.kind == "curve":
             one = SURFACE if key.key == "surface" else {"expressions": CURVE[:size], "range": [-3.0, 3.0]}
+        if key.key == "friction":
+            one = {"coefficient": 0.3, "speed": 0.2} | ({"radius": 0.1} if kind.has_friction_radius else {})
         found[key.key] = [copy.deepcopy(one) for _ in key.fields] if len(key.fields) > 1 else one
     return {key: value for key, value in found.items() if value is not None}
 
@@ -212,6 +214,7 @@ def test_the_walk_meets_every_key_of_the_schema():
         "euler",
         "sequence",
         "samples",
+        "cam",
         "expression",
         "degree",
         "derivative",

@@ -137,7 +137,7 @@ def test_toml_and_json_are_read_too(read):
         ("joints: {pin: {jerk: fast}}", "line 1, joints.pin.jerk: "),
         (
             "joints: {pin: {velocity: 2 m/s}}",
-            "line 1, joints.pin.velocity: the unit is that of length/time, got '2 m/s'; a joint that turns has "
+            "line 1, joints.pin.velocity: the unit is that of a speed, got '2 m/s'; a joint that turns has "
             "velocity in rad/s",
         ),
         (

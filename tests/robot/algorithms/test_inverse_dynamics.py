@@ -328,7 +328,6 @@ def test_calls_as_in_pinocchio_are_told_how_they_are_made_here():
         (lambda: jn.inverse_dynamics(robot, q, q, q), r"takes 2 arguments.*jn\.inverse_dynamics\(robot, np\.stack"),
         (lambda: jn.forward_dynamics(robot, q, q, q), r"takes 3 arguments.*pin\.aba\(model, data, q, v, tau\)"),
         (lambda: jn.bias_forces(robot, q, q), "pin.nonLinearEffects"),
-        (lambda: jn.mass_matrix(q, robot), "the robot is the first argument"),
         (lambda: jn.inverse_dynamics(robot, q), r"np\.stack\(\[q, v, a\]\)"),
     ):
         with pytest.raises(jn.errors.RobotError, match=words):

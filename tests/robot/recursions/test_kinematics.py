@@ -116,7 +116,8 @@ NOTHING = jn.Robot("frame", [jn.Link("base")], [])
         (lambda: jn.jacobian(PIN, [[0.0]], "pin"), "link: no link has this name, got 'pin'; valid: base, rod"),
         (
             lambda: jn.forward_kinematics(PIN, [0.0], "rod"),
-            "q: must have the shape (..., order + 1, n), not (1,); one has 1 joint: n = 1",
+            "q: must have the shape (..., order + 1, n), not (1,); one has 1 joint: n = 1; stack positions and "
+            "derivatives: np.stack([q, v, a])",
         ),
         (
             lambda: jn.inverse_dynamics(PIN, np.zeros((3, 2))),

@@ -38,7 +38,7 @@ def register_method(name: str, make: Callable[[float | None], AbstractMethod]) -
     >>> import jounce as jn
     >>> jn.integrate.register_method("taylor-12", lambda step: jn.integrate.Taylor(order=12, step=step))
     >>> jn.integrate.method_named("taylor-12")
-    Taylor(order=12, step=None)
+    Taylor(order=12)
     """
     if not isinstance(name, str) or not name:
         raise MechanismError("a method needs a name", name="name", value=name)
