@@ -81,11 +81,11 @@ def test_peaks_are_named_torque_yank_and_second_rate(motion):
 
 
 @pytest.mark.slow
-def test_figures_draw_forces_beside_accelerations(motion):
-    axes = np.reshape(draw(motion, ["angle", "T"]).axes, (3, 2))
-    assert [a.get_visible() and a.axison for a in axes[:, 1]] == [False, False, True]
-    assert axes[2, 1].get_ylabel() == "torque\n$T$  (N m)"
-    assert axes[2, 1].get_title(loc="left") == "T"
+def test_figures_stack_short_columns(motion):
+    axes = draw(motion, ["angle", "T"]).axes
+    assert [a.get_visible() and a.axison for a in axes] == [True] * 4
+    assert [a.get_title(loc="left") for a in axes] == ["angle", "", "", "T"]
+    assert axes[3].get_ylabel() == "torque\n$T$  (N m)"
 
 
 def test_the_command_shows_them(path, capsys):
