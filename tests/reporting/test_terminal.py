@@ -52,7 +52,7 @@ def test_a_line_of_progress_is_shown_on_a_terminal_and_for_long_work_only(capsys
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     monkeypatch.setenv("TERM", "xterm-256color")
     told = []
-    with Display("solve") as shown, Count("solving", told=lambda *call: told.append(call)) as count:
+    with Display("solve") as shown, Count("solving", report=lambda *call: told.append(call)) as count:
         count(3, 5)
         shown._look()
     assert capsys.readouterr().err == ""
