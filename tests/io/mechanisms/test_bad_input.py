@@ -118,8 +118,12 @@ def test_a_file_of_comments_only_is_empty(tmp_path):
 
 
 @pytest.mark.parametrize("file", sorted((ROOT / "examples").glob("*.yaml")), ids=lambda file: file.stem)
-def test_the_early_look_lets_pass_what_is_right(file):
+def test_the_early_look_passes_what_is_right_and_that_alone(tmp_path, file):
     check_keys(file)
+    path = tmp_path / "misspelled.yaml"
+    path.write_text(file.read_text().replace("bodies:", "bodis:", 1))
+    with pytest.raises(MechanismFileError, match="'bodis'"):
+        check_keys(path)
 
 
 def test_a_misspelling_is_told_without_jax(tmp_path):
