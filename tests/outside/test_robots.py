@@ -194,7 +194,7 @@ def test_springs_gravity_switches_and_loops_of_simulators_are_read(load):
         np.asarray(jn.inverse_dynamics(load(*rod, part, strict=True), np.zeros((3, 1))))[0, 0]
         for part in ("", f'<gazebo reference="pin">{spring}</gazebo>')
     )
-    with pytest.warns(jn.errors.RobotWarning, match="without the weight of links"):
+    with pytest.warns(jn.errors.RobotWarning, match="the weight of links that <gazebo> takes out of gravity"):
         weightless = load(*rod, f'<gazebo reference="rod">{OFF}</gazebo>')
     light = np.asarray(jn.inverse_dynamics(weightless, np.zeros((3, 1))))[0, 0]
     np.testing.assert_allclose([sprung - bare, light], [-50, 0], atol=1e-12)
